@@ -65,13 +65,7 @@ class SceneError(SimulatorError):
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
-    """Return the error for an unknown name; it suggests the closest known name, or lists them all.
-
-    Args:
-        what: kind of thing that the name should stand for ("task").
-        name: the name as typed.
-        known: the known names.
-    """
+    """Return the error for an unknown name of a kind ("task"); it suggests the closest known name, or lists all."""
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
@@ -107,8 +101,6 @@ def wrap_errors(
     Args:
         problem: the problem and its place ("set.json: not JSON").
         hint: the way to fix it.
-        catch: error classes to convert.
-        raise_as: class to convert them to.
 
     Raises:
         InfthorError: an instance of `raise_as`, with the message "PROBLEM (REASON); HINT".

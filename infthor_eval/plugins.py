@@ -41,11 +41,7 @@ class PluginTable:
         return {point.name: point for point in entry_points(group=self.group)}
 
     def load(self, name: str, protocol: type) -> Any:
-        """Import a class.
-
-        Args:
-            name: name of the class.
-            protocol: protocol whose members a class of another package must have.
+        """Import the class of a name; one of another package must have the members of the protocol.
 
         Raises:
             UsageError: there is no such name, or another package's class cannot be imported or lacks a member.

@@ -17,14 +17,7 @@ __all__ = ["Rate", "clustered_rate", "format_number", "format_percent", "rate_ov
 
 
 class Rate(msgspec.Struct, frozen=True):
-    """A mean with its 95 % interval, clustered by trajectory.
-
-    Attributes:
-        mean: the mean.
-        low: lower end of the interval; None with fewer than two trajectories.
-        high: upper end of the interval; None with fewer than two trajectories.
-        n: number of values.
-    """
+    """The mean of n values with its 95 % interval, clustered by trajectory; None with fewer than two trajectories."""
 
     mean: float
     low: float | None

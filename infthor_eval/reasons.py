@@ -14,11 +14,7 @@ _NUMBER = re.compile(r"(?<![\w/.,-])\d+(?:,\d{3})*(?:\.\d+)?(?![\w/]|[.,-]\w)")
 
 
 def count_reasons(reasons: Iterable[tuple[_Where, str]]) -> list[tuple[_Where, str, int]]:
-    """Return task, reason and count in alphabetical order; numbers that differ are given as a range.
-
-    Args:
-        reasons: task (or task and outcome) and reason of each case.
-    """
+    """Count reasons by task (or task and outcome), in alphabetical order; numbers that differ are given as a range."""
     groups: dict[tuple[_Where, str], list[str]] = defaultdict(list)
     for where, reason in reasons:
         groups[where, _NUMBER.sub("#", reason)].append(reason)

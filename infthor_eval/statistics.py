@@ -28,15 +28,9 @@ _LEVEL = 0.95
 
 @dataclass(frozen=True)
 class MeanEstimate:
-    """A mean with its uncertainty.
+    """The mean of n scores with its clustered standard error and 95 % interval, which need not be symmetric.
 
-    Attributes:
-        mean: mean score.
-        stderr: clustered standard error; None with fewer than two clusters.
-        low: lower end of the 95 % interval, which need not be symmetric; None with fewer than two clusters.
-        high: upper end of the interval; None with fewer than two clusters.
-        n: number of scores.
-        n_clusters: number of clusters.
+    Error and interval are None with fewer than two clusters.
     """
 
     mean: float
@@ -49,11 +43,9 @@ class MeanEstimate:
 
 @dataclass(frozen=True)
 class Difference:
-    """The mean difference of two runs on the same questions, with its p-value.
+    """The mean difference of two runs on the same questions, second minus first.
 
-    Attributes:
-        estimate: mean of the differences, second run minus first.
-        p: two-sided p-value of the clustered t statistic; None with fewer than two clusters.
+    `p` is the two-sided p-value of the clustered t statistic; None with fewer than two clusters.
     """
 
     estimate: MeanEstimate
@@ -66,10 +58,6 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Mea
     If all scores lie between 0 and 1, the interval is of Wilson's type on the effective sample size, so it stays valid
     near 0 and 1 and is not empty where all scores are equal. Other scores (the reference scorer can exceed 1) get a t
     interval with `n_clusters - 1` degrees of freedom.
-
-    Args:
-        scores: one score per question.
-        clusters: trajectory of each question.
 
     Raises:
         DataError: there is no score, or a score has no cluster.
@@ -87,9 +75,6 @@ def mean_over_clusters(values: Sequence[float]) -> MeanEstimate:
 
     Unlike `clustered_mean`, this never takes values for shares: the points of a reward curve that happen to lie between
     0 and 1 get the same kind of interval as all others.
-
-    Args:
-        values: one value per cluster.
 
     Raises:
         DataError: there is no value.
@@ -170,12 +155,7 @@ def bootstrap_interval(
 
 
 def paired_difference(first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]) -> Difference:
-    """Return the mean difference of two runs on the same questions, second minus first.
-
-    Args:
-        first: scores of the first run.
-        second: scores of the second run, in the same order.
-        clusters: trajectory of each question.
+    """Return the mean difference of the scores of two runs on the same questions in the same order, second minus first.
 
     Raises:
         DataError: the runs differ in length, or as in `clustered_mean`.

@@ -42,20 +42,12 @@ __all__ = [
 
 
 class _BuiltIn(NamedTuple):
-    """A suite of this package.
-
-    Attributes:
-        suite: "module:Class" of the suite.
-        options: "module:Class" of its options, which can be imported without the suite.
-        presenter: "module:Class" of its presenter.
-        requests: "module:Class" of its adapter for lm-eval's requests.
-        baselines: names of its baselines, which can be listed without importing it.
-    """
+    """A suite of this package: "module:Class" of each part, and names of its baselines, listed without importing it."""
 
     suite: str
     options: str
     presenter: str
-    requests: str
+    requests: str  # the adapter for lm-eval's requests
     baselines: tuple[str, ...]
 
 
@@ -108,8 +100,7 @@ def find_suite(name: str) -> "Suite[Any, Any]":
     suite_class = _SUITES.load(name, Suite)
     if suite_class.name != name:
         raise UsageError(f"the suite {name} of another package calls itself {suite_class.name!r}; give it one name")
-    suite: Suite[Any, Any] = suite_class()
-    return suite
+    return suite_class()
 
 
 def find_presenter(name: str) -> "Presenter":
@@ -121,8 +112,7 @@ def find_presenter(name: str) -> "Presenter":
     from infthor_eval.report.plain import PlainPresenter
     from infthor_eval.report.presenter import Presenter
 
-    presenter: Presenter = (_PRESENTERS.load(name, Presenter) if name in _PRESENTERS.names else PlainPresenter)()
-    return presenter
+    return (_PRESENTERS.load(name, Presenter) if name in _PRESENTERS.names else PlainPresenter)()
 
 
 def find_request_adapter(name: str) -> "RequestAdapter[Any, Any]":
@@ -133,8 +123,7 @@ def find_request_adapter(name: str) -> "RequestAdapter[Any, Any]":
     """
     from infthor_eval.harness.requests import RequestAdapter
 
-    adapter: RequestAdapter[Any, Any] = _REQUESTS.load(name, RequestAdapter)()
-    return adapter
+    return _REQUESTS.load(name, RequestAdapter)()
 
 
 def options_class(name: str) -> type:
@@ -143,10 +132,7 @@ def options_class(name: str) -> type:
     Raises:
         UsageError: the suite of another package cannot be imported or is incomplete.
     """
-    if name not in _BUILT_IN:
-        return find_suite(name).options
-    options: type = import_target(_BUILT_IN[name].options)
-    return options
+    return import_target(_BUILT_IN[name].options) if name in _BUILT_IN else find_suite(name).options
 
 
 def suite_code(name: str) -> dict[str, Any]:

@@ -30,14 +30,7 @@ class TableCell(str):
 
 
 def interval_cell(low: float | None, high: float | None, form: str = ".1f", pattern: str = "[{}, {}]") -> TableCell:
-    """Return a cell with an interval; `-` if there is none.
-
-    Args:
-        low: lower end.
-        high: upper end.
-        form: format of an end.
-        pattern: text of the cell, with a place for each end.
-    """
+    """Return a cell with an interval, its ends formatted and in the places of the pattern; `-` if there is none."""
     if low is None or high is None:
         return TableCell("-", {"low": "", "high": ""})
     ends = {"low": f"{low:{form}}", "high": f"{high:{form}}"}
@@ -46,12 +39,7 @@ def interval_cell(low: float | None, high: float | None, form: str = ".1f", patt
 
 @dataclass(frozen=True)
 class Column:
-    """A column.
-
-    Attributes:
-        name: heading of the column.
-        is_number: whether its cells are numbers, which are aligned on the right.
-    """
+    """A column with its heading; numbers are aligned on the right."""
 
     name: str
     is_number: bool = True
@@ -59,12 +47,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Row:
-    """A row.
+    """A row: a text per column (missing ones at the end are empty), of published numbers or our own.
 
     Attributes:
-        cells: a text per column; missing ones at the end are empty.
-        is_published: whether its numbers are published ones of others.
-        ends_section: whether a line is drawn below it.
+        ends_section: True if a line is drawn below it.
     """
 
     cells: tuple[str, ...]
@@ -74,14 +60,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
-
-    Attributes:
-        title: one line; empty for none.
-        columns: at least one column.
-        rows: rows in the order shown.
-        notes: remarks below the table, a paragraph each.
-    """
+    """A table of at least one column, with a title of one line (empty for none), and notes below, a paragraph each."""
 
     title: str
     columns: tuple[Column, ...]

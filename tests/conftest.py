@@ -102,8 +102,8 @@ def scripted_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def task_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the packaged task files that commands and runs of this process find instead; its folder."""
     folder = tmp_path / "tasks"
-    shutil.copytree(Catalog.packaged().folder, folder)
-    monkeypatch.setattr(Catalog, "packaged", classmethod(lambda cls: cls(folder)))
+    shutil.copytree(Catalog.find_packaged().folder, folder)
+    monkeypatch.setattr(Catalog, "find_packaged", classmethod(lambda cls: cls(folder)))
     return folder
 
 

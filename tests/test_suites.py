@@ -85,8 +85,8 @@ def test_it_is_found_by_name_behind_the_built_in_ones(package):
     before = suite_code("sums")
     (package / "sums_suite.py").write_text(SUITE + "\n")
     assert suite_code("sums") != before
-    assert Catalog.installed().tasks["sums"].suite == "sums"
-    assert "sums" not in Catalog.packaged().tasks
+    assert Catalog.find_installed().tasks["sums"].suite == "sums"
+    assert "sums" not in Catalog.find_packaged().tasks
 
 
 @pytest.fixture
@@ -164,7 +164,7 @@ def test_what_is_no_presenter_is_refused_in_one_line(package, add_presenter, tar
 def test_a_package_without_the_folder_that_it_names_is_told(point, target):
     point(target, "infthor_eval.tasks")
     with pytest.raises(UsageError, match=f"the tasks sums of another package are not in {target}"):
-        Catalog.installed()
+        Catalog.find_installed()
 
 
 def test_an_option_that_every_run_has_is_refused(package):

@@ -63,10 +63,10 @@ class EpisodeRunner(Generic[E, P]):
         try:
             result, faults = with_retries(self._simulator, run, self._drop_environment)
         except (InfeasibleError, SceneError) as error:
-            return unit.excluded(str(error), fingerprint)
+            return unit.record_exclusion(str(error), fingerprint)
         except InfthorError as error:
             begun = unit if self.begun is None else replace(unit, payload=self.begun)
-            return begun.failed(session.describe_failure(unit, error), fingerprint, usage=self.usage)
+            return begun.record_failure(session.describe_failure(unit, error), fingerprint, usage=self.usage)
         return unit.record(
             fingerprint,
             result.payload,

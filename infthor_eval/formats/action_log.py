@@ -10,11 +10,7 @@ __all__ = ["read_action_log"]
 
 
 def read_action_log(path: Path, places: Mapping[str, int]) -> dict[int, tuple[int, ...]]:
-    """Return the frames of each low-level action that has any.
-
-    Args:
-        path: the file.
-        places: position in the trajectory of each frame, by the frame's file name without suffix.
+    """Return the frames of each low-level action that has any; `places` are their positions by the stem of the file.
 
     Raises:
         DataError: the file is missing, has another form, or names frames that are not in `places`.

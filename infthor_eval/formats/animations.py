@@ -1,8 +1,8 @@
 """Writing pictures as an MP4 or GIF file; the same pictures give the same bytes."""
 
 import tempfile
-from collections.abc import Iterable, Iterator
-from itertools import chain
+from collections.abc import Iterable
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
@@ -33,15 +33,12 @@ def require_animation_name(path: Path) -> None:
 
 
 def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    """Write pictures as an animation, atomically; only one picture at a time is in memory.
+    """Write pictures as an animation, atomically, and return their number; only one at a time is in memory.
 
     Args:
         path: the file; its suffix is one of `ANIMATION_FORMATS`.
         pictures: one or more RGB pictures, all of one size with even sides.
         per_second: frame rate, pictures per second.
-
-    Returns:
-        The number of pictures.
 
     Raises:
         UsageError: the file name has another suffix.
@@ -61,13 +58,15 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
 
 
 def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    counter = _Counter(pictures)
+    taken = count()  # advances with each picture
     # No dithering: its noise would make the file larger.
-    quantized = (picture.quantize(_COLOURS, dither=Image.Dither.NONE) for picture in counter)
+    quantized = (
+        picture.quantize(_COLOURS, dither=Image.Dither.NONE) for picture, _ in zip(pictures, taken, strict=False)
+    )
     first = next(quantized)
     duration = max(20, round(100 / per_second) * 10)  # GIF has hundredths of a second; viewers take 10 ms for 100 ms
     first.save(path, save_all=True, append_images=quantized, duration=duration, loop=0, optimize=False)
-    return counter.n
+    return next(taken)
 
 
 def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
@@ -75,20 +74,21 @@ def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -
 
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(0)  # it would print a warning for each missing codec
-    counter = _Counter(pictures)
-    rest = iter(counter)
+    rest = iter(pictures)
     first = next(rest)
+    n_pictures = 0
     try:
         video = _open_writer(path, first.size, per_second)
         for picture in chain([first], rest):
+            n_pictures += 1
             video.write(np.asarray(picture)[:, :, ::-1])  # OpenCV takes BGR
         video.release()
         n_written = int(cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT))
     finally:
         cv2.utils.logging.setLogLevel(level)
-    if n_written != counter.n:  # OpenCV does not report a full disk
-        raise DataError(f"{path.parent}: only {n_written} of {counter.n} pictures could be written; {_HINT}")
-    return counter.n
+    if n_written != n_pictures:  # OpenCV does not report a full disk
+        raise DataError(f"{path.parent}: only {n_written} of {n_pictures} pictures could be written; {_HINT}")
+    return n_pictures
 
 
 def _open_writer(path: Path, size: tuple[int, int], per_second: float):  # type: ignore[no-untyped-def]  # cv2 untyped
@@ -99,16 +99,3 @@ def _open_writer(path: Path, size: tuple[int, int], per_second: float):  # type:
         if video.isOpened():
             return video
     raise DataError("this OpenCV cannot write MP4; give --out a name that ends in .gif")
-
-
-class _Counter:
-    """An iterable that counts the pictures taken from it."""
-
-    def __init__(self, pictures: Iterable[Image.Image]) -> None:
-        self._pictures = pictures
-        self.n = 0
-
-    def __iter__(self) -> Iterator[Image.Image]:
-        for picture in self._pictures:
-            self.n += 1
-            yield picture

@@ -9,7 +9,7 @@ import tarfile
 import tempfile
 from pathlib import Path, PurePosixPath
 
-from infthor_eval.errors import DataError, in_one_line
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import DAMAGED, require_file
 
 __all__ = ["unpack_tar"]
@@ -30,7 +30,11 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
         DataError: the archive is damaged, has an unsafe member, or does not fit on the disk.
     """
     require_file(archive, "fetch it again")
-    try:
+    damaged = (tarfile.TarError, *DAMAGED)
+    with (
+        wrap_errors(f"{archive}: cannot be unpacked to {target}", "make room, or fetch the archive again"),
+        wrap_errors(f"{archive}: a damaged archive", "delete it and fetch it again", catch=damaged),
+    ):
         target.parent.mkdir(parents=True, exist_ok=True)
         with (
             tarfile.open(archive) as tar,
@@ -39,12 +43,6 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
             members = _check_members(tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free))
             tar.extractall(scratch, members=members, filter="data")
             (Path(scratch) / target.name).rename(target)
-    except (tarfile.TarError, *DAMAGED) as error:
-        raise DataError(f"{archive}: a damaged archive ({in_one_line(error)}); delete it and fetch it again") from error
-    except OSError as error:
-        raise DataError(
-            f"{archive}: cannot be unpacked to {target} ({in_one_line(error)}); make room, or fetch the archive again"
-        ) from error
 
 
 def _check_members(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int) -> list[tarfile.TarInfo]:

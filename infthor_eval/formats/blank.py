@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.user_cache import user_cache
 
@@ -29,12 +29,8 @@ def blank_like(frame: FrameRef) -> FrameRef:
         return frame
     path = user_cache("blank_frames") / f"{size[0]}x{size[1]}.png"
     if not path.is_file():
-        try:
+        with wrap_errors(f"{path}: cannot be written", "make room, or set XDG_CACHE_HOME"):
             _write(path, size)
-        except OSError as error:
-            raise DataError(
-                f"{path}: cannot be written ({error.strerror}); make room, or set XDG_CACHE_HOME"
-            ) from error
     return FrameRef(path)
 
 

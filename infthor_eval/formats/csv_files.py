@@ -23,7 +23,7 @@ def read_rows(
     Args:
         path: the file.
         columns: columns that the file must have.
-        hint: the way to fix a bad file, for the message.
+        hint: the way to fix a bad file.
         line_breaks: True if a cell may have several lines; otherwise a line break means an unclosed quote.
 
     Raises:

@@ -24,11 +24,7 @@ _PROBE = b"x" * 4096  # a full disk still creates an empty file, so content is w
 
 
 def prepare_folder(path: Path, option: str = "--out") -> Path:
-    """Create a folder and check that it can be written to, before work whose results would be lost otherwise.
-
-    Args:
-        path: the folder.
-        option: the command-line option that names the folder, for the message.
+    """Create the folder of an option and check that it can be written to, before results would be lost otherwise.
 
     Raises:
         DataError: the path is a file, or the folder cannot be created or written to.
@@ -40,11 +36,7 @@ def prepare_folder(path: Path, option: str = "--out") -> Path:
 
 
 def require_writable(path: Path, option: str = "--out") -> None:
-    """Check that a folder can be written to, or created; nothing is left behind.
-
-    Args:
-        path: the folder.
-        option: the command-line option that names the folder, for the message.
+    """Check that the folder of an option can be written to, or created; nothing is left behind.
 
     Raises:
         DataError: the folder cannot be written to or created.
@@ -68,11 +60,7 @@ def _is_there(path: Path) -> bool:
 
 
 def prepare_file(path: Path, option: str = "--out") -> Path:
-    """Check that a file can be written or replaced, and create its folder.
-
-    Args:
-        path: the file.
-        option: the command-line option that names the file, for the message.
+    """Check that the file of an option can be written or replaced, and create its folder.
 
     Raises:
         DataError: the path is a folder, a pipe or a device, or its folder cannot be written to.
@@ -86,10 +74,6 @@ def prepare_file(path: Path, option: str = "--out") -> Path:
 
 def refuse_overwrite(path: Path, content: bytes) -> None:
     """Refuse to replace a file by different content: somebody may have edited it.
-
-    Args:
-        path: the file.
-        content: the content to be written.
 
     Raises:
         DataError: the file exists and its content differs.

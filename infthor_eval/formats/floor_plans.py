@@ -56,7 +56,7 @@ def write_floor_plan(
     Args:
         root: the folder; created if it does not exist.
         scene: name of the floor plan.
-        objects: metadata of every object, as AI2-THOR reports it.
+        objects: metadata of every object from AI2-THOR.
         cells: reachable (x, z), metres.
         overwrite: True to replace a different recording of the same name.
 

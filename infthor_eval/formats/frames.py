@@ -83,7 +83,8 @@ class FrameRef:
             return f"{self.path}: cannot be read ({error.strerror})"
         if not head.startswith(_SIGNATURES):
             return f"{self.path}: not a PNG or JPEG image"
-        return self._wrong_size(*struct.unpack(">II", head[16:])) if _is_whole_png_head(head) else None
+        is_whole_png_head = head.startswith(_PNG) and len(head) == _HEAD and head[12:16] == b"IHDR"
+        return self._wrong_size(*struct.unpack(">II", head[16:])) if is_whole_png_head else None
 
     def load(self) -> Image.Image:
         """Return the frame as an RGB image.
@@ -115,7 +116,3 @@ class FrameRef:
         if max(width, height) > IMAGE_ASPECT.value * min(width, height):
             return f"{self.path}: an image of {width}x{height} pixels is too narrow; {IMAGE_ASPECT.hint}"
         return None
-
-
-def _is_whole_png_head(head: bytes) -> bool:
-    return head.startswith(_PNG) and len(head) == _HEAD and head[12:16] == b"IHDR"

@@ -25,8 +25,8 @@ def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = No
 
     Args:
         folder: folder of the set.
-        token: access token of the Hugging Face account, or None for the one that `hf auth login` stored.
-        endpoint: URL of another hub, or None for the public one.
+        token: access token; None for the one that `hf auth login` stored.
+        endpoint: URL of another hub; None for the public one.
 
     Raises:
         DataError: there is no network or no access, or the data are malformed.

@@ -25,12 +25,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Limit:
-    """One limit.
-
-    Attributes:
-        name: the environment variable that changes it.
-        default: the limit if that variable is not set.
-    """
+    """A limit, named as the environment variable that changes it."""
 
     name: str
     default: int

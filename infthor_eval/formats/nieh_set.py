@@ -35,13 +35,7 @@ _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
 @dataclass(frozen=True)
 class SkippedQuestion:
-    """A question that cannot be asked, with the reason.
-
-    Attributes:
-        question: the question.
-        reason: reason why it cannot be asked.
-        variant: the variant of the task that cannot be asked; empty if that is all of them, or there is only one.
-    """
+    """A question that cannot be asked, with the reason; in one variant of the task, or in all if `variant` is empty."""
 
     question: Question
     reason: str
@@ -79,9 +73,9 @@ class NiehSet:
         self._read = tuple(question for file in self._files for question in read_questions(file))
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
         # One tuple per trajectory, shared by all its questions: a copy each would be thousands of references.
-        self._all_frames: dict[str, tuple[FrameRef, ...]] = {}
+        self._all_frames: dict[str, tuple[FrameRef, ...] | DataError] = {}
         self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
-        self._outlines: dict[str, Outline] = {}
+        self._outlines: dict[str, Outline | DataError] = {}
         self._action_frames: dict[str, dict[int, tuple[int, ...]]] = {}
 
     @cached_property
@@ -132,9 +126,7 @@ class NiehSet:
         Raises:
             DataError: the trajectory is not in the set, or its frames do not match its metadata.
         """
-        if traj_id not in self._all_frames:
-            self._all_frames[traj_id] = tuple(self._trajectory(traj_id).values())
-        return self._all_frames[traj_id]
+        return _read_once(self._all_frames, traj_id, lambda: tuple(self._trajectory(traj_id).values()))
 
     def clue_frames(self, question: Question) -> tuple[FrameRef, ...]:
         """Return the frames with a question's evidence, in the order of its clues."""
@@ -155,11 +147,7 @@ class NiehSet:
             DataError: the file is not a trajectory.
         """
         path = self.outline_file(traj_id)
-        if path is None:
-            return None
-        if traj_id not in self._outlines:
-            self._outlines[traj_id] = read_outline(path)
-        return self._outlines[traj_id]
+        return None if path is None else _read_once(self._outlines, traj_id, lambda: read_outline(path))
 
     @property
     def missing_outline(self) -> str:
@@ -246,7 +234,9 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
         if not folder.is_dir():
             raise DataError(f"trajectory {folder.name} is not in metadata/")
     steps = sorted(read_steps(folder), key=lambda step: step.img_idx)
-    home = _image_folder(folder)
+    home = next((folder / name for name in _IMAGE_FOLDERS if (folder / name).is_dir()), None)
+    if home is None:
+        raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; {_HINT}")
     # By stem: published sets of other sizes (img_768) keep the names and change the suffix.
     names = [Path(step.img_filename).stem for step in steps]
     numbers = [step.img_idx for step in steps]
@@ -266,13 +256,6 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
         step.img_idx: FrameRef(by_stem.get(name, home / Path(step.img_filename).name))
         for step, name in zip(steps, names, strict=True)
     }
-
-
-def _image_folder(folder: Path) -> Path:
-    for name in _IMAGE_FOLDERS:
-        if (folder / name).is_dir():
-            return folder / name
-    raise DataError(f"trajectory {folder.name}: neither img/ nor img_768/ in {folder}; {_HINT}")
 
 
 def _images(folder: Path) -> dict[str, Path]:

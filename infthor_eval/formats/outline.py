@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, wrap_errors
 
 __all__ = ["Outline", "find_outline", "read_outline", "read_states"]
 
@@ -87,12 +87,10 @@ def read_outline(path: Path) -> Outline:
     Raises:
         DataError: the file cannot be read, or is not a trajectory.
     """
-    try:
-        outline = msgspec.json.decode(path.read_bytes(), type=Outline, strict=False)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}); restore it") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: not a trajectory ({error}); restore it") from error
+    with wrap_errors(f"{path}: cannot be read", "restore it"):
+        content = path.read_bytes()
+    with wrap_errors(f"{path}: not a trajectory", "restore it", catch=(msgspec.DecodeError, UnicodeDecodeError)):
+        outline = msgspec.json.decode(content, type=Outline, strict=False)
     ranges = [item.low_pddl_idx for item in outline.sub_trajs]
     if any(not 0 <= first <= end <= len(outline.plan.low_actions) for first, end in ranges):
         raise DataError(f"{path}: sub_trajs reach outside the low-level actions; restore it")

@@ -21,10 +21,9 @@ _SAME_SIZE = 0.1  # relative tolerance: counts of one model differ with its head
 
 
 class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One model's row.
+    """The row of a model by its name in the paper.
 
     Attributes:
-        name: name of the model in the paper.
         checkpoints: hub ids of the evaluated checkpoints.
         parameters: number of parameters of the checkpoint, in billions.
         values: one number per column, in percent.
@@ -52,7 +51,6 @@ class PublishedTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         source: paper and table that the numbers are from.
         suite: suite whose results can be compared with the table.
         context: evaluated setting (for NIEH: the context).
-        metric: metric of the numbers.
         columns: names of the columns, as in the suite's summary.
         rows: rows in the paper's order.
     """

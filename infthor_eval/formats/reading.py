@@ -49,12 +49,7 @@ def file_problem(path: Path) -> str | None:
 
 
 def require_file(path: Path, hint: str, max_mb: int | None = None) -> None:
-    """Check that a path is a file that can be read.
-
-    Args:
-        path: the file.
-        hint: the way to fix it, for the message.
-        max_mb: maximum size in MiB.
+    """Check that a path is a file that can be read, of at most `max_mb` MiB.
 
     Raises:
         DataError: it is missing, a folder, a pipe or a device, or too large.
@@ -79,11 +74,7 @@ def require_plain_files(folder: Path, hint: str) -> None:
 
 
 def read_bytes(path: Path, hint: str) -> bytes:
-    """Return the content of a file.
-
-    Args:
-        path: the file.
-        hint: the way to fix it, for the message.
+    """Return the content of a file; `hint` is the way to fix a bad one, for the message.
 
     Raises:
         DataError: it is not a file, too large, or cannot be read.
@@ -108,12 +99,7 @@ def read_json(path: Path, hint: str) -> Any: ...
 @overload
 def read_json(path: Path, hint: str, form: type[T]) -> T: ...
 def read_json(path: Path, hint: str, form: Any = Any) -> Any:
-    """Return the content of a JSON file as a type.
-
-    Args:
-        path: the file.
-        hint: the way to fix a bad file, for the message.
-        form: the type that `msgspec` decodes to.
+    """Return the content of a JSON file as the type that `msgspec` decodes it to.
 
     Raises:
         DataError: as `read_bytes`, or the content is not JSON, nested too deep, or does not match the type.

@@ -5,7 +5,6 @@ import shutil
 import tempfile
 from functools import cache
 from pathlib import Path
-from types import TracebackType
 
 __all__ = ["ScratchFolder"]
 
@@ -43,9 +42,7 @@ class ScratchFolder:
     def __enter__(self) -> Path:
         return self.path
 
-    def __exit__(
-        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.cleanup()
 
     def cleanup(self) -> None:

@@ -41,17 +41,14 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
         with wrap_errors(f"{path}: cannot be written", "make room, or give another folder"):
             path.write_text(json.dumps(info) + "\n", encoding="utf-8")
         return
-    known = _read(path)
-    if known.get("simulator") != simulator:
+    info = _read(path)
+    theirs, wrote = info.get("simulator"), info.get("infthor_eval")
+    if theirs != simulator:
         raise DataError(
-            f"{root}: its frames are of the {known.get('simulator')} simulator; "
-            f"give another folder for the {simulator} one"
+            f"{root}: its frames are of the {theirs} simulator; give another folder for the {simulator} one"
         )
-    if known.get("infthor_eval") != version:
-        raise DataError(
-            f"{root}: its frames were rendered by version {known.get('infthor_eval')}, this is {version}; "
-            "give another folder"
-        )
+    if wrote != version:
+        raise DataError(f"{root}: its frames were rendered by version {wrote}, this is {version}; give another folder")
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -141,13 +141,7 @@ class Step(msgspec.Struct, omit_defaults=True):
 
 
 def read_steps(folder: Path) -> list[Step]:
-    """Read the log of one trajectory.
-
-    Args:
-        folder: the trajectory's folder, `metadata/<traj_id>`.
-
-    Returns:
-        One entry per frame, in the order of the file.
+    """Read the log of the trajectory in `metadata/<traj_id>`: one entry per frame, in the order of the file.
 
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
@@ -158,12 +152,7 @@ def read_steps(folder: Path) -> list[Step]:
 
 
 def write_steps(folder: Path, steps: Sequence[Step]) -> None:
-    """Write the log of one trajectory as a list of entries, one per line.
-
-    Args:
-        folder: the trajectory's folder, which must exist.
-        steps: one entry per frame.
-    """
+    """Write the log of one trajectory into its folder, which must exist: a list of entries, one per line."""
     lines = b",\n".join(msgspec.json.encode(step) for step in steps)
     (Path(folder) / _FILE).write_bytes(b"[\n" + lines + b"\n]\n")
 

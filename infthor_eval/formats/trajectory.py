@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.reading import lines_of, read_bytes
 
@@ -204,10 +204,7 @@ class Trajectory(_Fields):
 class TrajectorySource:
     """One trajectory in a file, not yet decoded, so that a malformed one does not prevent reading the others.
 
-    Attributes:
-        path: the file.
-        line: line in the file, from 1; None if the file holds only this trajectory.
-        raw: JSON text of the trajectory.
+    `line` is its line in the file, from 1; None if the file holds only this trajectory.
     """
 
     path: Path
@@ -225,16 +222,13 @@ class TrajectorySource:
         Raises:
             DataError: the text is not JSON, or not of the documented form.
         """
-        try:
+        catch = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+        with wrap_errors(f"{self.place}: not a trajectory", _HINT, catch=catch):
             trajectory = msgspec.convert(_normalize(msgspec.json.decode(self.raw)), type=Trajectory)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise DataError(f"{self.place}: not a trajectory ({error}); {_HINT}") from error
-        trajectory.traj_id = trajectory.traj_id or trajectory.task_id or self._stem()
-        return trajectory
-
-    def _stem(self) -> str:
         stem = self.path.name.split(".")[0]
-        return stem if self.line is None else f"{stem}-{self.line}"
+        in_file = stem if self.line is None else f"{stem}-{self.line}"
+        trajectory.traj_id = trajectory.traj_id or trajectory.task_id or in_file
+        return trajectory
 
 
 def iter_sources(path: Path) -> Iterator[TrajectorySource]:
@@ -265,7 +259,9 @@ def trajectory_files(path: Path) -> list[Path]:
     """
     if not path.is_dir():
         return [path]
-    files = [file for file in sorted(path.rglob("*")) if _is_trajectory_file(file)]
+    named = (file for file in sorted(path.rglob("*")) if file.name.endswith(_SUFFIXES))
+    # Not only plain files: reading a pipe or device then raises the error that says what it is.
+    files = [file for file in named if not file.is_dir() and file.name not in _NOT_TRAJECTORIES]
     if not files:
         raise DataError(f"{path}: no {', '.join(_SUFFIXES)} file in this folder; give another path")
     return files
@@ -311,11 +307,4 @@ def folder_name(traj_id: str) -> str:
     A hash is appended if any is replaced (the ids of ALFRED have a slash), so that two ids never share a folder.
     """
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", traj_id).lstrip(".")[:150]
-    if name == traj_id and name:
-        return name
-    return f"{name}-{digest(traj_id, 4)}"
-
-
-def _is_trajectory_file(path: Path) -> bool:
-    # Not only plain files: reading a pipe or device then raises the error that says what it is.
-    return not path.is_dir() and path.name.endswith(_SUFFIXES) and path.name not in _NOT_TRAJECTORIES
+    return name if name == traj_id and name else f"{name}-{digest(traj_id, 4)}"

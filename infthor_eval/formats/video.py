@@ -43,12 +43,8 @@ def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
         digest = digest_of_file(path)
     folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"
     if not _is_complete(folder):
-        try:
+        with wrap_errors(f"{folder}: cannot be written", "make room, or set XDG_CACHE_HOME"):
             _extract(path, folder)
-        except OSError as error:
-            raise DataError(
-                f"{folder}: cannot be written ({error.strerror}); make room, or set XDG_CACHE_HOME"
-            ) from error
     return tuple(FrameRef(file) for file in sorted(folder.glob("*.png")))
 
 

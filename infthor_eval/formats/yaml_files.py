@@ -17,12 +17,7 @@ class PlainLoader(yaml.SafeLoader):
 
 
 def read_yaml(path: Path, hint: str, loader: type[PlainLoader] = PlainLoader) -> Any:
-    """Return the content of a YAML file.
-
-    Args:
-        path: the file.
-        hint: the way to fix a bad file, for the message.
-        loader: loader that knows the custom tags.
+    """Return the content of a YAML file, whose custom tags the loader knows.
 
     Raises:
         DataError: the file cannot be read, is not YAML, has duplicate keys or a recursive alias, or exceeds the limit

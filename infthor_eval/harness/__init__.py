@@ -1,1 +1,1 @@
-"""All that touches lm-eval: our tasks and models as its guests, and our runs in its files."""
+"""Everything that uses lm-eval: our tasks and models under its command, and our runs in its files."""

@@ -13,7 +13,7 @@ __all__ = ["settings_doc", "task_request"]
 
 
 def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options: type) -> Doc:
-    """Return what every doc of a task has: its suite, settings and options as JSON, and the place of the data.
+    """Return the common part of a task's docs: its suite, settings and options as JSON, and the place of the data.
 
     Args:
         suite: name of the suite.
@@ -34,15 +34,7 @@ def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options:
 def task_request(
     doc: Doc, task: str, options: type, generation_kwargs: Mapping[str, Any], seed: int
 ) -> TaskRequest[Any]:
-    """Return the request that a doc's task makes of its suite.
-
-    Args:
-        doc: any doc of the task.
-        task: name of the task.
-        options: dataclass of the suite's options.
-        generation_kwargs: decoding settings in lm-eval's words.
-        seed: seed of the run.
-    """
+    """Return the request of a task to its suite, given any of its docs, and the dataclass of the suite's options."""
     settings = {"dataset_kwargs": json.loads(doc["settings"]), "generation_kwargs": generation_kwargs}
     file = TaskFile(task, doc["suite"], Path(task), settings)
     data = Path(doc["data"]) if doc["data"] else None

@@ -1,4 +1,4 @@
-"""Our runs in lm-eval's files: results and samples as its own command writes them, for whoever reads those."""
+"""Our runs in lm-eval's files: results and samples as its own command writes them."""
 
 import json
 import time
@@ -17,19 +17,19 @@ from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
 
-__all__ = ["Exported", "export", "exported"]
+__all__ = ["Exported", "convert_run", "export"]
 
 _FILTER = "none"
 
 
 @dataclass(frozen=True)
 class Exported:
-    """A run in lm-eval's words.
+    """A run in lm-eval's form.
 
     Attributes:
-        model: the model's name, fit for a folder's.
-        results: what its `results_*.json` holds, as JSON values.
-        samples: by task, the lines of its `samples_*.jsonl`.
+        model: name of the model, valid as a folder's name.
+        results: contents of `results_*.json`, as JSON values.
+        samples: lines of `samples_*.jsonl` by task.
     """
 
     model: str
@@ -37,15 +37,17 @@ class Exported:
     samples: dict[str, list[dict[str, Any]]]
 
 
-def exported(outcome: RunOutcome) -> Exported:
-    """All of a run that lm-eval's files have."""
+def convert_run(outcome: RunOutcome) -> Exported:
+    """Convert a run to lm-eval's form."""
+    from lm_eval.utils import sanitize_model_name
+
     tasks = _tasks(outcome)
     samples = {task.name: _scored_rows(task) for task in tasks}
     hashes = {
         name: _hash("".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows))
         for name, rows in samples.items()
     }
-    model = _sanitised(outcome.run.request.model)
+    model = str(sanitize_model_name(outcome.run.request.model))
     return Exported(model, _results(outcome, tasks) | {"task_hashes": hashes, "model_name_sanitized": model}, samples)
 
 
@@ -58,34 +60,27 @@ def export(outcome: RunOutcome) -> Path:
     Raises:
         DataError: they cannot be written.
     """
-    made = exported(outcome)
-    folder = outcome.folder / "lm_eval" / made.model
+    converted = convert_run(outcome)
+    folder = outcome.folder / "lm_eval" / converted.model
     stamp = datetime.now().isoformat().replace(":", "-")
     with wrap_errors(f"{folder}: cannot be written", "make room, the journal holds it all"):
         folder.mkdir(parents=True, exist_ok=True)
-        for task, rows in made.samples.items():
+        for task, rows in converted.samples.items():
             with write_atomically(folder / f"samples_{task}_{stamp}.jsonl") as partial:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
         with write_atomically(folder / f"results_{stamp}.json") as partial:
-            partial.write_text(json.dumps(made.results, indent=2, ensure_ascii=False), encoding="utf-8")
+            partial.write_text(json.dumps(converted.results, indent=2, ensure_ascii=False), encoding="utf-8")
     return folder
 
 
 @dataclass(frozen=True)
 class _Scored:
-    """A task with its records.
-
-    Attributes:
-        file: the task.
-        records: the records of its units; at least one.
-        scores: the scores of each, by metric; empty for a failed one.
-        rows: the line of each in lm-eval's file, without its scores.
-    """
+    """A task with the records of its units, the scores of each, and its line in lm-eval's file without the scores."""
 
     file: TaskFile
     records: list[UnitRecord[Any]] = field(default_factory=list)
-    scores: list[Mapping[str, float]] = field(default_factory=list)
+    scores: list[Mapping[str, float]] = field(default_factory=list)  # empty for a failed unit
     rows: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -94,12 +89,11 @@ class _Scored:
 
     @cached_property
     def metrics(self) -> list[str]:
-        """Names of the metrics, of all records together."""
         return list(dict.fromkeys(name for scores in self.scores for name in scores))
 
 
 def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
-    """The tasks of which there are records that count."""
+    """Return the tasks with records that count."""
     tasks = {file.name: _Scored(file) for file in outcome.run.request.tasks.tasks}
     for record, sample in zip(outcome.records, outcome.samples, strict=True):
         if record.excluded is None:
@@ -110,7 +104,7 @@ def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
 
 
 def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
-    """A sample per line, in the task's order."""
+    """Return a row per sample, in the task's order."""
     rows = [
         row | {"metrics": task.metrics} | {name: scores.get(name, 0.0) for name in task.metrics}
         for row, scores in zip(task.rows, task.scores, strict=True)
@@ -144,7 +138,7 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
     return {
         "results": {task.name: _means(task) for task in tasks},
         "group_subtasks": {task.name: [] for task in tasks},
-        "configs": {task.name: _plain(task.file.settings) for task in tasks},
+        "configs": {task.name: json.loads(canonical_json(task.file.settings)) for task in tasks},
         "versions": {task.name: task.file.settings.get("metadata", {}).get("version") for task in tasks},
         "n-shot": {task.name: 0 for task in tasks},
         "higher_is_better": {task.name: dict.fromkeys(task.metrics, True) for task in tasks},
@@ -168,20 +162,10 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
 
 
 def _means(task: _Scored) -> dict[str, Any]:
-    found: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": len(task.records)}
+    means: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": len(task.records)}
     for metric in task.metrics:
         scores = [scores.get(metric, 0.0) for scores in task.scores]
         estimate = clustered_mean(scores, [record.cluster for record in task.records])
-        found[f"{metric},{_FILTER}"] = estimate.mean
-        found[f"{metric}_stderr,{_FILTER}"] = "N/A" if estimate.stderr is None else estimate.stderr
-    return found
-
-
-def _plain(settings: Mapping[str, Any]) -> dict[str, Any]:
-    return dict(json.loads(canonical_json(settings)))
-
-
-def _sanitised(name: str) -> str:
-    from lm_eval.utils import sanitize_model_name
-
-    return str(sanitize_model_name(name))
+        means[f"{metric},{_FILTER}"] = estimate.mean
+        means[f"{metric}_stderr,{_FILTER}"] = "N/A" if estimate.stderr is None else estimate.stderr
+    return means

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
@@ -13,9 +13,10 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.harness.requests import RequestAdapter
-from infthor_eval.runs import RunHeader, Suite, Unit, UnitRecord
+from infthor_eval.runs import RunHeader, Suite, UnitRecord
 from infthor_eval.runs.binding import require_capability
 from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.records import P, U
 from infthor_eval.runs.run_config import run_config
 from infthor_eval.runs.session import JournalSession
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
@@ -23,18 +24,16 @@ from model_adapters import adapter_identity, has_option, label, load
 
 __all__ = ["InfthorLM"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
-_DEFAULT_DEVICE = "cuda:0"  # what lm-eval says where nobody said anything
+_DEFAULT_DEVICE = "cuda:0"  # lm-eval's default
 
 
 class InfthorLM(LM):
-    """Any model of ours, by name, for a command that is not ours.
+    """Any model of ours, by name, under lm-eval's command.
 
-    Requests are answered in the order that shares most, and each is recorded before the next is begun: lm-eval sorts
-    them by the length of their text, which scatters the questions on one trajectory; here they are grouped again.
-    Requests refer to their frames through the doc; images in them are not looked at.
+    Each request is recorded before the next one starts. lm-eval sorts requests by the length of their text, which
+    scatters the questions on one trajectory; here they are grouped again, so that they share most. Requests refer to
+    their frames through the doc; images in them are ignored.
     """
 
     MULTIMODAL = True  # lm-eval asks before it hands over a task with images
@@ -53,11 +52,11 @@ class InfthorLM(LM):
 
         Args:
             adapter: name of the model (`infthor-eval ls models`).
-            journal: folder of a run, to go on where an earlier one stopped; None keeps it for this process only.
-            seed: for whatever is random in the model.
+            journal: folder of a run, resumed if it exists; None to keep the journal for this process only.
+            seed: seed of everything random in the model.
             batch_size: lm-eval's; passed on to models that take one.
-            max_batch_size: lm-eval's; not looked at.
-            device: lm-eval's; passed on to models that take one, unless it is what lm-eval says by default.
+            max_batch_size: lm-eval's; ignored.
+            device: lm-eval's; passed on to models that take one, unless it is lm-eval's default.
             options: the model's options.
 
         Raises:
@@ -68,7 +67,11 @@ class InfthorLM(LM):
         if adapter in baseline_suites():
             raise UsageError(f"{adapter} is a baseline, not a model; run it with infthor-eval --model {adapter}")
         given = {key: str(value) for key, value in options.items()}
-        theirs = {"device": None if device == _DEFAULT_DEVICE else device, "batch_size": _number(batch_size)}
+        batch = str(batch_size)  # "auto" means nothing to our models, and 1 is their default
+        theirs = {
+            "device": None if device == _DEFAULT_DEVICE else device,
+            "batch_size": batch if batch.isdigit() and int(batch) > 1 else None,
+        }
         given |= {key: value for key, value in theirs.items() if value is not None and has_option(adapter, key)}
         say_model_takes_references()
         self._model = load(adapter, given, seed)
@@ -84,11 +87,11 @@ class InfthorLM(LM):
         return self._model.name
 
     def get_model_info(self) -> dict[str, str]:
-        """What lm-eval writes of a model beside its results."""
+        """Return what lm-eval writes about the model beside its results."""
         return {"model_source": NAME, "model_name": self._model.name}
 
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
-        """Return one response per request; empty where the model could not answer (the journal has the reason).
+        """Return one response per request; empty if the model could not answer (the journal has the reason).
 
         Raises:
             UsageError: the model lacks what a suite needs.
@@ -103,13 +106,11 @@ class InfthorLM(LM):
             responses |= zip(numbers, of_task, strict=True)
         return [responses[number] for number in range(len(requests))]
 
-    def loglikelihood(self, requests: Sequence[Instance]) -> list[tuple[float, bool]]:
-        """Not offered: no task of ours compares likelihoods."""
+    def loglikelihood(self, requests: Sequence[Instance]) -> list[Any]:
+        """Refuse: no task of ours compares likelihoods."""
         raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
 
-    def loglikelihood_rolling(self, requests: Sequence[Instance]) -> list[float]:
-        """Not offered, see `loglikelihood`."""
-        raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
+    loglikelihood_rolling = loglikelihood
 
     def _respond(self, suite: Suite[U, P], task: str, requests: Sequence[Instance]) -> list[str]:
         """Return the responses to the requests of one task."""
@@ -141,8 +142,3 @@ def _suite_and_task(request: Instance) -> tuple[str, str]:
     if request.task_name is None or not isinstance(suite, str):
         raise ModelError(f"{request.task_name}: infthor-eval's models answer its own tasks (tasks/nieh) under lm-eval")
     return suite, request.task_name
-
-
-def _number(batch_size: int | str | None) -> str | None:
-    """lm-eval's batch size where it is one: "auto" is nothing to us, and 1 is what every model takes by itself."""
-    return str(batch_size) if str(batch_size).isdigit() and int(str(batch_size)) > 1 else None

@@ -44,17 +44,17 @@ def dataset(**config: Any) -> dict[str, Any]:
     """
     from datasets import Dataset
 
-    found, pixels = find_samples(config), not model_takes_references()
-    if not found.samples:
-        reasons = Counter(item.reason for item in found.skipped).most_common(3)
-        said = "; ".join(f"{reason} ({n})" for reason, n in reasons) or "its files are empty"
-        raise UsageError(f"{found.data.root}: no question of it can be asked: {said}")
-    if pixels and found.samples[0].notes:
+    task_samples, pixels = find_samples(config), not model_takes_references()
+    if not task_samples.samples:
+        counts = Counter(item.reason for item in task_samples.skipped).most_common(3)
+        reasons = "; ".join(f"{reason} ({n})" for reason, n in counts) or "its files are empty"
+        raise UsageError(f"{task_samples.data.root}: no question of it can be asked: {reasons}")
+    if pixels and task_samples.samples[0].notes:
         raise UsageError(
             f"{config['context']}: shows notes that the model takes beforehand, which infthor-eval's models alone do; "
             "run the task with `infthor-eval run`, or with --model infthor"
         )
-    return {"test": Dataset.from_list([doc_of(found, sample, pixels) for sample in found.samples])}
+    return {"test": Dataset.from_list([doc_of(task_samples, sample, pixels) for sample in task_samples.samples])}
 
 
 def doc_to_text(doc: Doc) -> str:

@@ -84,14 +84,6 @@ class PlansRequests:
 
     def response(self, records: Sequence[UnitRecord[PlanRecord]]) -> str:
         """Return the outcomes of the plans as JSON, without excluded plans."""
-        plans = [
-            {
-                "plan": item.payload.plan,
-                "done": item.payload.done,
-                "reward": item.payload.reward,
-                "ended": item.payload.ended,
-            }
-            for item in records
-            if item.excluded is None
-        ]
-        return json.dumps(plans)
+        names = ("plan", "done", "reward", "ended")
+        payloads = [record.payload for record in records if record.excluded is None]
+        return json.dumps([{name: getattr(payload, name) for name in names} for payload in payloads])

@@ -1,4 +1,4 @@
-"""Making our model class known to lm-eval, without importing it, and it to our tasks."""
+"""Registering our model class with lm-eval, without importing it, and telling our tasks whether it is used."""
 
 __all__ = ["NAME", "model_takes_references", "register", "say_model_takes_references"]
 
@@ -17,11 +17,11 @@ def register() -> None:
 
 
 def say_model_takes_references() -> None:
-    """Our class is the model of this process: lm-eval makes the model first, and has no way to tell a task of it."""
-    global _references  # noqa: PLW0603 - lm-eval hands nothing from the model to the tasks
+    """Record that our class is the model of this process; lm-eval creates the model before the tasks."""
+    global _references  # noqa: PLW0603 - lm-eval passes nothing from the model to the tasks
     _references = True
 
 
 def model_takes_references() -> bool:
-    """Whether requests need no pixels. A decoded frame takes 270 KB in every request that shows it."""
+    """Return True if requests need no pixels. A decoded frame takes 270 KB in every request that shows it."""
     return _references

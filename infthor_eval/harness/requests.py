@@ -1,18 +1,17 @@
-"""How lm-eval's requests reach a suite, whoever's package it is in.
+"""The way of lm-eval's requests to a suite of any package.
 
 The functions of a task file make docs, each with the name of its suite under "suite". lm-eval hands them to our model,
 which looks up the suite's `RequestAdapter` by that name (`infthor_eval.suites.find_request_adapter`).
 """
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
-from infthor_eval.runs import Evaluation, Unit, UnitKey, UnitRecord
+from infthor_eval.runs import Evaluation, UnitKey, UnitRecord
+from infthor_eval.runs.records import P, U
 
 __all__ = ["Doc", "RequestAdapter"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 Doc = dict[str, Any]
 
@@ -23,24 +22,13 @@ class RequestAdapter(Protocol[U, P]):
     def prepare(
         self, task: str, docs: Sequence[Doc], generation_kwargs: Mapping[str, Any], seed: int
     ) -> Evaluation[U, P]:
-        """Set up the evaluation of a task's docs; units that belong to none of them are not done.
-
-        Args:
-            task: name of the task.
-            docs: at least one doc.
-            generation_kwargs: decoding settings in lm-eval's words.
-            seed: seed of the run.
-        """
-        ...
+        """Set up the evaluation of a task's docs (at least one); units that belong to none of them are not done."""
 
     def doc_id(self, doc: Doc) -> Hashable:
-        """Return what a doc is told apart by among those of its task."""
-        ...
+        """Return the id of a doc, unique among those of its task."""
 
     def doc_id_of_unit(self, key: UnitKey, cluster: str) -> Hashable:
         """Return the `doc_id` of the doc that a unit belongs to."""
-        ...
 
     def response(self, records: Sequence[UnitRecord[P]]) -> str:
         """Return the response to a doc, given the records of its units."""
-        ...

@@ -1,4 +1,4 @@
-"""Our runs in experiment trackers and on the hub, through lm-eval's own loggers: what its command would send."""
+"""Our runs in experiment trackers and on the hub, through lm-eval's own loggers."""
 
 import difflib
 import importlib.util
@@ -11,18 +11,18 @@ from contextlib import contextmanager
 from typing import Any
 
 from infthor_eval.errors import UsageError, in_one_line, wrap_errors
-from infthor_eval.harness.export import Exported, exported
+from infthor_eval.harness.export import Exported, convert_run
 from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome
 
 __all__ = ["Trackers"]
 
 Arguments = Mapping[str, str]
-_OURS = {"self", "output_path", "token", "init_args", "step"}  # what nobody may name, or is lm-eval's own
+_OURS = {"self", "output_path", "token", "init_args", "step"}  # arguments that are not a user's
 
 
 class Trackers:
-    """Where finished runs are sent."""
+    """The trackers to which finished runs are sent."""
 
     def __init__(
         self,
@@ -30,95 +30,81 @@ class Trackers:
         trackio_args: Arguments | None = None,
         hf_hub_log_args: Arguments | None = None,
     ) -> None:
-        """Check what was typed, and that what is needed is installed, before anything is evaluated.
-
-        Args:
-            wandb_args: of `wandb.init`; None where it is not wanted.
-            trackio_args: of `trackio.init`; None likewise.
-            hf_hub_log_args: of lm-eval's `EvaluationTracker`; None likewise.
+        """Check the arguments of `wandb.init`, `trackio.init` and lm-eval's `EvaluationTracker`; None for not used.
 
         Raises:
             UsageError: a package or a token is missing, or an argument is not known.
         """
-        self._wandb = _checked("wandb", wandb_args)
-        self._trackio = _checked("trackio", trackio_args)
+        self._wandb = _init_arguments("wandb", wandb_args)
+        self._trackio = _init_arguments("trackio", trackio_args)
         self._hub = _hub_arguments(hf_hub_log_args)
 
     def send(self, outcome: RunOutcome) -> None:
-        """Send a run everywhere.
+        """Send a run to all trackers.
 
         Raises:
-            DataError: a tracker did not take it; the run's own files are whole, and the same command sends them again.
+            DataError: a tracker refused it; the run's own files are complete, and the same command sends them again.
         """
-        to: dict[str, tuple[Callable[[Exported, str], None], Any]] = {
+        trackers: dict[str, tuple[Callable[[Exported, str], None], Any]] = {
             "Weights & Biases": (self._to_wandb, self._wandb),
             "trackio": (self._to_trackio, self._trackio),
             "the hub": (self._to_hub, self._hub),
         }
-        wanted = {place: send for place, (send, args) in to.items() if args is not None}
-        made = exported(outcome) if wanted else None
-        for place, send in wanted.items():
-            assert made is not None
+        used = {place: send for place, (send, args) in trackers.items() if args is not None}
+        converted = convert_run(outcome) if used else None
+        for place, send in used.items():
+            assert converted is not None
             problem = f"{outcome.folder}: could not be sent to {place}"
             with wrap_errors(problem, "run the same command again", catch=Exception):
-                send(made, outcome.summary.header.name)
+                send(converted, outcome.summary.header.name)
 
-    def _to_wandb(self, made: Exported, name: str) -> None:
+    def _to_wandb(self, run: Exported, name: str) -> None:
         from lm_eval.loggers import WandbLogger
 
         logger = WandbLogger({"name": name, **(self._wandb or {})})
         try:
-            logger.post_init(made.results)
+            logger.post_init(run.results)
             logger.log_eval_result()
-            logger.log_eval_samples(_as_evaluated(made))
+            logger.log_eval_samples(_as_evaluated(run))
         finally:
             logger.run.finish()
 
-    def _to_trackio(self, made: Exported, name: str) -> None:
+    def _to_trackio(self, run: Exported, name: str) -> None:
         from lm_eval.loggers import TrackioLogger
 
         logger = TrackioLogger({"name": name, **(self._trackio or {})})
         try:
-            logger.post_init(made.results)
-            with _complaints("lm_eval.loggers.trackio_logger"):
+            logger.post_init(run.results)
+            with _raise_failures("lm_eval.loggers.trackio_logger"):
                 logger.log_eval_result()
-                logger.log_eval_samples(_as_evaluated(made))
+                logger.log_eval_samples(_as_evaluated(run))
         finally:
             logger.finish()
 
-    def _to_hub(self, made: Exported, name: str) -> None:
+    def _to_hub(self, run: Exported, name: str) -> None:
         from lm_eval.loggers import EvaluationTracker
 
-        with tempfile.TemporaryDirectory() as folder, _complaints("lm_eval.loggers.evaluation_tracker"):
+        with tempfile.TemporaryDirectory() as folder, _raise_failures("lm_eval.loggers.evaluation_tracker"):
             tracker = EvaluationTracker(output_path=folder, **(self._hub or {}))
             tracker.general_config_tracker.log_experiment_args(NAME, {"model": name}, None, None, False)
-            samples = _as_evaluated(made)
-            tracker.save_results_aggregated(dict(made.results), samples)
+            samples = _as_evaluated(run)
+            tracker.save_results_aggregated(dict(run.results), samples)
             for task, rows in samples.items():
                 tracker.save_results_samples(task, rows)
             tracker.recreate_metadata_card()
 
 
-def _checked(package: str, typed: Arguments | None) -> dict[str, Any] | None:
-    """Arguments of a tracker's `init`.
-
-    Raises:
-        UsageError: the package is missing, or its `init` has no such argument.
-    """
+def _init_arguments(package: str, typed: Arguments | None) -> dict[str, Any] | None:
     if typed is None:
         return None
     if importlib.util.find_spec(package) is None:
         raise UsageError(f"--{package}-args needs the package {package}; pip install {package}")
     init = importlib.import_module(package).init
-    return _known(f"--{package}-args", typed, [*inspect.signature(init).parameters, "step"])
+    return _parse(f"--{package}-args", typed, [*inspect.signature(init).parameters, "step"])
 
 
 def _hub_arguments(typed: Arguments | None) -> dict[str, Any] | None:
-    """Arguments of lm-eval's tracker, with the token of the environment or of `hf auth login`.
-
-    Raises:
-        UsageError: an argument is not known, nothing would be pushed, or there is no token.
-    """
+    """Return the arguments of lm-eval's tracker, with the token of the environment or of `hf auth login`."""
     if typed is None:
         return None
     from huggingface_hub import get_token
@@ -126,7 +112,7 @@ def _hub_arguments(typed: Arguments | None) -> dict[str, Any] | None:
 
     option = "--hf-hub-log-args"
     known = [name for name in inspect.signature(EvaluationTracker).parameters if name not in _OURS]
-    args = _known(option, typed, known)
+    args = _parse(option, typed, known)
     if not (args.get("push_results_to_hub") or args.get("push_samples_to_hub")):
         raise UsageError(f"{option} would push nothing; add push_results_to_hub=True or push_samples_to_hub=True")
     token = os.environ.get("HF_TOKEN") or get_token()
@@ -135,12 +121,8 @@ def _hub_arguments(typed: Arguments | None) -> dict[str, Any] | None:
     return {**args, "token": token}
 
 
-def _known(option: str, typed: Arguments, names: list[str]) -> dict[str, Any]:
-    """What was typed, as values: numbers, True and False, texts.
-
-    Raises:
-        UsageError: a name is not among the known ones.
-    """
+def _parse(option: str, typed: Arguments, names: list[str]) -> dict[str, Any]:
+    """Return typed arguments as values (numbers, True and False, texts); refuse unknown names."""
     from lm_eval.utils import handle_arg_string
 
     for name in typed:
@@ -150,41 +132,37 @@ def _known(option: str, typed: Arguments, names: list[str]) -> dict[str, Any]:
     return {name: handle_arg_string(value) for name, value in typed.items()}
 
 
-def _as_evaluated(made: Exported) -> dict[str, list[dict[str, Any]]]:
-    """Samples as lm-eval has them before it writes them: the arguments of a request as a pair."""
+def _as_evaluated(run: Exported) -> dict[str, list[dict[str, Any]]]:
+    """Return the samples as lm-eval has them before it writes them: the arguments of a request as a pair."""
     return {
         task: [
             {**row, "arguments": [tuple(row["arguments"]["gen_args_0"][name] for name in ("arg_0", "arg_1"))]}
             for row in rows
         ]
-        for task, rows in made.samples.items()
+        for task, rows in run.samples.items()
     }
 
 
 @contextmanager
-def _complaints(name: str) -> Iterator[None]:
-    """lm-eval's loggers only log what goes wrong; here it is an error.
-
-    Raises:
-        RuntimeError: something was complained of.
-    """
-    heard: list[str] = []
-    hearing = logging.Handler(logging.INFO)
-    hearing.emit = lambda record: heard.append(_said(record))  # type: ignore[method-assign]
+def _raise_failures(name: str) -> Iterator[None]:
+    """Raise RuntimeError for a failure, which lm-eval's loggers only log."""
+    messages: list[str] = []
+    handler = logging.Handler(logging.INFO)
+    handler.emit = lambda record: messages.append(_message(record))  # type: ignore[method-assign]
     logger = logging.getLogger(name)
     level = logger.level
     logger.setLevel(logging.INFO)
-    logger.addHandler(hearing)
+    logger.addHandler(handler)
     try:
         yield
     finally:
-        logger.removeHandler(hearing)
+        logger.removeHandler(handler)
         logger.setLevel(level)
-    failed = [number for number, said in enumerate(heard) if said.startswith(("Could not", "Failed"))]
+    failed = [number for number, text in enumerate(messages) if text.startswith(("Could not", "Failed"))]
     if failed:
-        raise RuntimeError(" ".join(heard[failed[0] : failed[0] + 2]))
+        raise RuntimeError(" ".join(messages[failed[0] : failed[0] + 2]))
 
 
-def _said(record: logging.LogRecord) -> str:
+def _message(record: logging.LogRecord) -> str:
     reason = record.exc_info[1] if record.exc_info else None
     return record.getMessage() + (f": {in_one_line(reason)}" if reason is not None else "")

@@ -92,7 +92,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
             with self._experts.one() as expert:
                 states, faults = with_retries(expert, lambda: replay_expert(trajectory, expert), lambda: None)
         except SceneError as error:
-            yield from (unit.excluded(str(error), fingerprints[unit.key]) for unit in units)
+            yield from (unit.record_exclusion(str(error), fingerprints[unit.key]) for unit in units)
             return
         with arms.one() as simulator:
             runner = ArmRunner(trajectory, states, simulator, self._create_actor(), sees=self._sees, seed=self.seed)

@@ -16,12 +16,9 @@ Record = UnitRecord[NiehAnswer]
 
 
 class YesNo(msgspec.Struct, frozen=True):
-    """Yes/no questions.
+    """Yes/no questions; the shares, 0 to 1, are None without any.
 
     Attributes:
-        n: how many were asked.
-        share_gold_yes: to how many of them the answer is yes; None without any.
-        share_said_yes: how often yes was said; None without any.
         n_neither: replies that are neither, or both.
     """
 
@@ -32,11 +29,7 @@ class YesNo(msgspec.Struct, frozen=True):
 
 
 def yes_no(records: Sequence[Record]) -> YesNo:
-    """Bias on yes/no questions: a model that always says yes shows here, as does one that says neither.
-
-    Args:
-        records: of one task; those of other questions are passed over.
-    """
+    """Return the bias on the yes/no questions among a task's: does a model always say yes, or neither?"""
     asked = [record for record in records if _gold(record) in ({"yes"}, {"no"})]
     said = Counter(says_yes_or_no(last_line(record.payload.reply or "")) for record in asked)
     n = len(asked)
@@ -49,30 +42,25 @@ def yes_no(records: Sequence[Record]) -> YesNo:
 
 
 def format_failures(records: Sequence[Record], max_new_tokens: int) -> dict[str, int]:
-    """How many replies are not of the form asked for, by reason; one that fails in two ways counts in both.
-
-    Args:
-        records: of one task; questions that the model failed on have no reply and are not counted.
-        max_new_tokens: limit of a reply.
-    """
-    found: Counter[str] = Counter()
+    """Count a task's replies that are not of the form asked for, by reason; one with two faults counts in both."""
+    counts: Counter[str] = Counter()
     for record in records:
         if record.payload.reply is not None:
-            found.update(_failures(record, last_line(record.payload.reply), max_new_tokens))
-    return dict(sorted(found.items()))
+            counts.update(_failures(record, last_line(record.payload.reply), max_new_tokens))
+    return dict(sorted(counts.items()))
 
 
 def _failures(record: Record, said: str, max_new_tokens: int) -> list[str]:
-    gold, found = _gold(record), []
+    gold, reasons = _gold(record), []
     if not said:
-        found.append("empty")
+        reasons.append("empty")
     elif gold in ({"yes"}, {"no"}) and says_yes_or_no(said) is None:
-        found.append("neither yes nor no")
+        reasons.append("neither yes nor no")
     elif len(gold) == 1 and says_number(next(iter(gold))) and not says_number(said):
-        found.append("no number")
+        reasons.append("no number")
     if (record.tokens.reply or 0) >= max_new_tokens:
-        found.append("cut off at the token limit")
-    return found
+        reasons.append("cut off at the token limit")
+    return reasons
 
 
 def _gold(record: Record) -> set[str]:

@@ -28,31 +28,20 @@ __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answer_
 
 @dataclass(frozen=True)
 class NiehUnit(Unit[NiehAnswer]):
-    """A unit that asks a question.
-
-    Attributes:
-        sample: the question, and how it is asked.
-    """
+    """A unit that asks the question of a sample."""
 
     sample: Sample
 
     @classmethod
     def of(cls, task: str, sample: Sample) -> "NiehUnit":
-        """The unit of a task's sample."""
+        """Return the unit of a task's sample."""
         question = sample.question
         return cls(UnitKey(task, question.id, sample.variant), question.traj_id, NiehAnswer.of(question), sample)
 
 
 @dataclass(frozen=True)
-class _Asked:
-    """A unit with its request.
-
-    Attributes:
-        unit: the unit.
-        prepared: its task's.
-        context: what the model is shown before the question's text; notes in it are taken before the unit is asked.
-        text: the text with the question.
-    """
+class _UnitRequest:
+    """A unit with its request: the context, with notes that are still to be taken, and the text with the question."""
 
     unit: NiehUnit
     prepared: PreparedTask
@@ -60,13 +49,13 @@ class _Asked:
     text: str
 
     @classmethod
-    def of(cls, unit: NiehUnit, prepared: PreparedTask) -> "_Asked":
+    def of(cls, unit: NiehUnit, prepared: PreparedTask) -> "_UnitRequest":
         context, text = prepared.task_samples.request(unit.sample)
         return cls(unit, prepared, tuple(context), text)
 
     @property
     def shown(self) -> tuple[str | FrameRef, ...]:
-        """The context as the model is shown it, once its notes are taken."""
+        """The context for the model, once its notes are taken."""
         shown = tuple(part for part in self.context if not isinstance(part, Notes))
         if len(shown) < len(self.context):
             raise ValueError("the context holds notes that are not taken yet")
@@ -113,34 +102,30 @@ class Answerer(Protocol):
 
     @property
     def batch_size(self) -> int:
-        """How many units are worth handing over at once."""
-        ...
+        """Number of units worth answering at once."""
 
     def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
-        """A context as it is shown: with the model's notes, which it takes now if it has not yet, as text.
+        """Return a context with the model's notes as text; missing ones are taken now.
 
         Raises:
             DataError: a frame cannot be read.
             ModelError: the model cannot take notes on so many frames.
         """
-        ...
 
-    def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
-        """The replies to units that share their context and decoding.
+    def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
+        """Return the replies to units that share their context and decoding.
 
         Raises:
             DataError: a frame cannot be read; nothing is answered then.
             ModelError: the model cannot take one of the requests; nothing is answered then.
         """
-        ...
 
     def usage(self, reply: Reply) -> Usage:
-        """What a reply took."""
-        ...
+        """Return the usage of a reply."""
 
 
 class ModelAnswerer:
-    """Keeps one conversation, so that units in the same context share what the model has encoded of it."""
+    """A model with one conversation, so that units in the same context share what is encoded of it."""
 
     def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self.batch_size = model.capabilities.batch_size
@@ -156,9 +141,9 @@ class ModelAnswerer:
         with wrap_request_errors(self._name):
             return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in context)
 
-    def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
+    def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
-        context = asked[0].shown
+        context = requests[0].shown
         with wrap_request_errors(self._name):
             if context != self._context:
                 self._conversation.rewind(self._start)
@@ -166,7 +151,7 @@ class ModelAnswerer:
                 self._conversation.append(*context)
                 self._context, self._after_context = context, self._conversation.mark()
             self._conversation.rewind(self._after_context)
-            return self._conversation.replies([[item.text] for item in asked], asked[0].prepared.decoding)
+            return self._conversation.replies([[item.text] for item in requests], requests[0].prepared.decoding)
 
     def usage(self, reply: Reply) -> Usage:
         """See `Answerer`."""
@@ -174,7 +159,7 @@ class ModelAnswerer:
 
 
 class BaselineAnswerer:
-    """Looks at no context and notes nothing."""
+    """A baseline, which reads no context and takes no notes."""
 
     batch_size = 1
 
@@ -185,35 +170,35 @@ class BaselineAnswerer:
         """See `Answerer`."""
         return tuple(part for part in context if not isinstance(part, Notes))
 
-    def answer(self, asked: Sequence[_Asked]) -> list[Reply]:
+    def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
-        return [Reply(self._predict(item.unit.sample)) for item in asked]
+        return [Reply(self._predict(item.unit.sample)) for item in requests]
 
     def usage(self, reply: Reply) -> Usage:
-        """See `Answerer`: nothing was asked of anybody."""
+        """See `Answerer`."""
         return NOTHING
 
 
 def answer_units(
     units: Sequence[NiehUnit], prepared: PreparedTask, answerer: Answerer, session: Session[NiehAnswer]
 ) -> Iterator[UnitRecord[NiehAnswer]]:
-    """The records of units on one trajectory: those in the same context together, several at a time where that pays.
+    """Yield the records of units on one trajectory, answered together if they share their context.
 
     Neighbours share as long a prefix as there is, which a model's conversation encodes once. The order depends on the
     units alone, so it is the same when a run is resumed.
     """
-    asked = []
+    requests = []
     for unit in units:
         try:
-            asked.append(_Asked.of(unit, prepared))
+            requests.append(_UnitRequest.of(unit, prepared))
         except DataError as error:
-            yield unit.failed(session.describe_failure(unit, error))
-    for _, in_one_context in groupby(sorted(asked, key=_names), key=_names):
+            yield unit.record_failure(session.describe_failure(unit, error))
+    for _, in_one_context in groupby(sorted(requests, key=_names), key=_names):
         yield from _in_context(list(in_one_context), answerer, session)
 
 
-def _names(asked: _Asked) -> list[str]:
-    return [name for part in asked.context for name in _names_in(part)]
+def _names(request: _UnitRequest) -> list[str]:
+    return [name for part in request.context for name in _names_in(part)]
 
 
 def _names_in(part: ContextPart) -> list[str]:
@@ -223,16 +208,16 @@ def _names_in(part: ContextPart) -> list[str]:
 
 
 def _in_context(
-    asked: Sequence[_Asked], answerer: Answerer, session: Session[NiehAnswer]
+    requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer]
 ) -> Iterator[UnitRecord[NiehAnswer]]:
     try:
-        context = answerer.read(asked[0].context)
+        context = answerer.read(requests[0].context)
     except (DataError, ModelError) as error:
-        yield from [item.unit.failed(session.describe_failure(item.unit, error)) for item in asked]
+        yield from [item.unit.record_failure(session.describe_failure(item.unit, error)) for item in requests]
         return
     waiting = []
-    for item in [replace(item, context=context) for item in asked]:
-        record = _known(item, session)
+    for item in [replace(item, context=context) for item in requests]:
+        record = _find_record(item, session)
         if record is None:
             waiting.append(item)
         else:
@@ -241,29 +226,28 @@ def _in_context(
         yield from _answer(waiting[at : at + answerer.batch_size], answerer, session)
 
 
-def _known(asked: _Asked, session: Session[NiehAnswer]) -> UnitRecord[NiehAnswer] | None:
-    """The record of a unit that needs no answering: an earlier run's, or that of a frame that cannot be read."""
+def _find_record(request: _UnitRequest, session: Session[NiehAnswer]) -> UnitRecord[NiehAnswer] | None:
+    """Return the record of a unit that needs no answer: an earlier run has it, or a frame cannot be read."""
     try:
-        return session.find_record(asked.unit, asked.fingerprint)
+        return session.find_record(request.unit, request.fingerprint)
     except DataError as error:
-        return asked.unit.failed(session.describe_failure(asked.unit, error))
+        return request.unit.record_failure(session.describe_failure(request.unit, error))
 
 
 def _answer(
-    asked: Sequence[_Asked], answerer: Answerer, session: Session[NiehAnswer], faults: tuple[str, ...] = ()
+    requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer], faults: tuple[str, ...] = ()
 ) -> Iterator[UnitRecord[NiehAnswer]]:
-    began = time.perf_counter()
+    start = time.perf_counter()
     try:
-        replies = answerer.answer(asked)
+        replies = answerer.answer(requests)
     except (DataError, ModelError) as error:
-        if len(asked) == 1:
-            (item,) = asked
-            failure = session.describe_failure(item.unit, error)
-            yield item.unit.failed(failure, item.fingerprint, faults=faults)
+        if len(requests) == 1:
+            (item,) = requests
+            yield item.unit.record_failure(session.describe_failure(item.unit, error), item.fingerprint, faults=faults)
             return
-        for item in asked:  # one of them may be to blame; the others are answered
-            yield from _answer([item], answerer, session, (f"asked with {len(asked) - 1} others: {error}",))
+        for item in requests:  # one of them may be to blame; the others are answered
+            yield from _answer([item], answerer, session, (f"asked with {len(requests) - 1} others: {error}",))
         return
-    seconds = (time.perf_counter() - began) / len(asked)
-    for item, reply in zip(asked, replies, strict=True):
+    seconds = (time.perf_counter() - start) / len(requests)
+    for item, reply in zip(requests, replies, strict=True):
         yield item.record(reply, seconds, faults, answerer.usage(reply), session)

@@ -32,15 +32,12 @@ class AnsweringModel(Protocol):
         Raises:
             UsageError: the subject counts no tokens.
         """
-        ...
 
     def cost(self, prepared: PreparedTask) -> str | None:
         """Return the cost of a task in words, or None where it is not known."""
-        ...
 
     def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
         """Fit the subject to the answer key of each task, given a function that finds the key; models need no key."""
-        ...
 
 
 class _ConversationModel:

@@ -1,8 +1,8 @@
-"""Yardsticks that see no frame: the answer key itself, the best guess from the question alone, and chance."""
+"""Baselines that see no frame: the answer key itself, the best guess from the question alone, and chance."""
 
 import random
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from infthor_eval.errors import ModelError
@@ -21,34 +21,30 @@ _LEADING_WORDS = 2
 
 
 def question_type(question: Question) -> str:
-    """The question's own type, or its leading words in lower case where the file names no type."""
+    """Return the question's type, or its leading words in lower case if the file names no type."""
     return question.question_type or " ".join(question.text.lower().split()[:_LEADING_WORDS])
 
 
 @runtime_checkable
 class Baseline(Subject, Protocol):
-    """What answers from the answer key and what a sample tells without its frames, and never sees one.
-
-    The key is no part of its identity: it is part of the data's own fingerprint.
-    """
+    """A subject that answers from the answer key, without frames; the data's fingerprint covers the key."""
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """Read the whole answer key of one task; what comes of it answers that task's samples."""
-        ...
+        """Read the whole answer key of one task, and return a function that answers its samples."""
 
 
 class Oracle(BaselineSubject):
-    """Reads the answer key: what a perfect model would score."""
+    """The answer key itself: the score of a perfect model."""
 
     name = "oracle"
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """Nothing to learn: every question carries its key."""
+        """See `Baseline`; every question carries its key."""
         return lambda sample: doc_target(sample.question)
 
 
 class Blind(BaselineSubject):
-    """The best guess from the question's words, learned on the other trajectories: what can be had without looking."""
+    """The best guess from the question's words, learned on the other trajectories: the score without looking."""
 
     name = "blind"
     _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
@@ -59,7 +55,7 @@ class Blind(BaselineSubject):
 
 
 class BlindCount(Blind):
-    """The same, told how many frames are shown: what their number gives away."""
+    """`Blind` that also knows the number of shown frames."""
 
     name = "blind-count"
     _chains = staticmethod(chains_of_words_and_count)
@@ -71,12 +67,14 @@ class Random(BaselineSubject):
     name = "random"
 
     def identity(self) -> dict[str, Any]:
-        """Name and seed."""
+        """Return name and seed."""
         return {"baseline": self.name, "seed": self._seed}
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """The draw depends on the seed and the question alone, not on the order of asking."""
-        seen = _answers_by_type({sample.question.id: sample.question for sample in samples}.values())
+        """See `Baseline`; a draw depends on the seed and the question alone, not on the order of asking."""
+        seen: dict[str, Counter[str]] = defaultdict(Counter)
+        for question in {sample.question.id: sample.question for sample in samples}.values():
+            seen[question_type(question)][doc_target(question)] += 1
 
         def predict(sample: Sample) -> str:
             counts = _counts(seen, sample.question)
@@ -86,14 +84,6 @@ class Random(BaselineSubject):
         return predict
 
 
-def _answers_by_type(questions: Iterable[Question]) -> dict[str, Counter[str]]:
-    """How often each answer (several golds joined by commas) is right, by question type."""
-    seen: dict[str, Counter[str]] = defaultdict(Counter)
-    for question in questions:
-        seen[question_type(question)][doc_target(question)] += 1
-    return dict(seen)
-
-
 def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str]:
     asked = question_type(question)
     if asked not in seen:
@@ -101,4 +91,4 @@ def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str
     return seen[asked]
 
 
-BASELINES: Mapping[str, Callable[[int], Baseline]] = {made.name: made for made in (Oracle, Blind, BlindCount, Random)}
+BASELINES: Mapping[str, Callable[[int], Baseline]] = {kind.name: kind for kind in (Oracle, Blind, BlindCount, Random)}

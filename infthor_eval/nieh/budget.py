@@ -57,10 +57,6 @@ def budget_of(prepared: PreparedTask, model: Model) -> Budget:
 
     Questions in one context differ by a few words, so each context is counted once, with its longest question.
 
-    Args:
-        prepared: the task.
-        model: a model that counts tokens.
-
     Raises:
         ModelError: the model can take none of the requests, whatever their length.
     """

@@ -23,13 +23,7 @@ _PLACEHOLDERS = {FrameRef: "<image>", Notes: "<notes>"}  # the first is lm-eval'
 
 
 def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
-    """Return the doc of a sample.
-
-    Args:
-        task_samples: the samples of the task.
-        sample: one of them.
-        pixels: True if requests are to hold decoded images, as lm-eval's own models need them.
-    """
+    """Return the doc of a task's sample; with `pixels`, requests hold decoded images, as lm-eval's own models need."""
     question = sample.question
     return {
         "suite": "nieh",

@@ -13,17 +13,7 @@ from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples, open_set
 from infthor_eval.nieh.task import NiehTask, PreparedTask
-from infthor_eval.runs import (
-    Cost,
-    Group,
-    Session,
-    Skipped,
-    TaskRequest,
-    UnitKey,
-    UnitRecord,
-    UnitSample,
-    Workload,
-)
+from infthor_eval.runs import Cost, Group, Session, Skipped, TaskRequest, UnitKey, UnitRecord, UnitSample, Workload
 from model_adapters import Subject
 
 __all__ = ["BoundNieh", "NiehEvaluation", "PreparedEvaluation"]
@@ -59,7 +49,11 @@ class NiehEvaluation:
         costs = {name: model.cost(item) for name, item in prepared.items()}
         workload = Workload(
             groups=_groups(prepared),
-            skipped=[skipped for name, item in prepared.items() for skipped in _skipped(name, item.task_samples)],
+            skipped=[
+                Skipped(UnitKey(name, skipped.question.id, skipped.variant), skipped.reason)
+                for name, item in prepared.items()
+                for skipped in item.task_samples.skipped
+            ],
             config={
                 "tasks": {name: task.config(prepared[name]) for name, task in tasks.items()},
                 "k_tokens": self._options.k_tokens,
@@ -82,10 +76,11 @@ class NiehEvaluation:
         asked = ", ".join(task.name for task in self._tasks)
         measured = any(task.needs_size for task in self._tasks)
         for name in ("k_tokens", "tokens_per_frame"):
-            if getattr(self._options, name) is not None and not measured:
+            value = getattr(self._options, name)
+            if value is not None and not measured:
                 raise UsageError(
-                    f"--{name.replace('_', '-')} {getattr(self._options, name)}: no context of {asked} has a size in "
-                    "tokens; leave it out, or ask nieh_haystack or nieh_truncate_head"
+                    f"--{name.replace('_', '-')} {value}: no context of {asked} has a size in tokens; leave it out, or "
+                    "ask nieh_haystack or nieh_truncate_head"
                 )
         if (self._options.retriever or self._options.retriever_revision) and not self._depends_on("retriever"):
             raise UsageError(
@@ -107,7 +102,7 @@ class PreparedEvaluation:
     """Samples of known contexts set up for a run of a model; see `infthor_eval.runs.Evaluation`."""
 
     def __init__(self, prepared: Mapping[str, PreparedTask]) -> None:
-        """Take up tasks by name."""
+        """Take tasks by name."""
         self._prepared = prepared
 
     def bind(self, subject: Subject) -> "BoundNieh":
@@ -121,13 +116,7 @@ class BoundNieh:
     def __init__(
         self, workload: Workload[NiehUnit], prepared: Mapping[str, PreparedTask], open_answerer: OpenAnswerer
     ) -> None:
-        """Take up what was prepared for the subject.
-
-        Args:
-            workload: all the work.
-            prepared: the tasks by name.
-            open_answerer: opens what answers the questions of one task on one trajectory.
-        """
+        """Take the work, the tasks by name, and a function that opens the answerer of a task on a trajectory."""
         self.workload = workload
         self._prepared = prepared
         self._open_answerer = open_answerer
@@ -174,11 +163,6 @@ def _groups(prepared: Mapping[str, PreparedTask]) -> list[Group[NiehUnit]]:
             frames = len({frame for sample in same for frame in sample.frames})
             groups.append(Group([NiehUnit.of(task, sample) for sample in same], frames))
     return groups
-
-
-def _skipped(task: str, samples: TaskSamples) -> Iterator[Skipped]:
-    for item in samples.skipped:
-        yield Skipped(UnitKey(task, item.question.id, item.variant), item.reason)
 
 
 def _measure_frame(data: NiehSet, model: AnsweringModel) -> int:

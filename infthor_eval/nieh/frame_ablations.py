@@ -29,11 +29,7 @@ class FrameAblation:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check `frames`.
-
-        Raises:
-            UsageError: there is no such ablation.
-        """
+        """Raise UsageError if there is no such ablation."""
         check_frames(self.frames)
 
     def check(self, data: NiehSet) -> None:
@@ -46,14 +42,7 @@ class FrameAblation:
             raise UsageError(f"--frames other: {data.root} has questions on one trajectory only; give another set")
 
     def apply(self, parts: Sequence[ContextPart], data: NiehSet, context: Context, traj_id: str) -> list[ContextPart]:
-        """Return the parts of a request with the frames replaced.
-
-        Args:
-            parts: parts of the request.
-            data: the set.
-            context: context of the request.
-            traj_id: trajectory of the frames.
-        """
+        """Return the parts of a request with the frames replaced."""
         if self.frames == SHOWN:
             return list(parts)
         frames = [frame for part in parts for frame in _frames_in(part)]

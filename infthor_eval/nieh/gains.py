@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.nieh.options import SHOWN
-from infthor_eval.nieh.summary import NiehSummary, TaskSummary
+from infthor_eval.nieh.summary import TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.statistics import MeanEstimate, paired_difference
 
@@ -16,15 +16,7 @@ _BLANK = "blank"
 
 @dataclass(frozen=True)
 class Gain:
-    """The gain of one run over its run on blank frames, in one task under one scorer.
-
-    Attributes:
-        run: the run with frames.
-        task: name of the task.
-        metric: name of the scorer.
-        seeing: summary of the task with frames.
-        blind: summary of the task on blank frames.
-    """
+    """The gain of a run with frames over its run on blank ones, in one task under one scorer, with both summaries."""
 
     run: RunSummary
     task: str
@@ -56,16 +48,10 @@ def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
     """Yield the gains of every run that has a run on blank frames with otherwise the same config among the runs."""
     for run in runs:
         for blind in runs:
-            if frames_of(run) != _BLANK and frames_of(blind) == _BLANK and _differ_in_frames_only(run, blind):
-                yield from _gains_of_pair(run, blind)
-
-
-def _gains_of_pair(run: RunSummary, blind: RunSummary) -> Iterator[Gain]:
-    assert isinstance(run.summary, NiehSummary)
-    assert isinstance(blind.summary, NiehSummary)
-    for name, task in run.summary.tasks.items():
-        for metric in task.metrics:
-            yield Gain(run, name, metric, task, blind.summary.tasks[name])
+            is_pair = frames_of(run) != _BLANK and frames_of(blind) == _BLANK
+            if is_pair and _without_frames(run) == _without_frames(blind):
+                for name, task in run.summary.tasks.items():
+                    yield from (Gain(run, name, m, task, blind.summary.tasks[name]) for m in task.metrics)
 
 
 def frames_of(run: RunSummary) -> str:
@@ -77,10 +63,6 @@ def name_of(run: RunSummary) -> str:
     """Return the name of a run, with its frame ablation."""
     frames = frames_of(run)
     return run.header.name if frames == SHOWN else f"{run.header.name}, {frames} frames"
-
-
-def _differ_in_frames_only(run: RunSummary, blind: RunSummary) -> bool:
-    return _without_frames(run) == _without_frames(blind)
 
 
 def _without_frames(run: RunSummary) -> dict[str, Any]:

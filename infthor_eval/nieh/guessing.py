@@ -1,11 +1,9 @@
-"""The best guess of an answer by one who sees no frame.
+"""The best guess of an answer without frames.
 
-Answers are counted behind contexts that go from the general to the particular ("how", "how many", "how many mugs"),
-each mixed with the one before it; one behind which many different answers were seen is trusted less (Witten and Bell's
-interpolation). The evidence of several such chains is multiplied. Nothing is tuned, and nothing is drawn.
-
-What is guessed at a trajectory's questions is learned from the other trajectories alone, so that a right guess is
-no memory of the answer key.
+Answers are counted after contexts from the general to the particular ("how", "how many", "how many mugs"). Each is
+mixed with the one before it, and counts less the more different answers it has (Witten and Bell's interpolation). The
+evidence of several such chains is multiplied. Nothing is tuned, and nothing is drawn. Questions on a trajectory are
+guessed from the other trajectories alone, so that a right guess is no memory of the answer key.
 """
 
 import re
@@ -26,7 +24,7 @@ _DIGITS = 9  # of a log probability; what is beyond is rounding, which must not 
 
 
 def chains_of_words(sample: Sample) -> list[Chain]:
-    """The leading words, and each later word: alone, then behind the first two."""
+    """Return chains of a question's words: the leading words, and each later word, alone and after the first two."""
     words = _words(sample.question)
     later = sorted(set(words[2:]))
     leading = [("leading", *words[:n]) for n in range(1, len(words) + 1)]
@@ -34,7 +32,7 @@ def chains_of_words(sample: Sample) -> list[Chain]:
 
 
 def chains_of_words_and_count(sample: Sample) -> list[Chain]:
-    """The words, and how many frames are shown: behind the question's stem."""
+    """Return the chains of words, and one of the number of frames after the question's stem."""
     stem = _words(sample.question)[:_STEM]
     return [*chains_of_words(sample), [("stem", *stem), ("count", *stem, len(sample.frames))]]
 
@@ -47,12 +45,7 @@ class Guesser:
     """Guesses at samples from the answers to others."""
 
     def __init__(self, samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]) -> None:
-        """Count.
-
-        Args:
-            samples: the answer key; of one trajectory alone, each question is guessed from the other questions.
-            chains: the contexts of a sample.
-        """
+        """Count the answer key; if it is of one trajectory, each question is guessed from the others."""
         self._chains = chains
         self._is_alone = len({sample.question.traj_id for sample in samples}) == 1
         self._answers = sorted({doc_target(sample.question) for sample in samples})
@@ -63,7 +56,7 @@ class Guesser:
             self._count(sample)
 
     def guess(self, sample: Sample) -> str:
-        """The likeliest answer, of equally likely ones the first in the alphabet; empty where nothing was learned."""
+        """Return the likeliest answer (of equal ones, the first in the alphabet); empty if nothing was learned."""
         held_out = self._held_out(sample)
         counts = self._vector(self._others((), held_out))
         if not counts.any():
@@ -85,18 +78,18 @@ class Guesser:
         return sample.question.id if self._is_alone else sample.question.traj_id
 
     def _others(self, context: Hashable, held_out: str) -> Counter[int]:
-        """Answers behind a context, without those that must not be known."""
+        """Return the answers after a context, without the held-out ones."""
         return self._seen.get(context, Counter()) - self._own.get((held_out, context), Counter())
 
     def _probability(self, chain: Chain, counts: np.ndarray, held_out: str) -> np.ndarray:
         mixed = counts / counts.sum()
         for context in chain:
-            found = self._others(context, held_out)
-            n_different = len(found)
-            mixed = (self._vector(found) + n_different * mixed) / (found.total() + n_different) if found else mixed
+            seen = self._others(context, held_out)
+            n_different = len(seen)
+            mixed = (self._vector(seen) + n_different * mixed) / (seen.total() + n_different) if seen else mixed
         return mixed
 
-    def _vector(self, found: Counter[int]) -> np.ndarray:
+    def _vector(self, counts: Counter[int]) -> np.ndarray:
         vector = np.zeros(len(self._answers))
-        vector[list(found)] = list(found.values())
+        vector[list(counts)] = list(counts.values())
         return vector

@@ -32,10 +32,9 @@ class MetricError(UserCodeError, DataError):
 
 @dataclass(frozen=True)
 class Metrics:
-    """The metrics of a task.
+    """The metrics of a task by name, in the order of tables.
 
     Attributes:
-        names: names of the metrics in the order of tables.
         process: the task's own function; None for both scorers.
         code: name and digest of that function's source, as JSON values.
     """

@@ -16,12 +16,7 @@ __all__ = ["NoteSettings", "Notes", "Window"]
 
 @dataclass(frozen=True)
 class NoteSettings:
-    """Settings of note taking.
-
-    Attributes:
-        window: number of frames for one note.
-        max_new_tokens: limit of a note in tokens.
-    """
+    """Settings of note taking: the frames of a window, for one note, and the limit of the note in tokens."""
 
     window: int
     max_new_tokens: int
@@ -29,12 +24,7 @@ class NoteSettings:
 
 @dataclass(frozen=True)
 class Window:
-    """Consecutive frames of one note.
-
-    Attributes:
-        first: position of the first frame in the trajectory's time order.
-        frames: at least one frame.
-    """
+    """Consecutive frames of one note, at least one; `first` is the position of the first in the trajectory."""
 
     first: int
     frames: tuple[FrameRef, ...]
@@ -53,13 +43,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Notes:
-    """A model's notes on a whole trajectory, in time order.
-
-    Attributes:
-        traj_id: the trajectory.
-        frames: its frames in time order.
-        settings: settings of note taking.
-    """
+    """A model's notes on all frames of a trajectory, in time order."""
 
     traj_id: str
     frames: tuple[FrameRef, ...]

@@ -62,11 +62,7 @@ class NiehOptions:
     )
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            UsageError: tokens_per_frame is below 1, or there is no such frame ablation.
-        """
+        """Raise UsageError if tokens_per_frame is below 1, or there is no such frame ablation."""
         check_frames(self.frames)
         if self.tokens_per_frame is not None and self.tokens_per_frame < 1:
             raise UsageError(f"--tokens-per-frame {self.tokens_per_frame}: a frame has one token at least")

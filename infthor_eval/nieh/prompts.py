@@ -1,4 +1,4 @@
-"""What a model is told: in the words of the published evaluation, and for notes, which it lacks, in our own."""
+"""Prompts in the words of the published evaluation; for notes, which it lacks, in our own."""
 
 from infthor_eval.formats.question import Question
 
@@ -8,21 +8,12 @@ _FORM = "Do not include explanation or reasoning in the answer. Answer with a si
 
 
 def question_text(intro: str, question: Question) -> str:
-    """The text that follows a context, beginning with the line break that ends it.
-
-    Args:
-        intro: the context's sentence about what was seen.
-        question: what is asked.
-    """
+    """Return the text after a context, from the line break that ends it; `intro` is the context's first sentence."""
     return f"\n{intro} {_FORM}\nQuestion: {question.text}"
 
 
 def note_text(steps: str) -> str:
-    """The text that follows the frames of a window and asks for a note on them.
-
-    Args:
-        steps: the window's steps, as "Steps 0-19".
-    """
+    """Return the text that follows the frames of a window ("Steps 0-19") and asks for a note on them."""
     return (
         f"\n{steps} of an embodied agent's trajectory, one view per step in time order. You will be asked about them "
         "later without seeing them. Note in a few short phrases which room it is, which objects are where, how many of "
@@ -31,5 +22,5 @@ def note_text(steps: str) -> str:
 
 
 def last_line(response: str) -> str:
-    """The part of a response that counts: its last line."""
+    """Return the part of a response that counts: its last line."""
     return response.strip().rpartition("\n")[2].strip()

@@ -1,4 +1,4 @@
-"""What NIEH writes into a run's journal: answers to questions, and notes that a model took."""
+"""Payloads of NIEH's records in the journal: replies to questions, and a model's notes."""
 
 import msgspec
 
@@ -9,15 +9,15 @@ __all__ = ["RECORDS", "NiehAnswer", "NiehNote"]
 
 
 class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="nieh_answer"):
-    """A question, and what was said to it.
+    """A question and the reply to it.
 
     Attributes:
         question: the question's text.
-        question_type: its type, empty where the set names none.
-        n_clues: number of frames that hold the evidence; 0 for an absence, which no frame proves.
+        question_type: its type; empty if the set names none.
+        n_clues: number of frames that are evidence; 0 for an absence.
         answers: the gold answers.
-        reply: what the model said; None where it failed.
-        scores: of the reply by metric, empty where there is none.
+        reply: the reply; None if the model failed.
+        scores: scores of the reply by metric; empty if there is none.
     """
 
     question: str
@@ -29,29 +29,19 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
 
     @classmethod
     def of(cls, question: Question) -> "NiehAnswer":
-        """What is known of a question before it is asked."""
-        return cls(
-            question=question.text,
-            question_type=question.question_type or "",
-            n_clues=question.n_clues,
-            answers=question.answers,
-        )
+        """Return the payload of a question before it is asked."""
+        kind, n_clues = question.question_type or "", question.n_clues
+        return cls(question=question.text, question_type=kind, n_clues=n_clues, answers=question.answers)
 
     def with_reply(self, reply: str, scores: dict[str, float]) -> "NiehAnswer":
-        """The same question with a reply."""
+        """Return the same question with a reply."""
         return msgspec.structs.replace(self, reply=reply, scores=scores)
 
 
 class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_note"):
-    """What a model noted on a few frames of a trajectory, to be shown it later instead of them.
+    """A model's note on some frames of a trajectory ("Steps 0-19"), shown to it later instead of them.
 
-    Attributes:
-        note: the text.
-        traj_id: the trajectory.
-        steps: which frames, as the model is told ("Steps 0-19").
-        n_context_tokens: length of the request in tokens; None where the model does not tell.
-        n_reply_tokens: length of the note in tokens; None likewise.
-        seconds: time that it took.
+    The tokens of the request and of the note are None if the model does not count them.
     """
 
     note: str

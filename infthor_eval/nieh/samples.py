@@ -21,16 +21,11 @@ __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
 
 @dataclass(frozen=True)
 class TaskSamples:
-    """The samples of one task.
+    """The samples of one task in the order of its set.
 
     Attributes:
-        data: the set.
-        context_name: name of the context.
-        context: the context.
-        samples: the samples in the order of the set.
         skipped: questions that cannot be asked, with the reason.
         sources: whatever the frames depend on besides the set and the settings (`Context.sources`).
-        frame_ablation: replacement of the frames.
     """
 
     data: NiehSet
@@ -107,10 +102,11 @@ def _by_question(data: NiehSet, context: Context, settings: ContextSettings, lim
     problems: dict[FrameRef, str | None] = {}
 
     def skip_unreadable(sample: Sample) -> Sample | SkippedQuestion:
-        problem = _find_problem(context.shown(data, sample), problems)
+        problem = _find_problem(context.select_frames(data, sample), problems)
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
-    places = range(len(data.rows)) if limit is None else spread(data.rows, _trajectory_of, settings.seed)
+    trajectories = [row.traj_id if isinstance(row, Question) else row.question.traj_id for row in data.rows]
+    places = range(len(data.rows)) if limit is None else spread(trajectories, str, settings.seed)
     by_place: dict[int, _Items] = {}
     n_asked = 0
     for place in places:
@@ -121,10 +117,6 @@ def _by_question(data: NiehSet, context: Context, settings: ContextSettings, lim
         if n_asked == limit:
             break
     return [by_place[place] for place in sorted(by_place)]
-
-
-def _trajectory_of(row: Question | SkippedQuestion) -> str:
-    return row.traj_id if isinstance(row, Question) else row.question.traj_id
 
 
 def _samples(context: Context, data: NiehSet, question: Question, settings: ContextSettings) -> _Items:

@@ -1,7 +1,7 @@
 """The two scorers of NIEH answers.
 
 `reference` equals the published scorer on every pair, faults included: its numbers are what the paper reports.
-`strict` keeps its idea (normalise, compare, allow near misses and synonyms) and mends the faults:
+`strict` keeps its idea (normalise, compare, allow near misses and synonyms) and fixes the faults:
 
 * each gold answer is matched at most once, so "mug, mug, mug" against [mug, plate] scores 0.5, not 1.5;
 * "and" separates answers only as a whole word, so "hand towel" stays one answer;
@@ -34,16 +34,9 @@ _YES_NO = ("yes", "no")
 
 
 def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference") -> float:
-    """Score a model's response against the gold answers.
+    """Return the share of gold answers that a response gives; 1.0 or 0.0 for a single gold answer.
 
-    Args:
-        response: what the model said.
-        answers: the gold answers of the question (strings or numbers); all of them are asked for.
-        scorer: "reference" (the published scorer, exactly) or "strict" (its faults mended).
-
-    Returns:
-        The share of gold answers that the response gives; 1.0 or 0.0 for a single gold answer. Only the reference
-        scorer can exceed 1.0, when one gold answer is repeated.
+    Only the reference scorer can exceed 1.0, when one gold answer is repeated.
 
     Raises:
         UsageError: there is no such scorer, or no gold answer.
@@ -56,18 +49,18 @@ def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference"
 
 
 def scores(reply: str, answers: Sequence[Answer]) -> dict[str, float]:
-    """What a whole reply, of which the last line counts, scores under each scorer."""
+    """Return the scores of a whole reply, of which the last line counts, under each scorer."""
     said = last_line(reply)
     return {scorer: score(said, answers, scorer) for scorer in SCORERS}
 
 
 def says_yes_or_no(response: str) -> str | None:
-    """ "yes" or "no" where the strict scorer takes a response for one; None where it is neither, or both."""
+    """Return "yes" or "no" if the strict scorer takes a response for one; None if it is neither, or both."""
     return next((answer for answer in _YES_NO if _matches_strict(response, answer)), None)
 
 
 def says_number(response: str) -> bool:
-    """Whether both scorers read a response as a number."""
+    """Return True if both scorers read a response as a number."""
     return _is_number(_normalise(response))
 
 
@@ -86,7 +79,7 @@ def _strict(response: str, answers: Sequence[Answer]) -> float:
 
 
 def _largest_matching(answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]) -> int:
-    """How many gold answers can be given a piece of their own (augmenting paths; both lists are short)."""
+    """Return the number of gold answers that can have a piece each (augmenting paths; both lists are short)."""
     fits = [[index for index, piece in enumerate(pieces) if match(piece, gold)] for gold in answers]
     owner: dict[int, int] = {}
 
@@ -130,16 +123,13 @@ def _is_number(text: str) -> bool:
 
 
 def _normalise(text: Answer) -> str:
-    """The published normal form: a number in digits where the text holds one, else plain words."""
+    """Return the published normal form: a number in digits if the text holds one, else plain words."""
     if not isinstance(text, str):
         return str(text)
     text = text.lower().strip()
     try:
         return str(w2n.word_to_num(text))
-    except (
-        ValueError,
-        IndexError,
-    ):  # the library's own ways to say "not a number" ("thousand one": IndexError)
+    except (ValueError, IndexError):  # the library's own ways to say "not a number" ("thousand one": IndexError)
         return _plain(text)
 
 

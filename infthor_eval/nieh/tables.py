@@ -8,7 +8,6 @@ from infthor_eval.nieh.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
-from infthor_eval.statistics import MeanEstimate
 from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
 
 __all__ = ["clues_table", "overview", "tables"]
@@ -27,52 +26,36 @@ _EMBEDDED = (
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """The tables of some runs: by depth, by clues, the gain over blank frames, and the form of the replies.
+    """Return the tables of runs: by depth and by clues, the gains over blank frames, and the form of the replies.
 
-    Those by depth and of gains are there where a task has depths, and where runs on true and blank frames are shown.
-
-    A published table by clues stands below our numbers; one by anything else (question types, depths) is a table of its
-    own with ours in it.
+    Published rows by clues are below ours; a published table of other columns (question types) is a table with ours in
+    it. The tables by depth and of gains need a task with depths, and a pair of runs on true and on blank frames.
     """
-    by_depth = _depth_table(runs)
     others = [_beside(table, runs) for table in published_tables("nieh") if not _is_by_clues(table)]
-    by_frames = _gains_table(runs)
-    return [
-        *([by_depth] if by_depth else []),
-        *others,
-        clues_table(runs),
-        *([by_frames] if by_frames else []),
-        _replies_table(runs),
-    ]
+    return [*_depth_table(runs), *others, clues_table(runs), *_gains_table(runs), _replies_table(runs)]
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Accuracy in one number a task, with its intervals; a task that asked nothing is a line below.
+    """Return the accuracy of each task with its intervals, and the gains over blank frames if there are any.
 
-    Where runs on true and on blank frames are shown, the gain of the one over the other.
+    A task that asked nothing is a line below the table.
     """
-    found = list(_tasks(runs))
-    asked = [(run, name, task) for run, name, task in found if task.n]
+    tasks = list(_tasks(runs))
+    asked = [(run, name, task) for run, name, task in tasks if task.n]
     left_out = any(task.skipped.n or task.by_clues["total"].n_failed for _, _, task in asked)
-    rows = [
-        Row((run, _with_metric(name, task), *_total(task), *(_left_out(task) if left_out else ())))
-        for run, name, task in asked
-    ]
+    rows = tuple(
+        Row((run, *_name_and_total(name, task), *(_left_out(task) if left_out else ()))) for run, name, task in asked
+    )
     numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
-    notes = [*dict.fromkeys(_nothing_asked(name, task) for _, name, task in found if not task.n), *_embedded(runs)]
-    table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), tuple(rows), tuple(notes))
-    by_frames = _gains_table(runs)
-    return [table, *([by_frames] if by_frames else [])]
+    notes = *dict.fromkeys(_nothing_asked(name, task) for _, name, task in tasks if not task.n), *_notes(runs)
+    table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)
+    return [table, *_gains_table(runs)]
 
 
-def _with_metric(name: str, task: TaskSummary) -> str:
-    """A task's name, with its main metric where that is one of its own."""
-    return name if main_metric(task) == "strict" else f"{name}, {main_metric(task)}"
-
-
-def _total(task: TaskSummary) -> tuple[str, ...]:
+def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:
     total, metric = task.by_clues["total"], main_metric(task)
-    return _mean(total, metric), *_intervals(total, metric), str(total.n)
+    name_and_metric = name if metric == "strict" else f"{name}, {metric}"
+    return name_and_metric, _mean(total, metric), *_intervals(total, metric), str(total.n)
 
 
 def _left_out(task: TaskSummary) -> tuple[str, str]:
@@ -90,7 +73,7 @@ def _is_by_clues(table: PublishedTable) -> bool:
 
 
 def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
-    """Run's name, task's name and the task, of all runs."""
+    """Yield the run's name, the task's name and the task, of all runs."""
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
@@ -101,25 +84,24 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
-    """Accuracy by number of clues: a row per run, task and metric, then the published rows."""
+    """Return the accuracy by number of clues: a row per run, task and metric, then the published rows."""
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", OPEN_ENDED, ABSENCE, "n", "skipped", "failed")
     rows = [row for run in runs for row in _rows_of(run)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
     columns = (*_NAMES, _METRIC, *map(Column, numbers))
-    return Table("NIEH accuracy, % by number of clues (questions)", columns, tuple(rows), (*_LEGEND, *_embedded(runs)))
+    return Table("NIEH accuracy, % by number of clues (questions)", columns, tuple(rows), (*_LEGEND, *_notes(runs)))
 
 
-def _embedded(runs: Sequence[RunSummary]) -> list[str]:
-    """What must be said where the frames are no published ones."""
+def _notes(runs: Sequence[RunSummary]) -> list[str]:
     return [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
 
 
 def _rows_of(run: RunSummary) -> list[Row]:
-    found = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
+    lines = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
     return [
-        Row((name_of(run), name, metric, *_cells(task, metric)), ends_section=number == len(found))
-        for number, (name, task, metric) in enumerate(found, 1)
+        Row((name_of(run), name, metric, *_cells(task, metric)), ends_section=number == len(lines))
+        for number, (name, task, metric) in enumerate(lines, 1)
     ]
 
 
@@ -133,7 +115,7 @@ def _cells(task: TaskSummary, metric: str) -> list[str]:
 
 
 def _intervals(cell: Cell, metric: str) -> tuple[str, str]:
-    """Clustered, and over resampled trajectories; one trajectory alone tells nothing about others."""
+    """Return the clustered interval, and that over resampled trajectories; one trajectory has neither."""
     score = cell.scores.get(metric)
     if score is None:
         return _range(None, None), _range(None, None)
@@ -145,7 +127,6 @@ def _mean(cell: Cell, metric: str) -> str:
 
 
 def _mean_of(cell: Cell | None, metric: str) -> TableCell:
-    """With the number of questions behind it."""
     if not cell or not cell.n:
         return TableCell("-", {"": "", "questions": ""})
     mean = _mean(cell, metric)
@@ -158,7 +139,7 @@ def _range(low: float | None, high: float | None) -> TableCell:
 
 
 def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterator[Row]:
-    """The published rows, each followed by how far runs of its checkpoint are from it."""
+    """Yield the published rows, each followed by the differences of runs of its checkpoint."""
     for row in table.rows:
         values = dict(zip(table.columns, row.values, strict=True))
         cells = [f"{values[name]:.2f}" if name in values else "" for name in CLUE_COLUMNS]
@@ -168,7 +149,7 @@ def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterat
 
 
 def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
-    """How far a run of the published model is from its row, and whether its interval (=) holds the published value."""
+    """Yield the differences of a run of the published model from its row; = if its interval has the published value."""
     if not row.matches(run.header.config["model"]) or frames_of(run) != SHOWN:
         return
     for _, name, task in _tasks([run]):
@@ -193,7 +174,7 @@ def _difference(cell: Cell, value: float | None, metric: str) -> str:
 
 
 def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
-    """Published rows, and the runs that asked in the same context."""
+    """Return the published rows, and the runs that asked in the same context."""
     rows = [
         Row((row.name, table.context, table.metric, *(f"{value:.2f}" for value in row.values)), is_published=True)
         for row in table.rows
@@ -209,43 +190,37 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
 # -- gain by frames
 
 
-def _gains_table(runs: Sequence[RunSummary]) -> Table | None:
-    """What each run scores above the same run on blank frames; None where there is no such pair."""
+def _gains_table(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return a table of the gain of each run over its run on blank frames, if there is such a pair."""
     rows = [Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain))) for gain in find_gains(runs)]
     if not rows:
-        return None
+        return []
     note = "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval compare` has it."
     title = "Gain over the same model's run on blank frames, in points"
     columns = (*CLUE_COLUMNS, "95 %", OPEN_ENDED, ABSENCE)
-    return Table(title, (*_NAMES, _METRIC, *map(Column, columns)), tuple(rows), (note,))
+    return [Table(title, (*_NAMES, _METRIC, *map(Column, columns)), tuple(rows), (note,))]
 
 
 def _gain_cells(gain: Gain) -> tuple[str, ...]:
-    by_clues, apart = (
-        tuple(map(_points, map(gain.in_column, names))) for names in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE))
-    )
-    return *by_clues, _points_interval(gain.total()), *apart
-
-
-def _points_interval(total: MeanEstimate | None) -> TableCell:
-    if total is None or total.low is None or total.high is None:  # one trajectory alone tells nothing about others
-        return interval_cell(None, None)
-    return interval_cell(100 * total.low, 100 * total.high, "+.2f")
-
-
-def _points(gain: float | None) -> str:
-    return "-" if gain is None else f"{100 * gain:+.2f}"
+    gains = {name: gain.in_column(name) for name in (*CLUE_COLUMNS, OPEN_ENDED, ABSENCE)}
+    points = {name: "-" if value is None else f"{100 * value:+.2f}" for name, value in gains.items()}
+    by_clues, apart = (tuple(points[name] for name in names) for names in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE)))
+    total = gain.total()
+    # One trajectory alone tells nothing about others, and has no interval.
+    ends = (None, None) if total is None else (total.low, total.high)
+    low, high = (None if end is None else 100 * end for end in ends)
+    return *by_clues, interval_cell(low, high, "+.2f"), *apart
 
 
 # -- by depth
 
 
-def _depth_table(runs: Sequence[RunSummary]) -> Table | None:
-    """None where no task has depths."""
+def _depth_table(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return a table if a task has depths."""
     variants = {variant for _, _, task in _tasks(runs) for variant in task.by_variant}
     depths = sorted(variant for variant in variants if variant.startswith("depth="))
     if not depths:
-        return None
+        return []
     rows = [
         Row((run, name, metric, *(_mean_of(task.by_variant.get(depth), metric) for depth in depths)))
         for run, name, task in _tasks(runs)
@@ -253,25 +228,22 @@ def _depth_table(runs: Sequence[RunSummary]) -> Table | None:
         for metric in task.metrics
     ]
     columns = (*_NAMES, _METRIC, *map(Column, depths))
-    return Table("Accuracy, % by depth of the needle (questions)", columns, tuple(rows))
+    return [Table("Accuracy, % by depth of the needle (questions)", columns, tuple(rows))]
 
 
 # -- form of the replies
 
 
 def _replies_table(runs: Sequence[RunSummary]) -> Table:
-    """A leaning to yes, and replies that are no answer: a row per run and task."""
+    """Return the bias to yes, and the replies that are no answer: a row per run and task."""
     numbers = ("yes/no questions", "gold yes, %", "said yes, %")
     rows = []
     for run, name, task in _tasks(runs):
         if not task.n:
             continue
-        shares = [_percent(share) for share in (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)]
+        both = (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)
+        shares = ["-" if share is None else f"{100 * share:.1f}" for share in both]
         said = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
         rows.append(Row((run, name, str(task.yes_no.n), *shares, said)))
     columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
     return Table("Form of the replies", columns, tuple(rows))
-
-
-def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.1f}"

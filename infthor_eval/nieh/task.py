@@ -24,14 +24,7 @@ _NEEDED = ("custom_dataset", "dataset_kwargs", "doc_to_text", "generation_kwargs
 
 @dataclass(frozen=True)
 class PreparedTask:
-    """A task with all that turns its samples into records.
-
-    Attributes:
-        task_samples: its samples.
-        decoding: decoding of replies.
-        generation_kwargs: the same in lm-eval's words, as given.
-        metrics: metrics of replies.
-    """
+    """A task with all that turns its samples into records; `generation_kwargs` are the decoding in lm-eval's words."""
 
     task_samples: TaskSamples
     decoding: Decoding
@@ -43,11 +36,7 @@ class NiehTask:
     """A task file, as far as it can be read before the model is loaded.
 
     Attributes:
-        name: name of the task.
         settings: contents of its file.
-        decoding: decoding of replies.
-        metrics: metrics of replies.
-        data: the set.
         needs_size: True if the samples depend on the model's tokens per frame.
         task_samples: the samples; None if they depend on the model.
     """

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.errors import DataError, UsageError
+from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.files import prepare_folder, write_atomically
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
@@ -20,10 +20,6 @@ INSPECTION = "inspection.csv"
 
 def check_output(out: Path, data: NiehSet) -> None:
     """Refuse an output folder whose contents the validated set would damage; called before the models run.
-
-    Args:
-        out: folder of the validated set.
-        data: the set to validate.
 
     Raises:
         UsageError: it is the folder of the set itself.
@@ -40,12 +36,7 @@ def check_output(out: Path, data: NiehSet) -> None:
 
 
 def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | None:
-    """Write the validated set; its frames are linked, not copied.
-
-    Args:
-        out: folder of the validated set; created if it does not exist.
-        data: the set that was validated.
-        verdicts: the judged questions.
+    """Write the validated set into a folder, created if needed; its frames are linked, not copied.
 
     Returns:
         New path of an existing inspection list, if it has decisions that the new one has no rows for.
@@ -53,7 +44,7 @@ def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | 
     Raises:
         DataError: a file cannot be written.
     """
-    try:
+    with wrap_errors(f"{out}: cannot be written", "give another --out"):
         out.mkdir(parents=True, exist_ok=True)
         link = out / "metadata"
         if not link.exists():
@@ -65,8 +56,6 @@ def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | 
         with write_atomically(out / "rejected.jsonl") as partial:
             partial.write_bytes(b"".join(line + b"\n" for line in lines))
         return write_inspection_list(out / INSPECTION, verdicts.to_inspect)
-    except OSError as error:
-        raise DataError(f"{out}: cannot be written ({error.strerror}); give another --out") from error
 
 
 def _as_json(item: JudgedQuestion) -> dict[str, Any]:

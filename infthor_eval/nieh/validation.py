@@ -34,7 +34,6 @@ class JudgedQuestion:
     """A question and the models' replies to it.
 
     Attributes:
-        question: the question.
         replies: reply of each model; None where the model failed.
         right: names of the models that answered it correctly.
         decision: a person's decision, "keep" or "drop"; None if there is none.
@@ -72,7 +71,7 @@ def judge_questions(
     Args:
         questions: the questions in the order of the set.
         replies: replies by model, then by question id; None where the model failed.
-        decisions: decisions on inspected questions, "keep" or "drop", by question id.
+        decisions: "keep" or "drop", by question id.
         scorer: scorer whose full marks are a correct answer.
 
     Raises:
@@ -82,7 +81,8 @@ def judge_questions(
     verdicts = Verdicts()
     for question in questions:
         by_model = {model: _reply(question, model, of_model) for model, of_model in replies.items()}
-        right = tuple(m for m, text in by_model.items() if text is not None and _is_correct(text, question, scorer))
+        scores = {m: score(last_line(t), question.answers, scorer) for m, t in by_model.items() if t is not None}
+        right = tuple(model for model, value in scores.items() if value >= 1.0)
         judged = JudgedQuestion(question, by_model, right, decisions.get(question.id))
         _list_of(judged, verdicts).append(judged)
     return verdicts
@@ -113,17 +113,11 @@ def _reply(question: Question, model: str, replies: Mapping[str, str | None]) ->
     return replies[question.id]
 
 
-def _is_correct(text: str, question: Question, scorer: Scorer) -> bool:
-    return score(last_line(text), question.answers, scorer) >= 1.0
-
-
 def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path | None:
     """Write the questions that a person must decide on; the person fills the last column with keep or drop.
 
-    Decisions in an existing list are kept; a list with decisions on other questions is renamed.
-
-    Returns:
-        New path of an existing list with decisions on other questions; None if no decision would be lost.
+    Decisions in an existing list are kept. A list with decisions on other questions is renamed, and its new path is
+    returned; else None.
 
     Raises:
         DataError: an existing list cannot be read.

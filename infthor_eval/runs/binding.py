@@ -2,10 +2,10 @@
 
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Generic
 
 from infthor_eval.errors import UsageError
-from infthor_eval.runs.records import RunHeader, Unit
+from infthor_eval.runs.records import P, RunHeader, U
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.run_config import header_of
 from infthor_eval.runs.suite import BoundEvaluation, Need, Suite
@@ -13,8 +13,6 @@ from model_adapters import Model, Policy, Subject, load
 
 __all__ = ["BoundRun", "bind_run", "require_capability"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 _NEEDED: dict[Need, tuple[type, str]] = {
     "conversation": (Model, "a model that answers in words"),
@@ -24,13 +22,7 @@ _NEEDED: dict[Need, tuple[type, str]] = {
 
 @dataclass(frozen=True)
 class BoundRun(Generic[U, P]):
-    """A run whose subject is loaded.
-
-    Attributes:
-        subject: what is evaluated.
-        evaluation: the evaluation of the subject.
-        header: header of the run's journal.
-    """
+    """A run whose subject is loaded, and the header of its journal."""
 
     subject: Subject
     evaluation: BoundEvaluation[U, P]
@@ -75,16 +67,7 @@ def _load_subject(run: PreparedRun[U, P]) -> Subject:
 
 
 def require_capability(subject: Subject, name: str, suite: Suite[U, P]) -> None:
-    """Refuse a subject that a suite cannot evaluate.
-
-    Args:
-        subject: a model or a policy.
-        name: the name that it was asked for.
-        suite: the suite.
-
-    Raises:
-        UsageError: the subject lacks what the suite needs.
-    """
+    """Refuse a subject, by the name that it was requested by, that lacks what a suite needs (UsageError)."""
     kind, description = _NEEDED[suite.needs]
     if not isinstance(subject, kind):
         raise UsageError(f"{name} cannot be evaluated on {suite.name}, which needs {description}")

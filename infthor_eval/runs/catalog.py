@@ -12,8 +12,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.packaged import packaged_folder
@@ -30,11 +28,7 @@ class _Loader(PlainLoader):
     """Plain YAML, with lm-eval's `!function module.name` kept as the name."""
 
 
-def _function_name(_: _Loader, node: yaml.Node) -> str:
-    return str(node.value)
-
-
-_Loader.add_constructor("!function", _function_name)
+_Loader.add_constructor("!function", lambda _, node: str(node.value))
 
 
 @dataclass(frozen=True)
@@ -42,9 +36,7 @@ class TaskFile:
     """A single task.
 
     Attributes:
-        name: name of the task.
         suite: name of its suite.
-        path: path of the file.
         settings: contents of the file with those of the included files; functions by name.
         description: what the task evaluates, in a sentence; empty where the file has none.
     """
@@ -80,22 +72,19 @@ class Catalog:
     more: tuple[Path, ...] = ()
 
     @classmethod
-    def packaged(cls) -> "Catalog":
+    def find_packaged(cls) -> "Catalog":
         """Return the catalog of this package's tasks alone."""
         return cls(packaged_folder("tasks"))
 
     @classmethod
-    def installed(cls, include: Sequence[Path] = ()) -> "Catalog":
+    def find_installed(cls, include: Sequence[Path] = ()) -> "Catalog":
         """Return the catalog of the tasks of this package, of other installed packages, and of further folders.
-
-        Args:
-            include: folders with further task files.
 
         Raises:
             UsageError: an installed package lacks the folder that it names.
         """
         others = (_folder_of(point) for point in entry_points(group=ENTRY_POINTS))
-        return replace(cls.packaged(), more=(*others, *include))
+        return replace(cls.find_packaged(), more=(*others, *include))
 
     @cached_property
     def tasks(self) -> dict[str, TaskFile]:
@@ -145,7 +134,8 @@ class Catalog:
                 raise DataError(f"{path}: neither a task nor a group name; a task file has a key 'task' or 'group'")
             if name in entries:
                 raise DataError(f"{path}: {name!r} is the name of another task file too; rename one")
-            if "group" in settings and not _are_names(settings.get("task")):
+            names = settings.get("task")
+            if "group" in settings and not (isinstance(names, list) and all(isinstance(task, str) for task in names)):
                 raise DataError(f"{path}: 'task' of a group must be a list of task names")
             entries[name] = path, settings
         return entries
@@ -182,10 +172,6 @@ def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
     return TaskFile(
         name, metadata["suite"], path, {**settings, "metadata": others}, str(metadata.get("description", ""))
     )
-
-
-def _are_names(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
 def _read(path: Path, including: tuple[Path, ...], shared: Mapping[str, Path]) -> dict[str, Any]:

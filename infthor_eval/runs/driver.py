@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol
 
 from infthor_eval.runs import journal as journals
 from infthor_eval.runs.executor import Executor, LocalExecutor
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.records import P, U, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.results import results_document, write_results, write_scores, write_usage
 from infthor_eval.runs.samples import StoredSamples
@@ -20,24 +20,18 @@ from infthor_eval.runs.worker_executor import WorkerPoolExecutor
 
 __all__ = ["Observer", "RunOutcome", "Silent", "execute"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
-
 
 class Observer(Protocol):
     """Follows a run."""
 
     def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
         """Called before the first unit, with all the work and the number of bad lines taken out of the journal."""
-        ...
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
-        ...
 
     def note(self, text: str) -> None:
         """Called with a line when a worker is lost or cannot be started."""
-        ...
 
 
 class Silent:
@@ -58,12 +52,9 @@ class RunOutcome(Generic[U, P]):
     """A run that has ended.
 
     Attributes:
-        folder: the run's folder.
-        run: what it was executed from.
-        summary: header and summary of the run.
-        records: the records of all units that were attempted.
+        records: records of all units that were attempted.
         n_missing: number of units that were not attempted, as the run was stopped.
-        usage: what all its requests took, those for cached artifacts included.
+        usage: usage of all requests, those for cached artifacts included.
         samples: the records in their order, converted for other readers.
     """
 
@@ -86,9 +77,9 @@ def execute(
 
     Args:
         run: the prepared run.
-        observer: follows the run; None for nobody.
-        should_stop: asked after each unit; once it returns True, the units in hand are finished, and the results of
-            what is there are written.
+        observer: follows the run.
+        should_stop: called after each unit; once it returns True, the units in hand are finished, and the results so
+            far are written.
 
     Raises:
         UsageError: another process at the same run, a subject that the suite cannot evaluate, or nothing to do.

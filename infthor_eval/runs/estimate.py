@@ -11,20 +11,17 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields, replace
-from typing import Any, TypeVar
+from typing import Any
 
 from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
-from infthor_eval.runs.records import Unit, UnitRecord, describe_failure
+from infthor_eval.runs.records import A, P, U, Unit, UnitRecord, describe_failure
 from infthor_eval.runs.request import RunRequest, prepare
 from infthor_eval.runs.suite import BoundEvaluation, Group, Suite, Workload
 from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["Estimate", "Quantities", "TaskEstimate", "estimate_run", "estimate_tasks"]
 
-A = TypeVar("A")
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 _UNITS_OF_A_GROUP = 3  # measured units of a group: the first, the middle and the last
 
@@ -35,7 +32,6 @@ class Quantities:
 
     Attributes:
         seconds: time of one worker.
-        requests: requests to the model.
         read: tokens of the requests, frames included.
         encoded: those of them that are not in a cache.
         written: tokens of the replies.
@@ -67,13 +63,7 @@ class Quantities:
 
 @dataclass(frozen=True)
 class _MeasuredGroup:
-    """Measured units of one group.
-
-    Attributes:
-        frames: frames of the group.
-        quantities: task and quantities of each unit, in the order of work.
-        failures: task and reason of each failed unit.
-    """
+    """The frames of a group, task and quantities of each measured unit, and task and reason of each failed one."""
 
     frames: int
     quantities: Sequence[tuple[str, Quantities]]
@@ -82,15 +72,7 @@ class _MeasuredGroup:
 
 @dataclass(frozen=True)
 class TaskEstimate:
-    """The estimate of one task.
-
-    Attributes:
-        task: name of the task.
-        n_units: number of its units.
-        n_measured: number of measured units.
-        frames: frames of its groups, each frame counted once in a group.
-        total: estimated quantities of all units.
-    """
+    """The estimated total of one task, whose frames are counted once in each group."""
 
     task: str
     n_units: int
@@ -101,13 +83,7 @@ class TaskEstimate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The estimate of a run.
-
-    Attributes:
-        workload: all the work.
-        tasks: estimates of the tasks; empty if all measured units failed.
-        failures: task and reason of each measured unit that failed.
-    """
+    """The estimate of a run by task (none if all measured units failed), and task and reason of each failed unit."""
 
     workload: Workload
     tasks: Sequence[TaskEstimate]
@@ -137,18 +113,12 @@ class _MeasuringSession:
 
 
 def estimate_run(request: RunRequest, suite: Suite[U, P], n_units: int, progress: Callable[[], None]) -> Estimate:
-    """Load the subject, do a few units of each task, and estimate the quantities of all; nothing is written.
+    """Load the subject, do about `n_units` units of each task, and estimate the quantities of all.
 
-    Args:
-        request: request for the run.
-        suite: suite of the run.
-        n_units: approximate number of measured units of each task.
-        progress: called after each measured group.
+    Nothing is written. `progress` is called after each measured group.
 
     Raises:
-        UsageError: as `execute`.
-        DataError: as `execute`.
-        ModelError: as `execute`.
+        InfthorError: as `execute`.
     """
     with closing(bind_run(prepare(request, suite))) as bound:
         workload = bound.evaluation.workload
@@ -192,12 +162,7 @@ def _choose_groups(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
 
 
 def estimate_tasks(workload: Workload[Unit[Any]], measured: Sequence[_MeasuredGroup]) -> list[TaskEstimate]:
-    """Estimate each task.
-
-    Args:
-        workload: all the work.
-        measured: measured groups of it, with at least one unit that has not failed.
-    """
+    """Estimate each task of a workload by measured groups of it, with at least one unit that has not failed."""
     later = _later_units(measured)
     excess = _first_unit_excess(measured, later)
     estimates = []

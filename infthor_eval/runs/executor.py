@@ -2,12 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol
 
 from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import RunHeader, Unit, UnitRecord
+from infthor_eval.runs.records import P, RunHeader, U, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.scheduling import run_groups
 from infthor_eval.runs.session import JournalSession
@@ -15,8 +15,6 @@ from infthor_eval.runs.suite import UnitSample, Workload
 
 __all__ = ["Executor", "LocalExecutor", "Recorded"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 Recorded = tuple[UnitRecord[P], bool]  # a record that is on disk; True if an earlier run had put it there
 
@@ -27,32 +25,21 @@ class Executor(Protocol[P]):
     @property
     def header(self) -> RunHeader:
         """Header of the run's journal."""
-        ...
 
     @property
     def workload(self) -> Workload[Unit[Any]]:
         """All the work."""
-        ...
 
     def evaluate(
         self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
     ) -> Iterator[tuple[UnitRecord[P], bool]]:
-        """Do all groups; yield every record as soon as it is on disk.
-
-        Args:
-            folder: the run's folder.
-            journal: the driver's shard.
-            should_stop: returns True once the units in hand are to be the last.
-        """
-        ...
+        """Do all groups, or stop after the units in hand; yield every record as soon as it is on disk."""
 
     def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
         """Convert records for other readers, in their order; not after `close`."""
-        ...
 
     def close(self) -> None:
         """Release everything, in whatever state it is."""
-        ...
 
 
 class LocalExecutor(Generic[U, P]):

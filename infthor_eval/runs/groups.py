@@ -1,18 +1,14 @@
 """The records of a group: whatever its suite raises fails the group alone, and is recorded."""
 
 from collections.abc import Iterator
-from typing import Any, TypeVar
 
 import msgspec
 
 from infthor_eval.errors import ModelError
-from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.records import P, U, UnitRecord
 from infthor_eval.runs.suite import BoundEvaluation, Group, Session
 
 __all__ = ["group_records"]
-
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 
 def group_records(evaluation: BoundEvaluation[U, P], group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:
@@ -32,4 +28,4 @@ def group_records(evaluation: BoundEvaluation[U, P], group: Group[U], session: S
         raise
     except Exception as error:  # noqa: BLE001 - a suite is anybody's code, and may raise anything
         fault = error
-    yield from (unit.failed(session.describe_failure(unit, fault)) for unit in waiting.values())
+    yield from (unit.record_failure(session.describe_failure(unit, fault)) for unit in waiting.values())

@@ -19,8 +19,7 @@ from contextlib import ExitStack
 from io import FileIO
 from pathlib import Path
 from threading import Lock
-from types import TracebackType
-from typing import Any, BinaryIO, Generic, Self, TypeVar
+from typing import Any, BinaryIO, Generic, Self
 
 import msgspec
 
@@ -28,7 +27,7 @@ from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import require_file
-from infthor_eval.runs.records import ArtifactRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.records import ArtifactRecord, P, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.shards import (
     BAD,
     FOLDER,
@@ -44,7 +43,6 @@ from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["Journal", "recover", "set_aside"]
 
-P = TypeVar("P")
 
 _SHARD = "worker-{:d}.jsonl"
 _RETRY_S = 0.1  # between two attempts to lock
@@ -52,24 +50,14 @@ _BAD_LINES = "bad_lines.txt"
 
 
 class Journal(Generic[P]):
-    """Append-only record of one run; this process holds one shard of it.
-
-    Attributes:
-        header: header of the run.
-        folder: folder of the shards.
-    """
+    """Append-only record of one run, in a folder of shards; this process holds one of them."""
 
     def __init__(
         self, run: Path, header: RunHeader, types: RecordTypes[P], worker: int = 0, wait_s: float = 0.0
     ) -> None:
-        """Open or create a worker's shard, and read all others.
+        """Open or create a worker's shard in the run's folder, and read all others.
 
-        Args:
-            run: the run's folder.
-            header: header of the run.
-            types: payloads of the suite.
-            worker: number of the worker.
-            wait_s: seconds to wait for another process to release the shard.
+        Another process has `wait_s` seconds to release the shard.
 
         Raises:
             UsageError: another process is writing the shard, or it cannot be written.
@@ -100,9 +88,7 @@ class Journal(Generic[P]):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.close()
 
     @property
@@ -228,15 +214,9 @@ def _lock(file: BinaryIO | FileIO, path: Path, wait_s: float = 0.0) -> None:
 
 
 def recover(run: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
-    """Move the bad lines of a run's shards to a file beside them; their units are tried again.
+    """Move the bad lines of a run's shards to a file beside them, so that their units are tried again.
 
-    Args:
-        run: the run's folder.
-        header: header of the run; replaces a bad first line.
-        types: payloads of the suite.
-
-    Returns:
-        Number of bad lines.
+    The header replaces a bad first line. Returns the number of bad lines.
 
     Raises:
         UsageError: another process is writing a shard.

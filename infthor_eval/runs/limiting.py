@@ -10,18 +10,10 @@ T = TypeVar("T")
 
 
 def spread(items: Sequence[T], cluster_of: Callable[[T], str], seed: int) -> list[int]:
-    """Return an order in which any beginning is spread evenly over the trajectories.
+    """Return an order of positions of which any beginning is spread evenly over the trajectories.
 
     Each round takes one item of every trajectory that has any left. The item, and the order of the trajectories, are
     drawn. A larger limit selects all items of a smaller one.
-
-    Args:
-        items: items of one task.
-        cluster_of: returns the trajectory of an item.
-        seed: seed of the run.
-
-    Returns:
-        Positions in `items`.
     """
     places: dict[str, list[int]] = {}
     for place, item in enumerate(items):

@@ -26,8 +26,10 @@ __all__ = [
 
 FORMAT = 3
 
-P = TypeVar("P")
+A = TypeVar("A")  # an artifact
+P = TypeVar("P")  # the payload of a suite's records
 P_co = TypeVar("P_co", covariant=True)
+U = TypeVar("U", bound="Unit[Any]")  # a suite's unit
 
 
 class UnitKey(NamedTuple):
@@ -48,13 +50,7 @@ class UnitKey(NamedTuple):
 
 
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Tokens of a unit; None where the model does not count them.
-
-    Attributes:
-        context: tokens of its requests.
-        cached: those of them that were not encoded again.
-        reply: tokens of the replies.
-    """
+    """Tokens of a unit's requests, of those that were not encoded again, and of its replies; None if not counted."""
 
     context: int | None = None
     cached: int | None = None
@@ -83,9 +79,6 @@ class UnitRecord(
     """A unit that was evaluated, or the reason why it could not be.
 
     Attributes:
-        task: see `UnitKey`.
-        id: see `UnitKey`.
-        variant: see `UnitKey`.
         cluster: name of what it shares with units that are right or wrong together (a trajectory), for intervals.
         fingerprint: hash of all its inputs; empty if they could not be read.
         payload: the suite's own struct.
@@ -179,10 +172,10 @@ class Unit(Generic[P]):
             **self.key._asdict(), cluster=self.cluster, fingerprint=fingerprint, payload=payload, **envelope
         )
 
-    def failed(self, reason: str, fingerprint: str = "", **envelope: Any) -> UnitRecord[P]:
+    def record_failure(self, reason: str, fingerprint: str = "", **envelope: Any) -> UnitRecord[P]:
         """Return its record if there is no result."""
         return self.record(fingerprint, self.payload, failure=reason, **envelope)
 
-    def excluded(self, reason: str, fingerprint: str, **envelope: Any) -> UnitRecord[P]:
+    def record_exclusion(self, reason: str, fingerprint: str, **envelope: Any) -> UnitRecord[P]:
         """Return its record if it turns out that no subject can be evaluated on it."""
         return self.record(fingerprint, self.payload, excluded=reason, **envelope)

@@ -3,20 +3,17 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic
 
 from infthor_eval.errors import UsageError, unknown_name
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.files import require_writable
-from infthor_eval.runs.records import RunHeader, Unit
+from infthor_eval.runs.records import P, RunHeader, U
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
 __all__ = ["PreparedRun", "RunRequest", "prepare"]
-
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 
 @dataclass(frozen=True)
@@ -61,13 +58,7 @@ class RunRequest:
 
 @dataclass(frozen=True)
 class PreparedRun(Generic[U, P]):
-    """A request whose names, files and data are in order; it is pickled and sent to workers.
-
-    Attributes:
-        request: the request.
-        suite: its suite.
-        evaluation: the suite set up for it.
-    """
+    """A request whose names, files and data are in order, with its suite set up; it is pickled and sent to workers."""
 
     request: RunRequest
     suite: Suite[U, P]

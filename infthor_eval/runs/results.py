@@ -22,14 +22,7 @@ _USAGE = "usage.json"
 
 
 def results_document(run: RunSummary, suite: Suite[Any, Any], n_missing: int | None, usage: Usage) -> dict[str, Any]:
-    """Return the contents of `results.json`; docs/formats.md describes them.
-
-    Args:
-        run: header and summary of the run.
-        suite: suite of the run.
-        n_missing: number of units that were not attempted; None if it is not known.
-        usage: usage of all requests.
-    """
+    """Return the contents of `results.json`, see docs/formats.md; `n_missing` is None if it is not known."""
     header = run.header
     return {
         "suite": header.suite,
@@ -44,11 +37,7 @@ def results_document(run: RunSummary, suite: Suite[Any, Any], n_missing: int | N
 
 
 def write_results(folder: Path, document: dict[str, Any]) -> None:
-    """Write `results.json`; equal runs give equal bytes.
-
-    Args:
-        folder: folder of the run.
-        document: see `results_document`.
+    """Write `results.json` (see `results_document`) into a run's folder; equal runs give equal bytes.
 
     Raises:
         DataError: the file cannot be written.
@@ -58,11 +47,6 @@ def write_results(folder: Path, document: dict[str, Any]) -> None:
 
 def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
     """Write the scores of every unit to `scores.jsonl`, a JSON object a line; equal runs give equal bytes.
-
-    Args:
-        folder: folder of the run.
-        suite: suite of the run.
-        records: records of the run's units.
 
     Raises:
         DataError: the file cannot be written.
@@ -85,11 +69,6 @@ def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRec
 
 def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
     """Write requests, tokens, time and cost of a run, which differ from run to run, to `usage.json`.
-
-    Args:
-        folder: folder of the run.
-        records: records of its units.
-        usage: usage of all requests.
 
     Raises:
         DataError: the file cannot be written.

@@ -2,18 +2,15 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any
 
 import infthor_eval
-from infthor_eval.runs.records import RunHeader, Unit
+from infthor_eval.runs.records import P, RunHeader, U
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Workload
 from model_adapters import Subject, adapter_identity
 
 __all__ = ["header_of", "run_config"]
-
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 
 def header_of(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -> RunHeader:
@@ -33,7 +30,7 @@ def run_config(
 
     Args:
         suite: name of the suite.
-        subject: what is evaluated.
+        subject: the evaluated model, policy or baseline.
         code: identity of a model adapter that is not this package's (`model_adapters.adapter_identity`).
         workload: config of the workload.
         limit: number of items of each task; None for all.

@@ -21,10 +21,10 @@ def label_runs(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] =
 
     Args:
         runs: folder and header of each run.
-        ignore: options that the tables show by themselves.
+        ignore: options that the tables show anyway.
 
     Raises:
-        DataError: the `run.yaml` of a run is not what it should be.
+        DataError: the `run.yaml` of a run is not valid.
     """
     same_name = defaultdict(list)
     for place, (_, header) in enumerate(runs):
@@ -38,7 +38,7 @@ def label_runs(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] =
 
 
 def _label_alike(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]) -> Iterator[str]:
-    """The labels of runs of one name."""
+    """Yield the labels of runs of one name."""
     options = [_options(folder) for folder, _ in runs]
     names = sorted({name for given in options for name in given} - set(ignore))
     values = {name: [given.get(name) for given in options] for name in names}
@@ -47,12 +47,12 @@ def _label_alike(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]
     keys = [(given, sorted(header.config.get("tasks", {}))) for given, (_, header) in zip(options, runs, strict=True)]
     for given, key, (folder, header) in zip(options, keys, runs, strict=True):
         differing = ", ".join(f"{name}={texts[given[name]]}" for name, texts in shown.items() if name in given)
-        told_apart = [*([differing] if differing else []), *([folder.name] if keys.count(key) > 1 else [])]
-        yield f"{header.name} ({', '.join(told_apart)})" if told_apart else header.name
+        remarks = [*([differing] if differing else []), *([folder.name] if keys.count(key) > 1 else [])]
+        yield f"{header.name} ({', '.join(remarks)})" if remarks else header.name
 
 
 def _options(folder: Path) -> dict[str, str]:
-    """The options of a run's command, those of the model among them, as text."""
+    """Return the options of a run's command as text, those of the model among them."""
     command = read_stored_command(folder)
     every = dict(command.options) if command else {}
     of_model = every.pop("model_args", None)
@@ -62,7 +62,7 @@ def _options(folder: Path) -> dict[str, str]:
 
 
 def _shorten(values: Sequence[str | None]) -> Mapping[str, str]:
-    """The values as they are; paths without the folders that all of them share."""
+    """Return the values as they are; paths without the folders that all of them share."""
     given = sorted({value for value in values if value is not None})
     parts = {value: PurePath(value).parts for value in given}
     if not all(PurePath(value).is_absolute() for value in given):

@@ -23,10 +23,7 @@ class StoredRun:
     """A run on disk.
 
     Attributes:
-        folder: folder of the run.
-        header: header of its journal.
         n_done: number of units with a record, failed ones included.
-        n_failed: number of failed units.
         n_missing: number of units that were not attempted; None if the run was killed before it wrote results.
         primary_metrics: primary metric of each task; empty if there are no results yet.
         changed: time of the last change to the journal, in seconds since 1970.
@@ -50,12 +47,7 @@ class BrokenRun:
 
 
 class Results(msgspec.Struct, frozen=True):
-    """The fields of `results.json` that need no suite.
-
-    Attributes:
-        n_missing: number of units that were not attempted.
-        primary_metrics: primary metric of each task.
-    """
+    """The fields of `results.json` that need no suite."""
 
     n_missing: int
     primary_metrics: dict[str, Rate] = {}

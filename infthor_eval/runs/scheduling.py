@@ -3,27 +3,17 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
-from typing import Any, TypeVar
 
-from infthor_eval.runs.records import Unit, UnitRecord
+from infthor_eval.runs.records import P, U, UnitRecord
 from infthor_eval.runs.suite import Group
 
 __all__ = ["run_groups"]
-
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 
 def run_groups(
     groups: Sequence[Group[U]], do: Callable[[Group[U]], Iterable[UnitRecord[P]]], max_in_flight: int
 ) -> Iterator[UnitRecord[P]]:
-    """Yield the records of all groups as soon as they are there.
-
-    Args:
-        groups: the groups in the order in which they are started.
-        do: does one group; called from several threads if several are in flight.
-        max_in_flight: number of groups that are done at the same time.
-    """
+    """Yield the records of all groups as soon as they are there; several in flight are done in a thread each."""
     if max_in_flight == 1 or len(groups) <= 1:
         for group in groups:
             yield from do(group)

@@ -1,18 +1,15 @@
 """A suite's view of the journal that its results go to."""
 
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic
 
 import msgspec
 
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import Unit, UnitRecord, describe_failure
+from infthor_eval.runs.records import A, P, Unit, UnitRecord, describe_failure
 from infthor_eval.runs.tracebacks import TracebackFile
 from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = ["JournalSession"]
-
-A = TypeVar("A")
-P = TypeVar("P")
 
 
 class JournalSession(Generic[P]):

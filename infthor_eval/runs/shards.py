@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic
 
 import msgspec
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.reading import read_bytes, require_file
-from infthor_eval.runs.records import FORMAT, ArtifactRecord, RecordTypes, RunHeader, UnitKey, UnitRecord
+from infthor_eval.runs.records import FORMAT, ArtifactRecord, P, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.usage import Usage
 
 __all__ = [
@@ -27,7 +27,6 @@ __all__ = [
     "read_shards",
 ]
 
-P = TypeVar("P")
 
 FOLDER = "journal"  # within the run's folder
 Decoder = msgspec.json.Decoder[Any]
@@ -38,13 +37,7 @@ _HINT = "run the same command with --recover to resume without such lines, or wi
 
 @dataclass
 class RunLog(Generic[P]):
-    """The contents of all shards of a run.
-
-    Attributes:
-        header: header of the run; None if there is no shard yet.
-        units: the latest record of each unit.
-        artifacts: cached artifacts by fingerprint.
-    """
+    """The contents of all shards of a run: latest records of units, and artifacts by fingerprint."""
 
     header: RunHeader | None = None
     units: dict[UnitKey, UnitRecord[P]] = field(default_factory=dict)
@@ -124,10 +117,8 @@ def read_failures(run: Path) -> dict[UnitKey, bool]:
     latest: dict[UnitKey, tuple[int, bool]] = {}
     for path in find_shards(run):
         for number, line in enumerate(read_lines(path), 1):
-            try:
+            with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=BAD):
                 unit = decoder.decode(line)
-            except BAD as error:
-                raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_HINT}") from error
             if isinstance(unit, _UnitOutcome):
                 key, rank = UnitKey(unit.task, unit.id, unit.variant), (unit.attempt, unit.failure is None)
                 latest[key] = max(latest.get(key, rank), rank)
@@ -168,10 +159,8 @@ def read_shard(path: Path, decoder: Decoder, log: RunLog[Any]) -> None:
         raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
     log.header = header
     for number, line in enumerate(lines[1:], 2):
-        try:
+        with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=BAD):
             record = decoder.decode(line)
-        except BAD as error:
-            raise DataError(f"{path}, line {number}: not a line of a journal ({error}); {_HINT}") from error
         if isinstance(record, RunHeader):
             raise DataError(f"{path}, line {number}: a second header in the middle of the records; {_HINT}")
         log.add(record)
@@ -188,11 +177,7 @@ class _AnyFormat(msgspec.Struct):
 
 
 def check_format(path: Path, line: bytes) -> None:
-    """Refuse a shard of another format.
-
-    Args:
-        path: path of the shard.
-        line: its first line; one that is no header passes.
+    """Refuse a shard whose first line is the header of another format; a line that is no header passes.
 
     Raises:
         DataError: names both formats, and what to do.
@@ -210,7 +195,5 @@ def check_format(path: Path, line: bytes) -> None:
 def _read_header(path: Path, lines: list[bytes]) -> RunHeader:
     first = lines[0] if lines else b""
     check_format(path, first)
-    try:
+    with wrap_errors(f"{path}, line 1: not the first line of a journal", _HINT, catch=BAD):
         return msgspec.json.decode(first, type=RunHeader)
-    except BAD as error:
-        raise DataError(f"{path}, line 1: not the first line of a journal ({error}); {_HINT}") from error

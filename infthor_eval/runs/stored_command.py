@@ -24,10 +24,9 @@ _HINT = "write options of `infthor-eval run` by their long names, as `limit: 100
 
 @dataclass(frozen=True)
 class StoredCommand:
-    """The command of a run, as `run.yaml` has it.
+    """The command of a run in `run.yaml`.
 
     Attributes:
-        path: path of the file.
         options: options of `infthor-eval run` by their long names with `_` for `-`; several values are a list, those
             of `model_args` a mapping.
     """
@@ -51,10 +50,6 @@ class StoredCommand:
 
 def write_command(folder: Path, request: RunRequest) -> None:
     """Write `run.yaml` into a run's folder.
-
-    Args:
-        folder: folder of the run.
-        request: request for the run.
 
     Raises:
         DataError: the file cannot be written.

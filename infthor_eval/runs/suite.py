@@ -19,7 +19,7 @@ import msgspec
 
 from infthor_eval.rates import Rate
 from infthor_eval.runs.catalog import TaskFile
-from infthor_eval.runs.records import RecordTypes, RunHeader, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.records import A, P, RecordTypes, RunHeader, U, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -41,21 +41,18 @@ __all__ = [
 
 Need = Literal["conversation", "policy"]
 
-A = TypeVar("A")
 O_co = TypeVar("O_co", covariant=True)
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 U_co = TypeVar("U_co", bound=Unit[Any], covariant=True)
 
 
 @dataclass(frozen=True)
 class TaskRequest(Generic[O_co]):
-    """What a run asks of a suite.
+    """The request of a run to a suite.
 
     Attributes:
-        tasks: the task files, all of this suite.
-        options: an instance of the suite's `Options`.
-        data: folder of the data set for tasks that do not bring their own.
+        tasks: task files, all of this suite.
+        options: instance of the suite's `options`.
+        data: folder of the data set for tasks without their own.
         limit: number of items to evaluate of each task, chosen by `infthor_eval.runs.limiting`; None for all.
         seed: seed of everything random.
     """
@@ -90,12 +87,7 @@ class Skipped:
 
 @dataclass(frozen=True)
 class Cost:
-    """The cost of a task, known before its first unit.
-
-    Attributes:
-        task: name of the task.
-        description: the cost in words, for people.
-    """
+    """The cost of a task in words, known before its first unit."""
 
     task: str
     description: str
@@ -128,19 +120,15 @@ class Session(Protocol[P]):
 
     def find_record(self, unit: Unit[P], fingerprint: str) -> UnitRecord[P] | None:
         """Return the record of a unit that already has a result from these very inputs, or None."""
-        ...
 
     def describe_failure(self, unit: Unit[P], error: Exception) -> str:
         """Return the reason why a unit failed by an exception, and keep the traceback of an unexpected one."""
-        ...
 
     def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
         """Return the cached artifact of these inputs, or None."""
-        ...
 
     def cache_artifact(self, fingerprint: str, artifact: Any, usage: Usage = NOTHING) -> None:
         """Cache an artifact for when the run is resumed, with what its requests took."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -170,7 +158,6 @@ class BoundEvaluation(Protocol[U, P]):
     @property
     def workload(self) -> Workload[U]:
         """All the work; the same object every time."""
-        ...
 
     def run(self, group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:
         """Do a group: yield a record per unit as soon as it is there; records found in the session as they are.
@@ -179,15 +166,12 @@ class BoundEvaluation(Protocol[U, P]):
             InfthorError: the units without a record cannot be done. The run records them as failed and goes on. So it
                 does with any other exception, which is a fault of the suite; only MemoryError ends the run.
         """
-        ...
 
     def to_sample(self, record: UnitRecord[P]) -> UnitSample:
         """Convert a record of this workload for other readers; not after `close`."""
-        ...
 
     def close(self) -> None:
         """Release what the work needed (simulators); called once, whether the work was finished or not."""
-        ...
 
 
 class Evaluation(Protocol[U, P]):
@@ -201,7 +185,6 @@ class Evaluation(Protocol[U, P]):
             DataError: the data do not match their format.
             ModelError: the model can take none of the units.
         """
-        ...
 
 
 class Suite(Protocol[U, P]):
@@ -222,7 +205,6 @@ class Suite(Protocol[U, P]):
     @property
     def records(self) -> RecordTypes[P]:
         """Payloads of the suite's records."""
-        ...
 
     def prepare(self, request: TaskRequest[Any]) -> Evaluation[U, P]:
         """Set up a run. Whatever can be refused without the subject is refused here, before it is loaded.
@@ -231,37 +213,26 @@ class Suite(Protocol[U, P]):
             UsageError: a task or an option that does not fit.
             DataError: the data do not match their format.
         """
-        ...
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[P]]) -> msgspec.Struct:
         """Summarise a run: a pure function of its journal, without times, equal for equal records."""
-        ...
 
     def scores(self, record: UnitRecord[P]) -> Mapping[str, float]:
         """Return the metrics of one unit by name; a missing one counts as 0, as all do where the unit failed."""
-        ...
 
     def primary_metrics(self, summary: Any) -> Mapping[str, Rate]:
         """Return the primary metric of each task, a share from 0 to 1; none for a task of which no unit counts."""
-        ...
 
     def overview(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
         """Return what people see first of runs of this suite, side by side, at most 100 columns wide."""
-        ...
 
     def tables(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
         """Return all results of runs of this suite, with the published numbers beside them."""
-        ...
 
 
 @dataclass(frozen=True)
 class RunSummary:
-    """A run, summed up.
-
-    Attributes:
-        header: header of the run's journal.
-        summary: what the suite makes of the records (`Suite.summarise`).
-    """
+    """The header of a run's journal, and its summary by its suite (`Suite.summarise`)."""
 
     header: RunHeader
     summary: Any

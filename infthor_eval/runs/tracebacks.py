@@ -22,12 +22,7 @@ class TracebackFile:
         self._lock = Lock()
 
     def append(self, key: UnitKey, attempt: int, error: Exception) -> str:
-        """Append the traceback of an unexpected exception.
-
-        Args:
-            key: key of the unit that failed by it.
-            attempt: attempt at the unit.
-            error: the exception, or the `UserCodeError` that it caused.
+        """Append the traceback of an unexpected exception, or of the cause of a `UserCodeError`, that failed a unit.
 
         Returns:
             Name of the file within the run's folder; empty for an expected error, which needs no traceback.

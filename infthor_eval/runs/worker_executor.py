@@ -7,14 +7,14 @@ number, each with the records that earlier runs or a lost worker left of it. So 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.runs.binding import bind_run
 from infthor_eval.runs.groups import group_records
 from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import RunHeader, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.records import P, RunHeader, U, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.session import JournalSession
 from infthor_eval.runs.suite import Group, UnitSample, Workload
@@ -22,8 +22,6 @@ from infthor_eval.workers import Event, JobFailed, JobResult, Pool, WorkerLost, 
 
 __all__ = ["WorkerPoolExecutor"]
 
-P = TypeVar("P")
-U = TypeVar("U", bound=Unit[Any])
 
 _SHARD_WAIT_S = 20.0
 # A unit that kills its worker (out of memory, say) must not fail the others of its group: after so many losses in a
@@ -43,31 +41,19 @@ class _Greeting:
 
 @dataclass(frozen=True)
 class _Portion:
-    """A group, or one unit of it.
-
-    Attributes:
-        group: number of the group in the order of the workload.
-        unit: number of the unit in the group; None for all of them.
-    """
+    """A group of the workload by its number, or one unit of it; `unit` is None for all of them."""
 
     group: int
     unit: int | None = None
 
     def select(self, groups: Sequence[Group[U]]) -> Group[U]:
-        """Return the group, or the part of it, out of all groups."""
         group = groups[self.group]
         return group if self.unit is None else replace(group, units=[group.units[self.unit]])
 
 
 @dataclass(frozen=True)
 class _GroupJob(Generic[P]):
-    """A portion for a worker to do.
-
-    Attributes:
-        portion: the portion.
-        folder: the run's folder.
-        earlier: the latest records of its units.
-    """
+    """A portion for a worker to do, with the latest records of its units."""
 
     portion: _Portion
     folder: Path
@@ -103,7 +89,8 @@ class _Evaluator(Generic[U, P]):
     @property
     def greeting(self) -> _Greeting:
         workload = self._bound.evaluation.workload
-        groups = [Group([_without_inputs(unit) for unit in group.units], group.frames) for group in workload.groups]
+        # Units without the inputs that only the suite needs.
+        groups = [Group([Unit(u.key, u.cluster, u.payload) for u in g.units], g.frames) for g in workload.groups]
         return _Greeting(self._bound.header, Workload(groups, workload.skipped, workload.config, workload.costs))
 
     def do(self, job: _GroupJob[P] | _SampleJob[P]) -> Iterator[tuple[UnitRecord[P], bool] | UnitSample]:
@@ -130,14 +117,7 @@ class _Evaluator(Generic[U, P]):
 
 @dataclass(frozen=True)
 class _Progress(Generic[P]):
-    """The state of a run that all its portions share.
-
-    Attributes:
-        folder: the run's folder.
-        journal: the driver's shard.
-        should_stop: see `Executor.evaluate`.
-        done: units whose records were yielded.
-    """
+    """The state of a run that all its portions share; `done` are the units whose records were yielded."""
 
     folder: Path
     journal: Journal[P]
@@ -145,19 +125,11 @@ class _Progress(Generic[P]):
     done: set[UnitKey] = field(default_factory=set)
 
 
-def _without_inputs(unit: Unit[P]) -> Unit[P]:
-    return Unit(unit.key, unit.cluster, unit.payload)
-
-
 class WorkerPoolExecutor(Generic[U, P]):
     """The executor of several workers; see `infthor_eval.runs.executor.Executor`."""
 
     def __init__(self, run: PreparedRun[U, P], report: Callable[[str], None]) -> None:
-        """Start the workers and wait for the first of them.
-
-        Args:
-            run: the run; pickled and sent to each worker.
-            report: called with a line when a worker is lost or cannot be started.
+        """Start the workers and wait for the first; `report` gets a line when one is lost or cannot be started.
 
         Raises:
             UsageError: there is no such cluster.
@@ -193,7 +165,7 @@ class WorkerPoolExecutor(Generic[U, P]):
         for portion, reason in (yield from self._do_portions(alone, progress, _UNIT_TRIES)).items():
             (unit,) = portion.select(groups).units
             failure = f"worker after worker was lost at it ({reason}); give it more memory, or leave it out"
-            yield journal.append(unit.failed(failure)), False
+            yield journal.append(unit.record_failure(failure)), False
         for worker in range(1, self._n_workers + 1):
             journal.reread(worker)  # for cached artifacts, which workers do not send
 

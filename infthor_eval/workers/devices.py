@@ -19,12 +19,7 @@ def visible_gpus() -> list[str]:
 
 
 def limit_devices(number: int, count: int) -> None:
-    """Limit this process to its share; a number of threads that the environment sets already is kept.
-
-    Args:
-        number: number of the worker, from 1.
-        count: number of workers.
-    """
+    """Limit this process to the share of a worker (from 1) of `count`; a number of threads already set is kept."""
     os.environ.setdefault(_THREADS, str(max(1, (os.cpu_count() or 1) // count)))
     all_gpus = visible_gpus()
     if all_gpus and count > 1:

@@ -1,4 +1,4 @@
-"""Jobs of one result each, done by workers: what generating, replaying and asking do with --workers."""
+"""Jobs of one result each, done by workers, as commands do with --workers."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -18,7 +18,6 @@ def run_jobs(
 
     Args:
         open_worker: creates a worker, which gives one result for each job.
-        jobs: the jobs.
         worker_settings: number and place of the workers; a local one does the jobs in this process, in order.
         report: called with a line when a worker is lost or cannot be started.
 

@@ -20,27 +20,19 @@ class Worker(Protocol):
     @property
     def greeting(self) -> Any:
         """What the driver learns before the first job; it can be pickled."""
-        ...
 
     def do(self, job: Any) -> Iterator[Any]:
         """Do a job and yield its results, which can be pickled. The caller may stop after any of them."""
-        ...
 
     def close(self) -> None:
         """Release all resources."""
-        ...
 
 
 class OpenWorker(Protocol):
     """Creates a worker in the process where it works; it is pickled and sent there."""
 
     def __call__(self, number: int) -> Worker:
-        """Create the worker.
-
-        Args:
-            number: number of the worker, from 1.
-        """
-        ...
+        """Create the worker of this number, from 1."""
 
 
 class Link(Protocol):
@@ -53,7 +45,6 @@ class Link(Protocol):
             WorkerLostError: the worker ended before it was ready.
             InfthorError: the worker cannot be created, for the reason that it sent.
         """
-        ...
 
     def do(self, job: Any) -> Iterator[Any]:
         """Yield the results of a job as they arrive.
@@ -62,15 +53,12 @@ class Link(Protocol):
             WorkerLostError: the worker ended before the job did; the results so far are valid.
             InfthorError: the worker raised it, likewise OSError and MemoryError.
         """
-        ...
 
     def stop(self) -> None:
         """Stop the present job after its next result."""
-        ...
 
     def close(self) -> None:
         """End the worker, whatever it is doing."""
-        ...
 
 
 Connect = Callable[[int], Link]  # given the number of a worker

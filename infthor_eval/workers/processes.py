@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from threading import Lock, Thread
-from types import FrameType
 from typing import Any
 
 from infthor_eval.workers.devices import limit_devices
@@ -23,12 +22,7 @@ _SPAWN = get_context("spawn")
 
 
 def processes(open_worker: OpenWorker, count: int) -> Connect:
-    """Return links to processes of this machine, each with its share of processors and GPUs.
-
-    Args:
-        open_worker: creates a worker; must be picklable.
-        count: number of workers.
-    """
+    """Return links to processes of this machine, each with its share of processors and GPUs."""
     return lambda number: ProcessLink(open_worker, number, count)
 
 
@@ -111,7 +105,7 @@ class ProcessLink:
 def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
     """Run a worker's process: create the worker that it is sent, and do jobs until the driver is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends Ctrl-C to all processes; the driver decides
-    signal.signal(signal.SIGTERM, _end)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     limit_devices(number, count)  # before imports that read them only once
     Thread(target=_end_with_driver, daemon=True).start()
     try:
@@ -156,10 +150,6 @@ def _send(connection: "Connection[Any, Any]", message: Any) -> None:
         connection.send(message)
     except (BrokenPipeError, ConnectionResetError):
         sys.exit(1)  # the driver is gone
-
-
-def _end(_number: int, _frame: FrameType | None) -> None:
-    sys.exit(143)
 
 
 def _end_with_driver() -> None:

@@ -20,8 +20,8 @@ def ray_actors(open_worker: OpenWorker, address: str, gpus_per_worker: float | N
 
     Args:
         open_worker: creates a worker.
-        address: address of the cluster, as `ray.init` takes it.
-        gpus_per_worker: GPUs that are reserved for each worker; None for one if the cluster has any.
+        address: address of the cluster, for `ray.init`.
+        gpus_per_worker: GPUs of each worker; None for one if the cluster has any.
 
     Raises:
         UsageError: Ray is not installed, or there is no cluster at the address.

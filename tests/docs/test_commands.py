@@ -101,7 +101,7 @@ def _check_names(given):
             name = name_on_engine(model, engine) if engine else model
             assert all(has_option(name, option) for option in {**given["model_args"], **own}), name
     own = {"nieh_mini_last", "nieh_mini_start", "nieh_mini_words", "my_task", "sums_small"}
-    catalog = Catalog.packaged()
+    catalog = Catalog.find_packaged()
     for task in set(given["tasks"].split(",")) - own:
         assert task in catalog.tasks or task in catalog.groups
 

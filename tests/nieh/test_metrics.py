@@ -37,7 +37,7 @@ def own(task_files):
 
 
 def task():
-    return Catalog.packaged().tasks["nieh_own"]
+    return Catalog.find_packaged().tasks["nieh_own"]
 
 
 def test_the_files_function_makes_the_scores_and_the_published_scorers_stay_out(prepared, own):

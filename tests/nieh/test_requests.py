@@ -50,7 +50,7 @@ def as_text(part):
 
 @pytest.mark.parametrize("task", EXPECTED)
 def test_requests_are_what_they_were(task):
-    settings = Catalog.packaged().tasks[task].settings["dataset_kwargs"]
+    settings = Catalog.find_packaged().tasks[task].settings["dataset_kwargs"]
     found = find_samples({"bundled": "nieh_mini", "tokens_per_frame": 121, "seed": 0, **settings})
     rows = []
     for sample in found.samples:
@@ -62,5 +62,5 @@ def test_requests_are_what_they_were(task):
 
 def test_every_task_is_among_them():
     chosen_by_clip = {"nieh_clip_retrieval", "nieh_memory_frames"}
-    ours = {name for name, task in Catalog.packaged().tasks.items() if task.suite == "nieh"}
+    ours = {name for name, task in Catalog.find_packaged().tasks.items() if task.suite == "nieh"}
     assert set(EXPECTED) == ours - chosen_by_clip

@@ -7,7 +7,7 @@ from infthor_eval.runs import Catalog
 def test_the_packaged_tasks_are_those_that_lm_eval_sees():
     from lm_eval.tasks import TaskManager
 
-    catalog = Catalog.packaged()
+    catalog = Catalog.find_packaged()
     manager = TaskManager(include_path=str(catalog.folder), include_defaults=False)
     assert sorted([*catalog.tasks, *catalog.groups]) == sorted({*manager.all_tasks} - {"infthor"})
     assert [task.name for task in catalog.expand(["nieh"])] == ["nieh_gt", "nieh_full"]
@@ -18,7 +18,7 @@ def test_the_packaged_tasks_are_those_that_lm_eval_sees():
 
 
 def test_each_task_says_what_distinguishes_it_and_that_is_no_setting():
-    tasks = Catalog.packaged().tasks.values()
+    tasks = Catalog.find_packaged().tasks.values()
     descriptions = [task.description for task in tasks]
     assert all(descriptions)
     assert len(set(descriptions)) == len(descriptions)
@@ -28,7 +28,7 @@ def test_each_task_says_what_distinguishes_it_and_that_is_no_setting():
 @pytest.mark.parametrize(("name", "near"), [("nieh_ful", "'nieh_full'"), ("neih", "'nieh'"), ("xyz", "nieh_mini_gt")])
 def test_an_unknown_name_is_answered_with_the_nearest(name, near):
     with pytest.raises(UsageError) as caught:
-        Catalog.packaged().expand([name])
+        Catalog.find_packaged().expand([name])
     assert near in str(caught.value)
 
 

@@ -55,7 +55,7 @@ def _models() -> None:
 @include_option
 def _tasks(include: tuple[Path, ...]) -> None:
     """Tasks and groups of tasks."""
-    catalog = Catalog.installed(include)
+    catalog = Catalog.find_installed(include)
     for suite, tasks in split_by_suite(catalog.tasks.values()).items():
         table = RichTable(suite, "what it evaluates", "data", box=box.SIMPLE_HEAD)
         for group, members in catalog.groups.items():

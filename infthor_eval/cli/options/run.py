@@ -166,7 +166,7 @@ class RunOptions:
             raise UsageError(
                 f"--name {self.name!r}: names a folder; use letters, digits, '.', '_', '-', '@', '+' and blanks"
             )
-        by_suite = split_by_suite(Catalog.installed(self.include).expand(self.tasks))
+        by_suite = split_by_suite(Catalog.find_installed(self.include).expand(self.tasks))
         requests = []
         for model in self.models:
             for suite, tasks in by_suite.items():

@@ -15,10 +15,7 @@ CONTEXTS = {
     "truncate_head": Context(views.truncate_head, needs_model=True),
     "haystack": Context(haystack, needs_model=True),
     "interleaved": Context(
-        interleaved.interleaved,
-        intro=_INTERLEAVED,
-        parts=interleaved.interleaved_parts,
-        sources=trajectories_identity,
+        interleaved.interleaved, intro=_INTERLEAVED, parts=interleaved.interleaved_parts, sources=trajectories_identity
     ),
     "interleaved_plans": Context(plans.interleaved_plans, intro=_INTERLEAVED, parts=plans.plans_parts),
     "text_state": Context(
@@ -44,7 +41,7 @@ CONTEXTS = {
 
 
 def context_named(name: str) -> Context:
-    """The context of that name.
+    """Return the context of a name.
 
     Raises:
         UsageError: there is none.

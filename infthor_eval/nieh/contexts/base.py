@@ -47,7 +47,6 @@ class Sample:
     """A question in one variant of its context.
 
     Attributes:
-        question: the question.
         frames: positions of the shown frames in the trajectory's time order.
         variant: variant of the context ("depth=0.4"); empty if there is only one.
         n_cut: number of frames that are cut off to keep the context's size.
@@ -93,11 +92,7 @@ class ContextSettings:
 
     @classmethod
     def read(cls, given: Mapping[str, Any], place: str = "dataset_kwargs") -> "ContextSettings":
-        """Return the settings in a mapping; other keys are ignored.
-
-        Args:
-            given: the mapping.
-            place: file and key of the mapping, for messages.
+        """Return the settings in a mapping; other keys are ignored. `place` is its file and key, for messages.
 
         Raises:
             UsageError: a value is not valid; the message has place, setting and valid values.
@@ -117,10 +112,7 @@ class ContextSettings:
         return cls(**values)
 
     def n_frames(self, k_tokens: int) -> int:
-        """Return the number of frames that fill the context.
-
-        Args:
-            k_tokens: the published tokens of a kilo-token in this context.
+        """Return the number of frames that fill the context, given the published tokens of its kilo-token.
 
         Raises:
             UsageError: the size, or the tokens of a frame, are not given.
@@ -132,12 +124,9 @@ class ContextSettings:
         return int(self.ctx_size * (self.k_tokens or k_tokens)) // self.tokens_per_frame
 
 
+# Functions, not lambdas: contexts are pickled and sent to workers.
 def _only_frames(_data: NiehSet, _sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
     return list(frames)
-
-
-def _all_frames(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
-    return data.frames(traj_id)
 
 
 def _no_sources(_data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
@@ -161,18 +150,18 @@ class Context:
     needs_model: bool = False
     intro: str = "Answer the question given the agent's views in time order."
     parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(default=_only_frames)
-    frames: Callable[[NiehSet, str], Sequence[FrameRef]] = field(default=_all_frames)
+    frames: Callable[[NiehSet, str], Sequence[FrameRef]] = field(default=NiehSet.frames)
     sources: Callable[[NiehSet, ContextSettings], dict[str, Any]] = field(default=_no_sources)
 
-    def shown(self, data: NiehSet, sample: Sample) -> list[FrameRef]:
+    def select_frames(self, data: NiehSet, sample: Sample) -> list[FrameRef]:
         """Return the frames of a sample."""
         frames = self.frames(data, sample.question.traj_id)
         return [frames[position] for position in sample.frames]
 
     def request(self, data: NiehSet, sample: Sample) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows it."""
-        shown = self.parts(data, sample, self.shown(data, sample))
-        return shown, question_text(self.intro, sample.question)
+        parts = self.parts(data, sample, self.select_frames(data, sample))
+        return parts, question_text(self.intro, sample.question)
 
 
 def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:

@@ -24,29 +24,29 @@ _OUTSIDE = "the window reaches outside the trajectory"
 
 
 def haystack(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """The windows for one question: one per depth."""
+    """Return a question on one window per depth."""
     n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
     if question.absence:
         return [_anywhere(question, n_all, n, settings.seed)]
     clues = clue_positions(data, question)
-    found = []
+    samples: list[Sample | SkippedQuestion] = []
     for depth in settings.depths:
         draw = random.Random(f"{settings.seed}/{question.id}/{n}/{depth:g}")
         window = _window(clues, n_all, n, round(depth * _STEPS), draw)
         variant = f"depth={depth:g}"
-        found.append(
+        samples.append(
             SkippedQuestion(question, window, variant) if isinstance(window, str) else Sample(question, window, variant)
         )
-    return found
+    return samples
 
 
 def _window(clues: tuple[int, ...], n_all: int, n: int, d_index: int, draw: random.Random) -> tuple[int, ...] | str:
-    """Places of the frames, ascending; why there is no window where there is none."""
+    """Return the positions of the frames, ascending, or the reason why there is no window."""
     if n < 1:
         return "no frame fits the window"
     if len(clues) == 1:
         return _around(clues[0], n_all, n, d_index, n_all)
-    if _follow_each_other(clues):
+    if clues[-1] - clues[0] == len(clues) - 1:  # they follow each other
         # Of a put the published code lets the window end one frame too late, and shows it one frame shorter.
         return _around(clues[0], n_all, n, *((d_index, n_all + 1) if len(clues) == 2 else (_STEPS - 1, n_all)))
     pool, missing = sampling_pool(clues, n_all, n), n - len(clues)
@@ -57,10 +57,6 @@ def _window(clues: tuple[int, ...], n_all: int, n: int, d_index: int, draw: rand
     return tuple(sorted({*clues, *draw.sample(pool, missing)}))
 
 
-def _follow_each_other(clues: tuple[int, ...]) -> bool:
-    return clues[-1] - clues[0] == len(clues) - 1
-
-
 def _around(needle: int, n_all: int, n: int, d_index: int, last_end: int) -> tuple[int, ...] | str:
     start = needle - d_index * (n // _STEPS)
     if start < 0 or start + n > last_end:
@@ -69,10 +65,10 @@ def _around(needle: int, n_all: int, n: int, d_index: int, last_end: int) -> tup
 
 
 def sampling_pool(clues: Sequence[int], n_all: int, n: int) -> list[int]:
-    """What a window around clues that are apart is drawn from: the frames between them.
+    """Return the frames from which a window around clues that are apart is drawn: those between them.
 
-    Where those are too few, as many as are missing on either side of them too, clues among those as published: a clue
-    that is drawn takes no second place, and the window is shorter.
+    If these are too few, as many as are missing on either side too. As published, clues can be among these: a clue that
+    is drawn takes no second place, and the window is shorter.
     """
     between = [place for place in range(clues[0] + 1, clues[-1]) if place not in clues]
     missing = n - len(clues)

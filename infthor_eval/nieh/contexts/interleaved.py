@@ -10,11 +10,11 @@ from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
 __all__ = ["interleaved", "interleaved_parts"]
 
-_STATE = " State: "  # what comes before frames
+_STATE = " State: "  # text before frames
 
 
 def interleaved(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """Per task its goal and the frame before it, then every action with its frames."""
+    """Ask on each task's goal and the frame before it, then every action with its frames."""
     outline = data.outline(question.traj_id)
     if outline is None:
         return [SkippedQuestion(question, data.missing_outline)]
@@ -23,7 +23,7 @@ def interleaved(data: NiehSet, question: Question, _settings: ContextSettings) -
 
 
 def interleaved_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
-    """The texts, with the frames in their places."""
+    """Return the texts with the frames in their places."""
     outline = data.outline(sample.question.traj_id)
     assert outline is not None  # or there were no sample
     left = iter(frames)
@@ -32,19 +32,15 @@ def interleaved_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef])
 
 
 def _layout(outline: Outline, frames_of: Mapping[int, tuple[int, ...]]) -> Iterator[str | int]:
-    """Texts, and frames by their place in the trajectory."""
+    """Yield texts, and frames by their position in the trajectory."""
     actions = outline.actions
     for goal, span in outline.tasks:
         yield f"Your task goal: {goal}. "
         yield _STATE
-        yield _before(span.start, frames_of)
+        # The frame from which the first action starts: the last one of those before it, or the first of all.
+        yield next((frames_of[number][-1] for number in range(span.start - 1, -1, -1) if number in frames_of), 0)
         for number in span:
             yield f" Action: {actions[number]}"
             if number in frames_of:
                 yield _STATE
                 yield from frames_of[number]
-
-
-def _before(action: int, frames_of: Mapping[int, tuple[int, ...]]) -> int:
-    """The frame that an action begins from: the last one of those before it, or the first of all."""
-    return next((frames_of[number][-1] for number in range(action - 1, -1, -1) if number in frames_of), 0)

@@ -12,12 +12,12 @@ from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
 __all__ = ["interleaved_plans", "plans_parts"]
 
-_MARK = "<image>"  # where a frame stands in traj.txt
-_ACT = "<|act|>"  # what ends an action there
+_MARK = "<image>"  # the place of a frame in traj.txt
+_ACT = "<|act|>"  # the end of an action there
 
 
 def interleaved_plans(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """Goals, plans, frames and actions in time order; of several frames of an action the last."""
+    """Ask on goals, plans, frames and actions in time order; of several frames of an action, the last is shown."""
     n_frames = len(data.frames(question.traj_id))
     done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
     n_actions = max(done, default=0)
@@ -31,7 +31,7 @@ def interleaved_plans(data: NiehSet, question: Question, _settings: ContextSetti
 
 
 def _actions_before_marks(text: str) -> list[int]:
-    """How many actions each frame mark comes after. The frame behind a goal shows what the last action left."""
+    """Return the number of actions before each frame mark. The frame after a goal shows the result of the last one."""
     done, n_actions = [], 0
     for before in text.split(_MARK)[:-1]:
         n_actions += before.rstrip().endswith(_ACT)
@@ -40,7 +40,7 @@ def _actions_before_marks(text: str) -> list[int]:
 
 
 def plans_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
-    """The texts of traj.txt with the frames in their places."""
+    """Return the texts of traj.txt with the frames in their places."""
     texts = _sequence_text(data.folder(sample.question.traj_id)).strip().split(_MARK)
     parts = (part for pair in zip_longest(texts, frames) for part in pair)
     return [part for part in parts if part]

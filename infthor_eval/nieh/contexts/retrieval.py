@@ -1,6 +1,6 @@
 """Contexts that show the frames that a CLIP model finds nearest, to the question or to the agent's current view.
 
-What retrieves is imported where it is needed: it takes seconds, which tasks without it need not wait.
+The retriever is imported where it is needed: that takes seconds, which other tasks need not wait.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ __all__ = ["clip_retrieval", "memory_frames", "retriever_identity"]
 
 
 def clip_retrieval(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """The `top_k` frames most similar to the question, in time order (published under the same name, k = 10).
+    """Ask on the `top_k` frames most similar to the question, in time order (published by the same name, k = 10).
 
     Of equally similar frames the earlier ones are taken; a trajectory of fewer frames is shown whole.
     """
@@ -32,7 +32,7 @@ def clip_retrieval(data: NiehSet, question: Question, settings: ContextSettings)
 
 
 def memory_frames(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """The `top_k` earlier frames most similar to the last one, which is the agent's current view, then that one.
+    """Ask on the `top_k` earlier frames most similar to the last one, the agent's current view, then on that one.
 
     The paper reports such a memory with the top 20 images (long-horizon tasks). The current view is shown beside the
     k, not counted among them.
@@ -47,7 +47,7 @@ def memory_frames(data: NiehSet, question: Question, settings: ContextSettings) 
 
 
 def retriever_identity(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
-    """Which model retrieves: another one finds other frames."""
+    """Return the identity of the retriever: another one finds other frames."""
     return {"retriever": _retriever(settings).identity()}
 
 

@@ -11,7 +11,7 @@ __all__ = ["state_parts", "text_state"]
 
 
 def text_state(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """The last frame, beside the text of the last state."""
+    """Ask on the last frame, beside the text of the last state."""
     if not data.states(question.traj_id):
         reason = "the trajectory has no state_summary" if data.outline(question.traj_id) else data.missing_outline
         return [SkippedQuestion(question, reason)]
@@ -19,6 +19,6 @@ def text_state(data: NiehSet, question: Question, _settings: ContextSettings) ->
 
 
 def state_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
-    """The text of the last state, then the last frame."""
+    """Return the text of the last state, then the last frame."""
     states = data.states(sample.question.traj_id)
     return [f" State: {states[max(states)]}; Last agent's view: ", *frames]

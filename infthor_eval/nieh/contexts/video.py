@@ -14,10 +14,10 @@ __all__ = ["video", "video_frames", "video_identity"]
 
 
 def video(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """The trajectory's mp4 at one frame per second, or every frame where it has none (published: `video`).
+    """Ask on the trajectory's mp4 at one frame per second, or on every frame if it has none (published: `video`).
 
-    Models are given the frames as images, also those that have an input for videos of their own, so that all of them
-    answer from the same frames. The variant says which it was, for the two must not be mixed up in a result.
+    Models are given the frames as images, also those with an input for videos, so that all of them answer from the same
+    frames. The variant names the source, so that the two are not mixed up in a result.
     """
     try:
         frames = video_frames(data, question.traj_id)
@@ -28,7 +28,7 @@ def video(data: NiehSet, question: Question, _settings: ContextSettings) -> list
 
 
 def video_frames(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
-    """The frames that are shown.
+    """Return the shown frames.
 
     Raises:
         DataError: the trajectory has a video that cannot be decoded.
@@ -38,7 +38,7 @@ def video_frames(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
 
 
 def video_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
-    """Hash of the videos and how they are decoded: the set's own fingerprint knows nothing of videos."""
+    """Return the hash of the videos and their decoder; the set's own fingerprint does not cover videos."""
     digest = hashlib.blake2b(digest_size=16)
     for traj_id in sorted({question.traj_id for question in data.questions}):
         if data.video(traj_id) is not None:
@@ -47,7 +47,6 @@ def video_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
 
 
 def _name(data: NiehSet, traj_id: str) -> str:
-    """What tells a video's sampled frames from others."""
     try:
         return data.video_frames(traj_id)[0].path.parent.name
     except DataError:

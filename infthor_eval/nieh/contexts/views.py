@@ -10,13 +10,13 @@ _K_TOKENS = 1024  # truncate_head's published kilo-token
 
 
 def clues(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """The frames that hold the evidence and no others, in time order whatever the file's (the paper's Table 4)."""
+    """Ask on the frames that are evidence alone, in time order whatever the file's (the paper's Table 4)."""
     order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
     return [Sample(question, tuple(sorted(order[frame] for frame in data.clue_frames(question))))]
 
 
 def trajectory(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """Every frame of the trajectory (published: `full_traj`)."""
+    """Ask on every frame of the trajectory (published: `full_traj`)."""
     return [Sample(question, tuple(range(len(data.frames(question.traj_id)))))]
 
 
