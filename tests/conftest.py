@@ -16,6 +16,7 @@ from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.runs import Catalog
 
+from .browser import browser, open_page  # noqa: F401 - fixtures
 from .processor_times import read_slow_tests
 
 # Before torch is imported, here and in processes that tests start: on a busy machine two threads that wait for each

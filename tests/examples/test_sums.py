@@ -9,8 +9,6 @@ from infthor_eval.report.runs import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.suites import find_presenter, find_suite
 
-from ..report.web.conftest import browser, open_page  # noqa: F401
-
 MODELS = ("calculator", "qwen2.5-vl-tiny")
 
 
@@ -69,7 +67,7 @@ def test_its_page_has_its_tables_its_chart_and_its_samples(page):
         assert wrong.tokens[0] > 0
 
 
-def test_its_page_opens_in_a_browser(page, open_page):  # noqa: F811
+def test_its_page_opens_in_a_browser(page, open_page):
     opened = open_page(page)
     tab = opened.tab
     tab.select_option("#kind", "with carry")
