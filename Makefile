@@ -31,6 +31,7 @@ test-all: $(INSTALLED) $(PEERS)
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
 test-times: $(INSTALLED) $(PEERS)
+	$(BIN)/python -m pytest tests/sim/test_pictures.py tests/sim/arm # numba compiles, which counts for no test
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -p tests.processor_times
 	$(BIN)/python -m tests.processor_times

@@ -14,8 +14,6 @@ SOURCES = ("infthor_eval", "model_adapters", "tasks", "results/published")
 FILES = ("results/README.md", "README.md", "LICENSE", "pyproject.toml", "setup.py")
 QUIETLY = ("--quiet", "--disable-pip-version-check", "--no-index", "--no-deps")
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):

@@ -22,17 +22,6 @@ CANNOT_RUN = {
     r"DIR$": "needs data of the reader's",
     r"--ray-address": "needs a cluster",
 }
-# Commands that take ten seconds and more.
-SLOW = (
-    r"--tasks infthor_plans_mini( |$)(?!.*--limit 1$)",
-    r"--tasks manipulathor_mini",
-    r"generate --scene",
-    r"scenes show",
-    r"qwen2.5-vl-tiny --tasks nieh --data",
-    r"figure (6|7|radius)",
-    r"lm-eval run --model infthor",
-    r"--tasks nieh_mini$",
-)
 PROGRAMS = ("infthor-eval", "make", "lm-eval", "pip", "python", "hf", "torchrun", "export")
 
 
@@ -59,11 +48,6 @@ class Command:
         if not self.is_ours:
             return f"{self.words[0]} is not this package's"
         return next((reason for pattern, reason in CANNOT_RUN.items() if re.search(pattern, self.text)), None)
-
-    @property
-    def is_slow(self) -> bool:
-        """Whether it takes ten seconds and more."""
-        return any(re.search(pattern, self.text) for pattern in SLOW)
 
 
 def command_blocks(page: str) -> list[list[Command]]:

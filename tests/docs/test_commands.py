@@ -15,7 +15,7 @@ from infthor_eval.suites import baseline_suites
 from model_adapters import has_option, is_known, name_on_engine, names
 
 from .blocks import ROOT, written_files
-from .commands import CANNOT_RUN, FLOOR_PLANS, SLOW, Command, command_blocks
+from .commands import CANNOT_RUN, FLOOR_PLANS, Command, command_blocks
 
 RUN_PAGES = ("README.md", "docs/tutorial.md", "docs/own-models.md", "docs/own-tasks.md", "docs/training.md")
 PAGES = sorted(
@@ -23,16 +23,8 @@ PAGES = sorted(
     for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md"))
 )
 COMMANDS = [(page, command) for page in PAGES for block in command_blocks(page) for command in block]
-LONG = (pytest.mark.slow, pytest.mark.timeout(1800))
 BLOCKS = [
-    pytest.param(
-        page,
-        block,
-        id=f"{page}-{number}",
-        marks=[pytest.mark.slow, pytest.mark.timeout(1800)]
-        if any(one.is_slow for one in block if one.reason is None)
-        else [],
-    )
+    pytest.param(page, block, id=f"{page}-{number}")
     for page in RUN_PAGES
     for number, block in enumerate(command_blocks(page))
     if any(command.reason is None for command in block)
@@ -53,6 +45,7 @@ def folder_of(tmp_path_factory):
     return folder_of
 
 
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize(("page", "block"), BLOCKS)
 def test_the_commands_of_a_page_run_one_after_the_other(page, block, folder_of, run, monkeypatch):
     monkeypatch.chdir(folder_of(page))
@@ -108,7 +101,7 @@ def _check_names(given):
 
 def test_every_exception_is_still_needed():
     ours = [command.text for _, command in COMMANDS if command.is_ours]
-    for pattern in (*CANNOT_RUN, *SLOW):
+    for pattern in CANNOT_RUN:
         assert any(re.search(pattern, text) for text in ours), pattern
 
 

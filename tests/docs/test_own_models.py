@@ -53,7 +53,6 @@ def test_it_is_evaluated_and_a_run_of_its_own_when_it_is_edited(folder, run):
     assert {identity["model"]["name"] for identity in identities} == {"Brightness"}
 
 
-@pytest.mark.slow
 def test_workers_find_it(folder, run):
     code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 3, "--workers", 2)
     assert code == 0, err

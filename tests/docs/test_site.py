@@ -41,7 +41,6 @@ def test_a_link_in_the_repository_becomes_one_in_the_site(hook, place, link, exp
     assert hook.on_page_markdown(f"see [this]({link}).", page) == f"see [this]({expected})."
 
 
-@pytest.mark.slow
 def test_the_site_is_whole_and_takes_nothing_from_elsewhere(tmp_path):
     words = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", tmp_path]
     done = subprocess.run(

@@ -213,7 +213,6 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(make_nieh_
     assert len(read_run(journal.parent, RECORDS)[1]) == 5
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("full_at", ["kitchen-1-seed1.json", "task-000.pddl"])
 def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(tmp_path, run, monkeypatch, full_at):
     arguments = ["generate", "--scene", "kitchen-1", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path]

@@ -64,9 +64,7 @@ def test_the_final_task_is_about_both_ends_and_comes_last(simulator):
     assert trajectory.sub_trajs[-1].low_pddl_idx[1] == len(trajectory.plan.low_actions)
 
 
-@pytest.mark.parametrize(
-    ("scene", "seed"), [("living-room-3", 2), pytest.param("FloorPlan317", 0, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("scene", "seed"), [("living-room-3", 2), ("FloorPlan317", 0)])
 def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
     # In the floor plan an open drawer is out of sight from where it was opened to look into it.
     data = SHARED if scene.startswith("FloorPlan") else None

@@ -1,7 +1,5 @@
 """Generating, replaying and asking by several workers: the very files of one."""
 
-import pytest
-
 from infthor_eval.formats.digests import digest_of_file
 
 SCENES = ("--scene", "kitchen-1", "--scene", "bedroom-2", "--min-steps", 20, "--min-subgoals", 1)
@@ -15,7 +13,6 @@ def files(folder):
     }
 
 
-@pytest.mark.slow
 def test_the_files_are_the_same_whoever_makes_them(run, tmp_path):
     for workers in (1, 2):
         out = tmp_path / str(workers)

@@ -28,7 +28,6 @@ def ours(make_nieh_set, tmp_path, run):
     return ours
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not PEERS.is_dir(), reason=f"no torchvision in {PEERS}; `make test` puts it there")
 def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, ours, start):
     from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
@@ -68,7 +67,6 @@ def test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own(tmp_p
     assert found == theirs
 
 
-@pytest.mark.slow
 def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(make_nieh_set, tmp_path, start):
     package = tmp_path / "site"
     write_adapter(package)

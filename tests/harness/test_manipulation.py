@@ -32,7 +32,6 @@ def short(task_files):
     return task_files
 
 
-@pytest.mark.slow
 def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run, start):
     data = write(tmp_path / "data", cut(MUG, 6))
     arguments = ["--model", TINY, "--tasks", "manipulathor_pickup", "--data", data, "--output", tmp_path / "ours"]
@@ -56,11 +55,10 @@ def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run,
 @pytest.mark.parametrize(
     ("adapter", "task", "said"),
     [
-        pytest.param(
+        (
             "qwen2.5-vl-tiny",
             "manipulathor_pickup",
             "cannot be evaluated on manipulation, which needs a policy that drives an arm",
-            marks=pytest.mark.slow,
         ),
         (TINY, "nieh_mini_gt", "openvla-tiny cannot be evaluated on nieh, which needs a model that answers in words"),
     ],

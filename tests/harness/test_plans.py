@@ -22,7 +22,6 @@ def asked(task, data, out, model, *more, **options):
     return ["run", *model, "--tasks", task, "--metadata", metadata, "--output_path", out, *more]
 
 
-@pytest.mark.slow
 def test_one_request_a_trajectory_and_what_our_own_run_finds(tmp_path, task_files, run, start):
     task = task_files / "plans" / "infthor_plans.yaml"
     task.write_text("include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n")

@@ -142,7 +142,6 @@ def test_a_package_that_is_missing_is_named_with_the_mend(asked, run, doubled, p
     assert err.splitlines()[-1] == f"infthor-eval: --{package}-args needs the package {package}; pip install {package}"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("package", "more"), [("wandb", "mode=offline"), ("trackio", "auto_log_gpu=False")])
 def test_the_real_package_takes_a_run(asked, run, tmp_path, monkeypatch, package, more):
     pytest.importorskip(package)

@@ -53,7 +53,6 @@ def found(output):
     return read_run(folder, RECORDS)[1], json.loads((folder / "results.json").read_text())["summary"]
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("shared_simulators")
 def test_a_run_that_is_killed_ends_as_one_that_is_not(prepared, tmp_path):
     data = write(tmp_path / "two", cut(CANDLE, 6), cut(MUG))
@@ -115,7 +114,7 @@ def calls(monkeypatch, shared_simulators):
     return found
 
 
-@pytest.mark.parametrize("mode", ["arm", pytest.param("default", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("mode", ["arm", "default"])
 def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(prepared, tmp_path, calls, mode):
     whole = execute(prepared("random-arm", output=tmp_path / "whole"))
     n_calls = calls.n[mode]
@@ -130,7 +129,7 @@ def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(prep
 
 
 @pytest.mark.usefixtures("shared_simulators")
-@pytest.mark.parametrize("n_failures", [pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize("n_failures", [2, 3])
 def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(prepared, tmp_path, monkeypatch, n_failures):
     whole = execute(prepared("random-arm", output=tmp_path / "whole"))
     step, failures = ArmEnvironment.step, []

@@ -74,7 +74,6 @@ def kill_and_go_on(data, output, n_kills, draw):
     return killed
 
 
-@pytest.mark.slow
 def test_a_run_that_is_killed_again_and_again_ends_as_one_that_is_not(tmp_path):
     data = write(tmp_path / "data", cut(FORK, 4), cut(MUG, 3))
     finish(start(data, tmp_path / "whole"))
@@ -128,7 +127,7 @@ def n_restarts(outcome):
     return sum(int(fault.rpartition(" ")[2]) for fault in faults)
 
 
-@pytest.mark.parametrize("model", ["planner", pytest.param("random", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("model", ["planner", "random"])
 def test_a_simulator_that_dies_in_mid_plan_changes_no_result_and_is_counted(prepared, tmp_path, calls, model):
     whole = execute(prepared(model, output=tmp_path / "whole"))
     n_calls = calls.n
@@ -148,7 +147,7 @@ def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepared, tmp_pa
 
 
 @pytest.mark.usefixtures("shared_simulator")
-@pytest.mark.parametrize("n_failures", [pytest.param(1, marks=pytest.mark.slow), 2, 3])
+@pytest.mark.parametrize("n_failures", [1, 2, 3])
 def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(prepared, tmp_path, monkeypatch, n_failures):
     whole = execute(prepared(output=tmp_path / "whole"))
     step, failures = PlanEnvironment.step, []

@@ -326,7 +326,7 @@ def short(tmp_path):
 
 @pytest.mark.parametrize(
     ("model", "ways"),
-    [(QWEN, ("greedy", "constrained")), pytest.param(LLAVA, ("constrained",), marks=pytest.mark.slow)],
+    [(QWEN, ("greedy", "constrained")), (LLAVA, ("constrained",))],
 )
 def test_sharing_what_was_encoded_changes_no_reply(prepared, tmp_path, short, brief, model, ways):
     for way in ways:  # replies are drawn unless they are greedy
@@ -339,7 +339,6 @@ def test_sharing_what_was_encoded_changes_no_reply(prepared, tmp_path, short, br
         assert endings(shared) == endings(plain)
 
 
-@pytest.mark.slow
 def test_a_seed_draws_the_same_replies_and_another_others(prepared, tmp_path):
     data = write(tmp_path / "one", cut(FORK, 3))
 
@@ -376,7 +375,6 @@ def test_what_was_seen_is_encoded_once(prepared, short, monkeypatch, watched, br
             assert watched[0][1].n_context_tokens - second.n_cached_tokens < 30
 
 
-@pytest.mark.slow
 def test_histories_of_a_tiny_model(prepared, tmp_path, watched, make_clip):
     data = write(tmp_path / "few", cut(CANDLE, 5))
     options = {"retriever": str(make_clip())}

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import msgspec
-import pytest
 
 from infthor_eval.plans.baselines import BASELINES
 from infthor_eval.runs import Silent, execute
@@ -26,7 +25,6 @@ class Counting(Silent):
         self.most = max(self.most, len(children() - self.before))
 
 
-@pytest.mark.slow
 def test_four_episodes_at_once_find_what_one_after_the_other_finds(prepared, tmp_path, monkeypatch):
     data = write(tmp_path / "three", cut(FORK, 2), cut(MUG, 2), cut(CANDLE, 3))
     counting = Counting()

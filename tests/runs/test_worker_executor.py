@@ -187,7 +187,6 @@ class _Losing(Watching):
             self._cluster.remove_node(self._node)
 
 
-@pytest.mark.slow
 def test_a_cluster_that_loses_a_node_finds_what_one_process_finds(tmp_path):
     suite = DeadlySuite(tmp_path, {"4+1": 1})
     with two_nodes() as (cluster, node):

@@ -137,7 +137,6 @@ def test_an_executable_that_is_not_there():
         simulator.reset(SCENE)
 
 
-@pytest.mark.slow
 def test_two_hundred_starts_and_stops_leave_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 

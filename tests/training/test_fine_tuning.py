@@ -64,7 +64,6 @@ def same(first, second):
     return first.keys() == second.keys() and all(first[name].equal(second[name]) for name in first)
 
 
-@pytest.mark.slow
 def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter(recipe, data, tmp_path):
     checkpoint, steps = train(recipe, data, tmp_path / "out", epochs=40, save_every=1000)
     assert [done.step for done in steps] == list(range(1, steps[-1].n_steps + 1))

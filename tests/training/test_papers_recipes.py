@@ -66,7 +66,6 @@ def weights_of(out: Path) -> dict[str, torch.Tensor]:
     return load_file(out / "checkpoint" / "model.safetensors")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "n_processes"), [("infthor_32k", 1), ("infthor_64k", 2), ("infthor_130k", 4)])
 def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: int) -> None:
     recipe = scaled(name, n_processes)
@@ -79,7 +78,6 @@ def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: in
     assert all(weight.isfinite().all() for weight in weights_of(tmp_path / "out").values())
 
 
-@pytest.mark.slow
 def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_others(
     bundled_set: Path, tmp_path: Path
 ) -> None:

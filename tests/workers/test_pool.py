@@ -185,7 +185,6 @@ def test_jobs_of_one_result_come_with_their_numbers_and_what_is_given_up_is_an_e
     assert alone == {0: (os.getpid(), 0)}
 
 
-@pytest.mark.slow
 def test_a_worker_for_which_there_is_no_room_yet_joins_when_its_node_comes():
     with two_nodes() as (cluster, second):
         cluster.remove_node(second)

@@ -68,7 +68,6 @@ def test_the_command_of_the_file_is_the_run(config, run):
     assert "oracle: 0 evaluated now, 2 resumed" in err
 
 
-@pytest.mark.slow
 def test_several_workers_write_it_too(config, tmp_path, run):
     code, _, err = run("--config", config(workers=2))
     assert code == 0, err

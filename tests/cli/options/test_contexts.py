@@ -35,7 +35,6 @@ def data(make_nieh_set):
     return make_nieh_set(QUESTIONS, n_frames=45, size=56)
 
 
-@pytest.mark.slow
 def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(data, make_clip, tmp_path, run):
     tasks, out = "nieh_clip_retrieval,nieh_memory_frames", tmp_path / "out"
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out]
@@ -122,7 +121,6 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(data, write
     assert sorted(map(sorted, variants)) == [["source=frames", "source=mp4"], ["source=mp4"]]
 
 
-@pytest.mark.slow
 def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_path):
     def start(output):
         arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_memory_notes", "--data", data, "--output", output]

@@ -2,8 +2,6 @@
 
 import json
 
-import pytest
-
 TINY = "qwen2.5-vl-tiny"
 
 
@@ -20,7 +18,6 @@ def tokens(folder, records_in):
     return tokens
 
 
-@pytest.mark.slow
 def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run, records_in):
     data, out = make_nieh_set(size=56), tmp_path / "out"
     arguments = ["--model", TINY, "--tasks", "nieh_full", "--data", data, "--output", out]

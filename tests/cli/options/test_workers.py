@@ -19,8 +19,8 @@ def exported(folder):
     ("model", "task"),
     [
         ("qwen2.5-vl-tiny", "nieh_gt"),
-        pytest.param("planner", "infthor_plans", marks=pytest.mark.slow),
-        pytest.param("planner-arm", "manipulathor_pickup", marks=pytest.mark.slow),
+        ("planner", "infthor_plans"),
+        ("planner-arm", "manipulathor_pickup"),
     ],
 )
 def test_two_workers_have_the_results_of_one_process(run, make_nieh_set, tmp_path, model, task):

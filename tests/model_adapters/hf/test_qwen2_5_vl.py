@@ -60,7 +60,6 @@ def test_replies_differ_between_frames_and_between_questions(tiny: Any, frames: 
     assert len({_ask(tiny, frames[:1], f"\nIs the {thing} here?").text for thing in ("mug", "pan", "bed")}) > 1
 
 
-@pytest.mark.slow
 def test_weights_and_tokenizer_are_the_same_for_a_seed_in_every_process(checkpoint: Path, tmp_path: Path) -> None:
     code = (
         "import pathlib, sys; from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint;"

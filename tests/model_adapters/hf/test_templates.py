@@ -81,7 +81,6 @@ def test_turns_are_written_one_after_the_other(family: str, conversations: list[
         assert model._loaded.tokenizer.decode(ids) == BEGINS[family] + text.replace("@", IMAGES[family])
 
 
-@pytest.mark.slow
 def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
     checkpoints: dict[str, Path], tmp_path: Path, conversations: list[tuple[Turn, ...]], answer_plainly: Any
 ) -> None:

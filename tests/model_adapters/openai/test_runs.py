@@ -181,7 +181,7 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
         assert KEY[3:] not in message
 
 
-@pytest.mark.parametrize("in_flight", [pytest.param(1, marks=pytest.mark.slow), 4])
+@pytest.mark.parametrize("in_flight", [1, 4])
 def test_a_run_interrupted_twice_ends_at_once_in_one_line(make_nieh_set: Any, tmp_path: Path, in_flight: int) -> None:
     asked, done = threading.Event(), threading.Event()
 

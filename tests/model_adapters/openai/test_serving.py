@@ -123,7 +123,6 @@ def test_plans_are_carried_out_as_in_this_process(
     assert {record.usage.requests for record in behind} == {len(record.payload.steps) for record in behind}
 
 
-@pytest.mark.slow
 def test_all_bundled_questions_are_answered_alike(
     both: Callable[..., list[list[UnitRecord[Any]]]],
 ) -> None:
@@ -132,7 +131,6 @@ def test_all_bundled_questions_are_answered_alike(
     assert [record.payload for record in behind] == [record.payload for record in here]
 
 
-@pytest.mark.slow
 def test_bundled_plans_are_carried_out_alike(both: Callable[..., list[list[UnitRecord[Any]]]]) -> None:
     behind, here = both("--tasks", "infthor_plans_mini", "--limit", 2, "--greedy", **WITHOUT_STOP)
     assert len(behind) > 40
