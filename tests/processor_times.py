@@ -19,12 +19,13 @@ import pytest
 __all__ = ["LIMIT_S", "read_slow_tests"]
 
 LIMIT_S = 1.5
-# Slow ones that `make test` runs all the same, as no other test goes the same whole way.
+# Slow ones that `make test` runs all the same, as no other test goes the same whole way, or later blocks of a page need them.
 KEPT = (
     "tests/nieh/test_suite.py::test_the_tiny_model_runs_through_and_shares_prefixes",
     "tests/model_adapters/hf/test_conversation.py::test_sharing_changes_no_reply",
     "tests/manipulation/test_episodes.py::test_the_planner_picks_up_all_and_puts_nearly_all",
     "tests/runs/test_driver.py::test_a_killed_command_goes_on_and_shows_progress_table_results_and_export",
+    "tests/docs/test_commands.py::test_the_commands_of_a_page_run_one_after_the_other[docs/tutorial.md-2]",
     "tests/harness/test_host.py::test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own",
     "tests/cli/commands/test_data_commands.py::test_the_three_commands_make_a_set",
     "tests/plans/test_planner.py::test_every_plan_is_carried_out[bedroom-2-seed7]",
