@@ -15,9 +15,9 @@ __all__ = ["clues_table", "overview", "tables"]
 _NAMES = (Column("model", False), Column("task", False))
 _METRIC = Column("scorer", False)
 _LEGEND = (
-    "total: all questions, those on absences among them; open-ended ones stand in the columns by clues too.",
-    "95 %: clustered by trajectory, honest near all right and all wrong. bootstrap: over resampled trajectories, which "
-    "assumes no shape of the scores; where the two differ much, there are few trajectories.",
+    "total: all questions, with those on absences. Open-ended questions are in the columns by clues too.",
+    "95 %: interval clustered by trajectory, valid near 0 and 100 %. bootstrap: interval over resampled trajectories, "
+    "which assumes no distribution of the scores. If the two differ much, there are few trajectories.",
 )
 _EMBEDDED = (
     "Questions on frames of the embedded simulator: not comparable with the published rows, which are on AI2-THOR's "
