@@ -19,7 +19,7 @@ import pytest
 __all__ = ["LIMIT_S", "read_slow_tests"]
 
 LIMIT_S = 1.5
-# Slow ones that `make test` runs all the same, as no other test goes the same whole way, or later blocks of a page need them.
+# Slow ones that `make test` runs all the same: no other test goes the same whole way, or later ones need their results.
 KEPT = (
     "tests/nieh/test_suite.py::test_the_tiny_model_runs_through_and_shares_prefixes",
     "tests/model_adapters/hf/test_conversation.py::test_sharing_changes_no_reply",
