@@ -16,6 +16,7 @@ import pytest
 from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.runs import Group, RunRequest, Unit, UnitKey, execute, prepare, read_header, read_run
 from infthor_eval.runs.scheduling import run_groups
+from infthor_eval.workers import WorkerSettings
 from model_adapters import Capabilities
 from tests.runs.toy import Adder, Sum, Sums, ToySuite, is_broken, suite_of
 from tests.runs.toy_command import request
@@ -180,6 +181,21 @@ def test_what_is_known_is_not_done_again_and_what_failed_is_tried_again(tmp_path
     outcome, watching = run(request(tmp_path))
     assert [resumed for _, _, resumed in watching.seen] == [True, True, False, False]
     assert [record.attempt for record in outcome.records] == [1, 1, 2, 2]
+
+
+def test_the_folder_has_the_command_and_the_results(tmp_path):
+    outcome, _ = run(request(tmp_path))
+    assert {"run.yaml", "results.json", "scores.jsonl", "usage.json"} <= {
+        path.name for path in outcome.folder.iterdir()
+    }
+
+
+@pytest.mark.timeout(600)
+def test_two_workers_have_the_results_of_one_process(tmp_path):
+    alone, _ = run(request(tmp_path / "alone"))
+    shared = execute(prepare(request(tmp_path / "shared", worker_settings=WorkerSettings(2)), ToySuite()))
+    assert (shared.folder / "results.json").read_bytes() == (alone.folder / "results.json").read_bytes()
+    assert len(list((shared.folder / "journal").glob("worker-*.jsonl"))) == 2
 
 
 def test_a_shard_that_is_deleted_after_the_last_unit_gives_no_results(tmp_path, monkeypatch):
