@@ -3,6 +3,8 @@
 The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`): `qa_set*.csv` beside
 `metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`, `expert_log.json` and, in some sets,
 `<traj_id>_10fps.mp4`. The trajectory files are in a separate folder (published data) or inside the set (ours).
+
+Question files alone, without `metadata/`, are a set too: for whatever needs no frame.
 """
 
 import hashlib
@@ -28,6 +30,7 @@ __all__ = ["NiehSet", "SkippedQuestion"]
 T = TypeVar("T")
 _LONGEST = 40  # characters of a name in a message
 _HINT = "unpack the trajectory again"
+_NO_FRAMES = "has no metadata/ with frames; unpack the set's metadata.tar there"
 _GIVE_A_SET = "give the folder of an NIEH set, or download the published one with `infthor-eval fetch nieh`"
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
@@ -46,7 +49,8 @@ class NiehSet:
     """Questions and frames of one folder. A trajectory is read when it is first needed, and cached.
 
     Attributes:
-        root: folder of the set.
+        root: folder of the set, or one question file.
+        has_frames: False if there are question files alone.
         trajectories: folder of its trajectories (`<traj_id>.json` or `.txt`), or None if they are inside the set.
         simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does not say.
     """
@@ -58,18 +62,20 @@ class NiehSet:
             DataError: a folder or file is missing, the set has another format version, or a question file is
                 malformed.
         """
-        if not root.is_dir():
+        if not root.exists():
             raise DataError(f"{root}: no such folder; {_GIVE_A_SET}")
         self.root = root
-        self._files = sorted(root.glob("qa_set*.csv"))
+        self._folder = root if root.is_dir() else root.parent
+        self._files = sorted(root.glob("qa_set*.csv")) if root.is_dir() else [root]
         if needs_questions and not self._files:
             raise DataError(f"{root}: has no qa_set*.csv, as an NIEH set has beside metadata/; {_GIVE_A_SET}")
-        if not (root / "metadata").is_dir():
-            raise DataError(f"{root}: has no metadata/; unpack the set's metadata.tar there")
+        self.has_frames = (self._folder / "metadata").is_dir()
+        if not self.has_frames and not needs_questions:
+            raise DataError(f"{root}: {_NO_FRAMES}")
         if trajectories is not None and not trajectories.is_dir():
             raise DataError(f"{trajectories}: no such folder; give the folder of the trajectories with --trajectories")
         self.trajectories = trajectories
-        self.simulator = simulator_of(root)
+        self.simulator = simulator_of(self._folder)
         self._read = tuple(question for file in self._files for question in read_questions(file))
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
         # One tuple per trajectory, shared by all its questions: a copy each would be thousands of references.
@@ -106,7 +112,7 @@ class NiehSet:
         digest = hashlib.blake2b(digest_size=16)
         for file in self._files:
             digest.update(file.read_bytes())
-        for traj_id in sorted({question.traj_id for question in self.questions}):
+        for traj_id in sorted({question.traj_id for question in self.questions if self.has_frames}):
             digest.update((self.folder(traj_id) / "metadata.json").read_bytes())
             for index, frame in self._trajectory(traj_id).items():
                 digest.update(f"{traj_id}/{index}:{frame.path.name}:{_size(frame.path)}\n".encode())
@@ -118,7 +124,7 @@ class NiehSet:
 
     def folder(self, traj_id: str) -> Path:
         """Return the folder of a trajectory's frames and metadata."""
-        return self.root / "metadata" / traj_id
+        return self._folder / "metadata" / traj_id
 
     def frames(self, traj_id: str) -> tuple[FrameRef, ...]:
         """Return all frames of a trajectory in time order.
@@ -199,6 +205,8 @@ class NiehSet:
             return "no gold answer"
         if not question.clues:
             return "no clue frame"
+        if not self.has_frames:
+            return None
         try:
             frames = self._trajectory(question.traj_id)
         except DataError as error:
@@ -209,6 +217,8 @@ class NiehSet:
         return next(filter(None, (frames[index].problem() for index in question.clues)), None)
 
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
+        if not self.has_frames:
+            raise DataError(f"{self.root}: {_NO_FRAMES}")
         if Path(traj_id).name != traj_id or traj_id in {"", ".", ".."}:
             raise DataError(f"trajectory {traj_id!r} is not a plain folder name")
         return _read_once(self._frames, traj_id, lambda: _read_frames(self.folder(traj_id)))

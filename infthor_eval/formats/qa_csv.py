@@ -2,7 +2,12 @@
 
 Columns `traj_id`, `question`, `gt_img_idx`, `answer`; the last two are Python-literal lists (`[12, 13]`, `['yes']`).
 `question_type` and `absence` are ours and optional. `absence` is `yes` for questions whose answer is that something is
-nowhere: no frame is evidence for that, and `gt_img_idx` is a sample. Other columns are ignored.
+nowhere: no frame is evidence for that, and `gt_img_idx` is a sample. Without a `question_type` the tables take the type
+that the question's words have in Table 3 (`question_forms`).
+
+The two published files (`qa_set_nieh_single_clue.csv`, `qa_set_nsieh_multi_clue.csv`) have `qid`, `num_evidence`,
+`gt_steps` and `match1` to `match4` too, which are kept; copies without some of them can be read. Other columns are
+ignored.
 """
 
 import ast
@@ -16,13 +21,16 @@ from typing import Any
 from infthor_eval.errors import DataError
 from infthor_eval.formats.csv_files import read_rows
 from infthor_eval.formats.files import write_atomically
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.question import PublishedColumns, Question
 
 __all__ = ["encode_questions", "read_questions", "write_questions"]
 
 _COLUMNS = ("traj_id", "question", "gt_img_idx", "answer")
 _TYPE = "question_type"
 _ABSENCE = "absence"
+_MATCHES = ("match1", "match2", "match3", "match4")
+_PUBLISHED = ("qid", "num_evidence", "gt_steps", *_MATCHES)
+_CLUE_FILES = ("single", "multi")  # in the names of the published files, before "_clue"
 _LARGEST = 2**63  # JSON readers refuse larger numbers
 
 
@@ -33,7 +41,8 @@ def read_questions(path: Path) -> list[Question]:
         DataError: the file cannot be read, is not a CSV file of this form, or a cell is malformed.
     """
     hint = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
-    return [_question(row, place) for place, row in read_rows(path, _COLUMNS, hint)]
+    file = next((name for name in _CLUE_FILES if f"{name}_clue" in path.stem), None)
+    return [_question(row, place, file) for place, row in read_rows(path, _COLUMNS, hint)]
 
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
@@ -44,18 +53,18 @@ def write_questions(path: Path, questions: Iterable[Question]) -> None:
 
 def encode_questions(questions: Iterable[Question]) -> bytes:
     """Return the content of a question file."""
-    text = io.StringIO(newline="")
+    questions, text = list(questions), io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*_COLUMNS, _TYPE, _ABSENCE])
+    are_published = any(item.published for item in questions)
+    writer.writerow([*_COLUMNS, _TYPE, _ABSENCE, *(_PUBLISHED if are_published else ())])
     for item in questions:
         absence = "yes" if item.absence else ""
-        writer.writerow(
-            [item.traj_id, item.text, list(item.clues), list(item.answers), item.question_type or "", absence]
-        )
+        cells = [item.traj_id, item.text, list(item.clues), list(item.answers), item.question_type or "", absence]
+        writer.writerow([*cells, *(_published_cells(item.published) if item.published else ())])
     return text.getvalue().encode()
 
 
-def _question(row: dict[str, str], place: str) -> Question:
+def _question(row: dict[str, str], place: str, file: str | None) -> Question:
     for name in _COLUMNS:
         if not row[name].strip():
             raise DataError(f"{place}: {name} is empty; fill it or remove the row")
@@ -73,7 +82,29 @@ def _question(row: dict[str, str], place: str) -> Question:
         answers=tuple(answers),
         question_type=row.get(_TYPE, "").strip() or None,
         absence=absence == "yes",
+        published=_published(row, place, file),
     )
+
+
+def _published(row: dict[str, str], place: str, file: Any) -> PublishedColumns | None:
+    if file is None:
+        return None
+    cells = {name: cell.strip() for name, cell in row.items() if name in _PUBLISHED and cell.strip()}
+    try:
+        n_evidence = int(cells["num_evidence"]) if "num_evidence" in cells else None
+        matches = tuple((name, float(cells[name])) for name in _MATCHES if name in cells)
+    except ValueError:
+        raise DataError(f"{place}: num_evidence or one of match1 to match4 is not a number; fix it") from None
+    if not all(math.isfinite(score) for _, score in matches):
+        raise DataError(f"{place}: one of match1 to match4 is not finite; fix it")
+    steps = _literal_list(cells.get("gt_steps", "[]"), f"{place}: gt_steps", int)
+    return PublishedColumns(file, cells.get("qid"), n_evidence, tuple(steps), matches)
+
+
+def _published_cells(published: PublishedColumns) -> list[object]:
+    matches = dict(published.matches)
+    n_evidence = "" if published.n_evidence is None else published.n_evidence
+    return [published.qid or "", n_evidence, list(published.steps), *(matches.get(name, "") for name in _MATCHES)]
 
 
 def _literal_list(cell: str, place: str, types: type | tuple[type, ...]) -> list[Any]:

@@ -2,13 +2,34 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 from infthor_eval.formats.digests import digest
 
-__all__ = ["ABSENCE", "Answer", "Question", "clue_column"]
+__all__ = ["ABSENCE", "Answer", "PublishedColumns", "Question"]
 
 Answer = str | int | float
 ABSENCE = "absence"  # column of the absence questions (no frame is evidence)
+
+
+@dataclass(frozen=True)
+class PublishedColumns:
+    """What only the published question files say of a question; None or empty where a column is missing.
+
+    Attributes:
+        file: the file that it is in: the one of a single clue or the one of several.
+        qid: its name.
+        n_evidence: `num_evidence`, pieces of evidence as the published scripts count them.
+        steps: `gt_steps`, the steps that its clues belong to.
+        matches: scores on the clue frames by column, `match1` (LLaVA-OneVision), `match2` (Pixtral), `match3`
+            (Qwen2.5-VL) and `match4` (DeepSeek-VL).
+    """
+
+    file: Literal["single", "multi"]
+    qid: str | None = None
+    n_evidence: int | None = None
+    steps: tuple[int, ...] = ()
+    matches: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -22,6 +43,7 @@ class Question:
         answers: gold answers; if there are several, all are required.
         question_type: content of the `question_type` column, or None if the file has none.
         absence: True if the answer is that something is nowhere. No frame is evidence; the clues are a sample.
+        published: further columns of a published file; None elsewhere.
     """
 
     traj_id: str
@@ -30,21 +52,31 @@ class Question:
     answers: tuple[Answer, ...]
     question_type: str | None = None
     absence: bool = False
+    published: PublishedColumns | None = None
 
     @property
     def n_clues(self) -> int:
         """Number of frames that are evidence."""
         return 0 if self.absence else len(self.clues)
 
+    @property
+    def clue_column(self) -> str:
+        """Column of the question in the paper's Table 4, `ABSENCE`, or empty if it is in the total alone.
+
+        Columns count clue frames, not steps. Two published files make one exception: "1" is the whole file of a single
+        clue, and a question of the other file with one frame is in the total alone.
+        """
+        file = self.published.file if self.published else None
+        if self.n_clues == 0:
+            return ABSENCE
+        if file == "single" or self.n_clues == 1:
+            return "" if file == "multi" else "1"
+        return "2" if self.n_clues == 2 else ">=3"
+
     @cached_property
     def id(self) -> str:
-        """Name of the question, which does not depend on the order of the file: `<traj_id>/<12 hex digits>`."""
+        """Name of the question, which does not depend on the order of the file: `<traj_id>/<12 hex digits>`, or qid."""
+        if self.published and self.published.qid:  # a few published questions are there twice, under two names
+            return self.published.qid
         key = repr((self.text, self.clues, self.answers))
         return f"{self.traj_id}/{digest(key, 6)}"
-
-
-def clue_column(n_clues: int) -> str:
-    """Return the column for questions with this number of clues (paper, Table 4), or the column of absences."""
-    if n_clues == 0:
-        return ABSENCE
-    return str(n_clues) if n_clues < 3 else ">=3"

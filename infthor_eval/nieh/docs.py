@@ -10,7 +10,7 @@ from dataclasses import asdict
 from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.question import PublishedColumns, Question
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.notes import Notes, NoteSettings
@@ -32,6 +32,7 @@ def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> D
         "question": question.text,
         "question_type": question.question_type or "",
         "absence": question.absence,
+        "published": question.published and {"file": question.published.file, "qid": question.published.qid},
         "clues": list(question.clues),
         "answers": json.dumps(question.answers),
         "context": task_samples.context_name,
@@ -54,6 +55,7 @@ def sample_of(doc: Doc) -> Sample:
         answers=tuple(json.loads(doc["answers"])),
         question_type=doc["question_type"] or None,
         absence=doc["absence"],
+        published=PublishedColumns(**doc["published"]) if doc["published"] else None,
     )
     notes = NoteSettings(*doc["notes"]) if doc["notes"] else None
     return Sample(question, tuple(doc["frames"]), doc["variant"], notes=notes)

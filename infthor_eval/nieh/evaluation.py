@@ -8,6 +8,7 @@ from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.answering import NiehUnit, answer_units
 from infthor_eval.nieh.answering_models import AnsweringModel, OpenAnswerer, answering_model
+from infthor_eval.nieh.baselines import Baseline
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import NiehAnswer
@@ -39,6 +40,7 @@ class NiehEvaluation:
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
         model = answering_model(subject)
+        _refuse_without_frames(subject, self._tasks)
         tokens = self._tokens_per_frame(model)
         tasks = {task.name: task for task in self._tasks}
         prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
@@ -176,6 +178,13 @@ def _measure_frame(data: NiehSet, model: AnsweringModel) -> int:
                 problems.append(error)
     reasons = [str(problem) for problem in problems] or sorted(data.reasons()) or ["its files are empty"]
     raise UsageError(f"no question of {data.root} can be asked ({reasons[0]}); fix the set, or give another")
+
+
+def _refuse_without_frames(subject: Subject, tasks: Sequence[NiehTask]) -> None:
+    """Refuse to ask a model about question files alone, which only baselines can answer."""
+    without = next((task.data.root for task in tasks if not task.data.has_frames), None)
+    if without is not None and not isinstance(subject, Baseline):
+        raise UsageError(f"{without}: has questions but no frames, which {subject.name} needs; give a set with metadata/")
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:

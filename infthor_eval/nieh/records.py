@@ -3,6 +3,7 @@
 import msgspec
 
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.question_forms import type_of
 from infthor_eval.runs.records import RecordTypes
 
 __all__ = ["RECORDS", "NiehAnswer", "NiehNote"]
@@ -13,8 +14,9 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
 
     Attributes:
         question: the question's text.
-        question_type: its type; empty if the set names none.
+        question_type: its type; that of its words if the set names none, empty if they are of no form of Table 3.
         n_clues: number of frames that are evidence; 0 for an absence.
+        clue_column: column in the tables by number of clues (`Question.clue_column`).
         answers: the gold answers.
         reply: the reply; None if the model failed.
         scores: scores of the reply by metric; empty if there is none.
@@ -23,6 +25,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     question: str
     question_type: str
     n_clues: int
+    clue_column: str
     answers: tuple[str | int | float, ...]
     reply: str | None = None
     scores: dict[str, float] = {}
@@ -30,8 +33,13 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     @classmethod
     def of(cls, question: Question) -> "NiehAnswer":
         """Return the payload of a question before it is asked."""
-        kind, n_clues = question.question_type or "", question.n_clues
-        return cls(question=question.text, question_type=kind, n_clues=n_clues, answers=question.answers)
+        return cls(
+            question=question.text,
+            question_type=question.question_type or type_of(question.text),
+            n_clues=question.n_clues,
+            clue_column=question.clue_column,
+            answers=question.answers,
+        )
 
     def with_reply(self, reply: str, scores: dict[str, float]) -> "NiehAnswer":
         """Return the same question with a reply."""

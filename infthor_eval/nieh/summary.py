@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.formats.question import ABSENCE, clue_column
+from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.answer_form import YesNo, format_failures, yes_no
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.rates import Rate
@@ -160,7 +160,7 @@ def _by_trajectory(records: Sequence[Record], metric: str) -> dict[str, list[flo
 
 
 def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Cell]:
-    chosen = {name: [r for r in records if clue_column(r.payload.n_clues) == name] for name in (*CLUE_COLUMNS, ABSENCE)}
+    chosen = {name: [r for r in records if r.payload.clue_column == name] for name in (*CLUE_COLUMNS, ABSENCE)}
     chosen["total"] = list(records)
     chosen[OPEN_ENDED] = [record for record in records if _is_open_ended(record)]
     return {name: _cell(of_column, metrics) for name, of_column in chosen.items()}

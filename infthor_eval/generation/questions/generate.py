@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import DataError, InfthorError, wrap_errors
-from infthor_eval.formats.question import ABSENCE, Question, clue_column
+from infthor_eval.formats.question import ABSENCE, Question
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions import (
@@ -57,7 +57,7 @@ class GeneratedQuestions:
 
     def by_clues(self) -> dict[str, int]:
         """Return the number of questions by number of clues: 1, 2, >=3, and of absences, which have none."""
-        counts = Counter(clue_column(item.n_clues) for item in self.questions)
+        counts = Counter(item.clue_column for item in self.questions)
         return {name: counts[name] for name in ("1", "2", ">=3", ABSENCE)}
 
     def summary_text(self) -> str:

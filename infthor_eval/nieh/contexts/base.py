@@ -154,7 +154,9 @@ class Context:
     sources: Callable[[NiehSet, ContextSettings], dict[str, Any]] = field(default=_no_sources)
 
     def select_frames(self, data: NiehSet, sample: Sample) -> list[FrameRef]:
-        """Return the frames of a sample."""
+        """Return the frames of a sample; none in a set of question files alone."""
+        if not data.has_frames:
+            return []
         frames = self.frames(data, sample.question.traj_id)
         return [frames[position] for position in sample.frames]
 

@@ -11,6 +11,8 @@ _K_TOKENS = 1024  # truncate_head's published kilo-token
 
 def clues(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
     """Ask on the frames that are evidence alone, in time order whatever the file's (the paper's Table 4)."""
+    if not data.has_frames:  # baselines need no more than their number
+        return [Sample(question, tuple(sorted(question.clues)))]
     order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
     return [Sample(question, tuple(sorted(order[frame] for frame in data.clue_frames(question))))]
 

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from infthor_eval.formats.question import clue_column
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Timelines
@@ -40,7 +39,7 @@ class NiehPresenter(PlainPresenter):
         """See `Presenter.describe`."""
         payload = record.payload
         target = ", ".join(map(str, payload.answers))
-        return Description(payload.question, target, payload.question_type or "untyped", clue_column(payload.n_clues))
+        return Description(payload.question, target, payload.question_type or "untyped", payload.clue_column)
 
     def reply(self, record: Record) -> str:
         """See `Presenter.reply`."""
