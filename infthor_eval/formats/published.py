@@ -27,12 +27,16 @@ class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         checkpoints: hub ids of the evaluated checkpoints.
         parameters: number of parameters of the checkpoint, in billions.
         values: one number per column, in percent.
+        match: column of the published question files with the scores behind the row, if they have it.
+        misprints: by column, the number that the row should have; only where the printed one is known to be wrong.
     """
 
     name: str
     checkpoints: tuple[str, ...]
     parameters: float
     values: tuple[float, ...]
+    match: str | None = None
+    misprints: Mapping[str, float] = {}
 
     def matches(self, model: Mapping[str, Any]) -> bool:
         """Return True if this row is about the model that a run's config describes."""

@@ -184,7 +184,9 @@ def _refuse_without_frames(subject: Subject, tasks: Sequence[NiehTask]) -> None:
     """Refuse to ask a model about question files alone, which only baselines can answer."""
     without = next((task.data.root for task in tasks if not task.data.has_frames), None)
     if without is not None and not isinstance(subject, Baseline):
-        raise UsageError(f"{without}: has questions but no frames, which {subject.name} needs; give a set with metadata/")
+        raise UsageError(
+            f"{without}: has questions but no frames, which {subject.name} needs; give a set with metadata/"
+        )
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
