@@ -1,7 +1,7 @@
 """The forms of questions of the paper's Table 3, told by their words.
 
-Question files may have no `question_type` column, as the published ones. The type and the form of such a question follow
-from its text; both the published words ("Is Mug on the Table?") and ours ("Is the mug on the table?") are known.
+The published question files have no `question_type`. The type and the form of a question follow from its text, in the
+published words ("Is Mug on the Table?") and in ours ("Is the mug on the table?").
 """
 
 import re

@@ -1,4 +1,4 @@
-"""The paper's Table 4 from the published question files: means of the scores that their columns `match1` to `match4` hold."""
+"""The paper's Table 4 from the published question files: means of their columns `match1` to `match4`."""
 
 from collections.abc import Sequence
 
@@ -14,8 +14,8 @@ __all__ = ["derive_row", "table4"]
 
 _TITLE = "Table 4"
 _NOTES = (
-    "Columns count clue frames: 1 is the whole file of a single clue, 2 and >=3 are the file of several. The total has all "
-    "questions, also those of the second file with one clue frame.",
+    "Columns count clue frames: 1 is the whole file of a single clue, 2 and >=3 are the file of several. The total has "
+    "all questions, also those of the second file with one clue frame.",
     "95 %: interval of the total, clustered by trajectory.",
 )
 

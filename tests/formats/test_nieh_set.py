@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import pytest
 
@@ -105,9 +106,22 @@ def test_missing_parts_of_a_set_are_named(make_nieh_set, tmp_path):
         NiehSet(tmp_path / "nowhere")
     with pytest.raises(DataError, match=r"no qa_set\*\.csv"):
         NiehSet(tmp_path)
-    (tmp_path / "qa_set.csv").write_text("")
     with pytest.raises(DataError, match="no metadata/"):
-        NiehSet(tmp_path)
+        NiehSet(tmp_path, needs_questions=False)
+
+
+def test_question_files_alone_are_a_set_without_frames(make_nieh_set):
+    root = make_nieh_set([SOUND])
+    whole = NiehSet(root)
+    questions, fingerprint = whole.questions, whole.fingerprint
+    shutil.rmtree(root / "metadata")
+    (file,) = root.glob("qa_set*.csv")
+    for place in (root, file):
+        data = NiehSet(place)
+        assert (data.has_frames, data.questions, data.skipped) == (False, questions, ())
+        assert data.fingerprint != fingerprint
+        with pytest.raises(DataError, match=f"{place}: has no metadata/ with frames; unpack"):
+            data.frames("t")
 
 
 def test_the_fingerprint_follows_questions_logs_and_frames(make_nieh_set):

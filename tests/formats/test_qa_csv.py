@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.qa_csv import read_questions, write_questions
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.question import PublishedColumns, Question
 
 words = st.text(st.characters(exclude_categories=["C", "Z"]), min_size=1, max_size=20)
 questions = st.builds(
@@ -25,8 +27,49 @@ def test_what_is_written_is_read_back(tmp_path_factory, items):
     assert read_questions(path) == items
 
 
-def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
+@given(
+    st.sampled_from(["single", "multi"]),
+    st.lists(
+        st.builds(
+            PublishedColumns,
+            file=st.just("single"),
+            qid=words,
+            n_evidence=st.integers(0, 20) | st.none(),
+            steps=st.lists(st.integers(0, 3000), max_size=5).map(tuple),
+            matches=st.lists(st.floats(0, 2), min_size=4, max_size=4).map(
+                lambda scores: tuple(zip(("match1", "match2", "match3", "match4"), scores, strict=True))
+            ),
+        ),
+        max_size=5,
+        unique_by=lambda published: published.qid,
+    ),
+)
+def test_all_columns_of_the_published_files_are_kept(tmp_path_factory, file, published):
+    path = tmp_path_factory.mktemp("csv") / f"qa_set_nieh_{file}_clue.csv"
+    items = [Question("t", "q", (1,), ("a",), published=replace(columns, file=file)) for columns in published]
+    write_questions(path, items)
+    assert read_questions(path) == items
+    assert [item.id for item in items] == [columns.qid for columns in published]
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "said"),
+    [
+        ("match2", "half", "num_evidence or one of match1 to match4 is not a number"),
+        ("match2", "nan", "one of match1 to match4 is not finite"),
+        ("num_evidence", "two", "num_evidence or one of match1 to match4 is not a number"),
+        ("gt_steps", "7", "gt_steps is not a list"),
+    ],
+)
+def test_a_bad_cell_of_a_published_column_is_named(tmp_path, column, cell, said):
     path = tmp_path / "qa_set_nieh_single_clue.csv"
+    path.write_text(f"traj_id,question,gt_img_idx,answer,{column}\nt,q,[1],['a'],{cell}\n")
+    with pytest.raises(DataError, match=f"line 2: {said}"):
+        read_questions(path)
+
+
+def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
+    path = tmp_path / "qa_set_nieh.csv"
     path.write_text("idx,traj_id,question,gt_img_idx,answer\n0,t1,\"Is it, there?\",[12],['yes']\n")
     assert read_questions(path) == [Question("t1", "Is it, there?", (12,), ("yes",))]
 

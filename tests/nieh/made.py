@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.nieh.summary import NiehSummary, summarise
@@ -23,7 +24,8 @@ def record(
     about |= {name: changes.pop(name) for name in _PAYLOAD if name in changes}
     found = {} if reply is None else scores(reply, answers)
     found = changes.pop("scores", found)
-    payload = NiehAnswer(**about, n_clues=n_clues, answers=answers, reply=reply, scores=found)
+    column = Question("t", "?", tuple(range(max(1, n_clues))), answers, absence=n_clues == 0).clue_column
+    payload = NiehAnswer(**about, n_clues=n_clues, clue_column=column, answers=answers, reply=reply, scores=found)
     fields = {
         "task": "nieh_gt",
         "id": f"q{number}",
