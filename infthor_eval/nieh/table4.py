@@ -1,5 +1,6 @@
 """The paper's Table 4 from the published question files: means of their columns `match1` to `match4`."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 from infthor_eval.errors import DataError
@@ -30,13 +31,13 @@ def table4(data: NiehSet) -> Table:
     rows, misprints = [], []
     for row in published.rows:
         cells = derive_row(data, row)
-        total = cells["total"]
-        ends = [None if end is None else 100 * end for end in (total.low, total.high)]
+        low, high = (None if end is None else 100 * end for end in (cells["total"].low, cells["total"].high))
         means = [_mean_cell(cells[name]) for name in CLUE_COLUMNS]
-        rows.append(Row((row.name, f"the set's {row.match}", *means, interval_cell(*ends, pattern="{}–{}"))))
+        rows.append(Row((row.name, f"the set's {row.match}", *means, interval_cell(low, high, pattern="{}–{}"))))
         printed, wrong = _printed(row, published)
         rows.append(Row((row.name, "printed", *printed), is_published=True, ends_section=True))
         misprints += wrong
+    rows.append(Row(("questions by number of steps", "gt_steps", *_by_steps(data))))
     columns = (Column("model", False), Column("from", False), *map(Column, (*CLUE_COLUMNS, "95 %")))
     return Table(
         "Table 4: accuracy on clue frames, % by number of clues (questions)",
@@ -60,6 +61,16 @@ def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
             f"{data.root}: no question for the column {empty}; give a folder with both published question files"
         )
     return {name: _mean(questions, row.match or "", data) for name, questions in chosen.items()}
+
+
+def _by_steps(data: NiehSet) -> list[str]:
+    """Return the questions of each column by the number of steps that their clue frames belong to ("2: 215, 3: 7")."""
+    cells = []
+    for name in CLUE_COLUMNS[:-1]:
+        chosen = [item.published for item in data.questions if item.clue_column == name and item.published]
+        counts = Counter(len(set(published.steps)) for published in chosen)
+        cells.append(", ".join(f"{n_steps}: {count}" for n_steps, count in sorted(counts.items())))
+    return cells
 
 
 def _mean(questions: Sequence[Question], match: str, data: NiehSet) -> MeanEstimate:

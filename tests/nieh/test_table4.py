@@ -53,6 +53,7 @@ def test_printed_numbers_stand_below_ours_and_misprints_are_marked(make_set):
     assert table.rows[5].cells[2:6] == ("81.56*", "39.14", "22.57", "62.88")
     assert sum("*" in cell for row in table.rows for cell in row.cells) == 1
     assert "81.56 for 81.65" in table.notes[-1]
+    assert table.rows[-1].cells[2:] == ("1: 2", "1: 1", "1: 1")
 
 
 def test_what_is_missing_is_named(make_set):

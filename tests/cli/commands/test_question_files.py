@@ -1,0 +1,81 @@
+"""Question files without frames: what runs on them, and what says that it cannot."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.formats.question import PublishedColumns, Question
+
+PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
+FILES = ("qa_set_nieh_single_clue.csv", "qa_set_nsieh_multi_clue.csv")
+
+
+@pytest.fixture
+def alone(make_nieh_set):
+    """A set whose frames are gone."""
+    root = make_nieh_set(size=56)
+    shutil.rmtree(root / "metadata")
+    return root
+
+
+def results_of(output, model):
+    (folder,) = (output / model).iterdir()
+    return json.loads((folder / "results.json").read_text())
+
+
+def test_baselines_run_on_them(alone, tmp_path, run):
+    out = tmp_path / "out"
+    words = ("--model", "oracle,blind,blind-count,random", "--tasks", "nieh_gt", "--data", alone, "--output", out)
+    code, _, err = run(*words)
+    assert code == 0, err
+    by_clues = results_of(out, "oracle")["summary"]["tasks"]["nieh_gt"]["by_clues"]
+    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {"1": 3, "2": 1, ">=3": 1, "total": 5}
+    assert run("show", *(next((out / model).iterdir()) for model in ("oracle", "blind")))[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("model", "task", "said"),
+    [
+        ("qwen2.5-vl-tiny", "nieh_gt", "has questions but no frames, which qwen2.5-vl-tiny needs"),
+        ("blind", "nieh_full", "has no metadata/ with frames; unpack the set's metadata.tar there"),
+    ],
+)
+def test_what_shows_frames_says_that_there_are_none(alone, tmp_path, run, model, task, said):
+    code, out, err = run("--model", model, "--tasks", task, "--data", alone, "--output", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert said in err.splitlines()[-1]
+    assert "Traceback" not in err
+
+
+def test_table4_is_printed_from_the_files_scores(tmp_path, run):
+    matches = tuple((f"match{n}", 0.5) for n in range(1, 5))
+    for file, name, n_clues in (("single", FILES[0], (1,)), ("multi", FILES[1], (2, 4))):
+        questions = [
+            Question(f"{file}{n}", "Was Box open?", tuple(range(n)), ("Yes",), published=PublishedColumns(
+                file, f"{file}{n}_q1", 1, (0,), matches))
+            for n in n_clues
+        ]  # fmt: skip
+        write_questions(tmp_path / name, questions)
+    code, out, err = run("table4", tmp_path)
+    assert (code, err) == (0, "")
+    assert [line.split()[-6:] for line in out.splitlines() if "match3" in line] == [
+        ["(1)", "50.00", "(1)", "50.00", "(3)", "5.0–95.0"]
+    ]
+    (tmp_path / FILES[1]).unlink()
+    code, out, err = run("table4", tmp_path)
+    assert (code, out) == (2, "")
+    assert "no question for the column 2; give a folder with both published question files" in err
+
+
+@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data")
+@pytest.mark.parametrize(("file", "n", "accuracy"), [(FILES[0], 829, 76.47), (FILES[1], 474, 67.33)])
+def test_who_sees_nothing_scores_this_on_the_published_files(tmp_path, run, file, n, accuracy):
+    data, out = PUBLISHED / file, tmp_path / "out"
+    assert run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0] == 0
+    totals = {m: results_of(out, m)["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"] for m in ("oracle", "blind")}
+    assert (totals["oracle"]["n"], totals["oracle"]["scores"]["strict"]["mean"]) == (n, 1.0)
+    for metric in ("reference", "strict"):
+        assert round(100 * totals["blind"]["scores"][metric]["mean"], 2) == accuracy
