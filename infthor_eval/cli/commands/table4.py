@@ -17,8 +17,8 @@ def command(set_folder: Path) -> None:
 
     SET is a folder with both files. It needs no frames.
     """
-    from infthor_eval.nieh.samples import open_set
+    from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.table4 import table4
     from infthor_eval.report.terminal import print_table, table_console
 
-    print_table(table4(open_set(str(set_folder))), table_console())
+    print_table(table4(NiehSet(set_folder)), table_console())
