@@ -31,6 +31,7 @@ _COMMANDS = {
         "compare": "Compare two runs on the same data.",
         "report": "Write a page with results and all samples, or a figure of the paper.",
         "watch": "Write a video of an agent or an arm.",
+        "import-replies": "Score replies that others made, as a run.",
         "table4": "Compute the paper's Table 4 from the published question files.",
     },
     "Make data": {

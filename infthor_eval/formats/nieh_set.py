@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import TypeVar
 
@@ -52,6 +53,7 @@ class NiehSet:
         root: folder of the set, or one question file.
         has_frames: False if there are question files alone.
         trajectories: folder of its trajectories (`<traj_id>.json` or `.txt`), or None if they are inside the set.
+        files: all questions by the name of their file, in its order, also those that cannot be asked.
         simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does not say.
     """
 
@@ -76,7 +78,7 @@ class NiehSet:
             raise DataError(f"{trajectories}: no such folder; give the folder of the trajectories with --trajectories")
         self.trajectories = trajectories
         self.simulator = simulator_of(self._folder)
-        self._read = tuple(question for file in self._files for question in read_questions(file))
+        self.files = {file.stem: tuple(read_questions(file)) for file in self._files}
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
         # One tuple per trajectory, shared by all its questions: a copy each would be thousands of references.
         self._all_frames: dict[str, tuple[FrameRef, ...] | DataError] = {}
@@ -89,7 +91,7 @@ class NiehSet:
         """All questions in the order of the files, as `SkippedQuestion` where they cannot be asked."""
         rows: list[Question | SkippedQuestion] = []
         seen = set()
-        for question in self._read:
+        for question in chain.from_iterable(self.files.values()):
             reason = "is in the files twice" if question.id in seen else self._problem(question)
             seen.add(question.id)
             rows.append(SkippedQuestion(question, reason) if reason else question)

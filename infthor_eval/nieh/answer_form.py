@@ -41,7 +41,7 @@ def yes_no(records: Sequence[Record]) -> YesNo:
     )
 
 
-def format_failures(records: Sequence[Record], max_new_tokens: int) -> dict[str, int]:
+def format_failures(records: Sequence[Record], max_new_tokens: int | None) -> dict[str, int]:
     """Count a task's replies that are not of the form asked for, by reason; one with two faults counts in both."""
     counts: Counter[str] = Counter()
     for record in records:
@@ -50,7 +50,7 @@ def format_failures(records: Sequence[Record], max_new_tokens: int) -> dict[str,
     return dict(sorted(counts.items()))
 
 
-def _failures(record: Record, said: str, max_new_tokens: int) -> list[str]:
+def _failures(record: Record, said: str, max_new_tokens: int | None) -> list[str]:
     gold, reasons = _gold(record), []
     if not said:
         reasons.append("empty")
@@ -58,7 +58,7 @@ def _failures(record: Record, said: str, max_new_tokens: int) -> list[str]:
         reasons.append("neither yes nor no")
     elif len(gold) == 1 and says_number(next(iter(gold))) and not says_number(said):
         reasons.append("no number")
-    if (record.tokens.reply or 0) >= max_new_tokens:
+    if max_new_tokens is not None and (record.tokens.reply or 0) >= max_new_tokens:
         reasons.append("cut off at the token limit")
     return reasons
 

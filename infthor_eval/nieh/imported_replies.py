@@ -1,0 +1,203 @@
+"""Replies that others made, as runs: scored, with a journal and results like those of our own runs."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import infthor_eval
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.digests import digest_of_file, fingerprint
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import SCORERS, scores
+from infthor_eval.runs import RunHeader, Tokens, Unit, UnitKey, UnitRecord, Usage
+
+__all__ = ["ImportedRun", "Refusal", "import_logs"]
+
+_PUBLISHED_NAME = re.compile(r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$")
+# Published modes: the task of ours, and its context.
+_MODES = {
+    None: ("nieh_full", "trajectory"),
+    "full_traj": ("nieh_full", "trajectory"),
+    "truncate_head": ("nieh_truncate_head", "truncate_head"),
+    "clip_retrieval": ("nieh_clip_retrieval", "clip_retrieval"),
+    "video": ("nieh_video", "video"),
+}
+_OTHER = ("imported", "imported")  # of logs that name no mode
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A row that is not imported, with its place and the reason."""
+
+    log: Path
+    line: int
+    reason: str
+
+
+@dataclass
+class ImportedRun:
+    """The replies of one model in one mode.
+
+    Attributes:
+        model: name of the model.
+        task: name of the task of ours that the mode is; "imported" if the log names none.
+        settings: settings of the task's context, as `dataset_kwargs` of a task file has them.
+        logs: the logs.
+        records: a record per imported reply.
+        refused: the rows that are not imported.
+        rescored: rows whose logged score is not that of the reference scorer.
+        n_questions: number of questions that the logs are about.
+    """
+
+    model: str
+    task: str
+    settings: Mapping[str, Any]
+    logs: list[Path] = field(default_factory=list)
+    records: list[UnitRecord[NiehAnswer]] = field(default_factory=list)
+    refused: list[Refusal] = field(default_factory=list)
+    rescored: list[Refusal] = field(default_factory=list)
+    n_questions: int = 0
+
+    @property
+    def usage(self) -> Usage:
+        """Usage of all imported replies."""
+        return Usage.total(record.usage for record in self.records)
+
+    def header(self, data: NiehSet) -> RunHeader:
+        """Return the header of the run: the model's name, the mode, and the digests of the logs."""
+        task = {
+            "config": {"task": self.task, "dataset_kwargs": dict(self.settings)},
+            "decoding": {"max_new_tokens": None},
+            "metrics": {"names": list(SCORERS)},
+            "data": data.fingerprint,
+            "simulator": data.simulator,
+            "sources": {"logs": {log.name: digest_of_file(log) for log in self.logs}},
+            "n_samples": self.n_questions,
+            "skipped": [],
+        }
+        config = {
+            "infthor_eval": infthor_eval.__version__,
+            "suite": "nieh",
+            "model": {"name": self.model, "imported": True},
+            "adapter": {},
+            "limit": None,
+            "seed": 0,
+            "tasks": {self.task: task},
+            "k_tokens": None,
+            "tokens_per_frame": None,
+            "frames": "shown",
+        }
+        return RunHeader(suite="nieh", name=self.model, config=config)
+
+
+def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -> list[ImportedRun]:
+    """Return the runs that some logs hold: logs of one model in one mode, on different questions, are one run.
+
+    Args:
+        logs: files with replies (`infthor_eval.formats.reply_logs`).
+        data: the set that they answer.
+        model: name of the model; None for the one in the names of published logs.
+
+    Raises:
+        UsageError: a log names no model and none is given, or no row of a log answers a question of the set.
+        DataError: a log cannot be read.
+    """
+    runs: dict[tuple[str, str, str], ImportedRun] = {}
+    for log in logs:
+        rows = list(read_reply_log(log))
+        replies = [row for row in rows if isinstance(row, LoggedReply)]
+        name = _PUBLISHED_NAME.match(log.name)
+        if model is None and name is None:
+            raise UsageError(f"{log}: its name has no model; give one with --model")
+        of_model, (task, settings) = model or (name and name["model"]) or "", _mode_of(replies, log)
+        run = runs.setdefault((of_model, task, repr(settings)), ImportedRun(of_model, task, settings))
+        _add_log(run, log, rows, _questions_of(data, name))
+    return list(runs.values())
+
+
+def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, Any]]:
+    """Return task and context settings of a log, from its first row; a log that is not published names none."""
+    first = next((reply for reply in replies if reply.published), None)
+    if first is None:
+        return _OTHER[0], {"context": _OTHER[1]}
+    if first.mode not in _MODES:
+        raise UsageError(f"{log}: the mode {first.mode!r:.40} is unknown; there are {', '.join(filter(None, _MODES))}")
+    task, context = _MODES[first.mode]
+    if context == "truncate_head" and first.size:
+        return f"{task}_{first.size:g}k", {"context": context, "ctx_size": first.size}
+    if context == "clip_retrieval" and first.n_frames:
+        return task, {"context": context, "top_k": max(reply.n_frames or 0 for reply in replies)}
+    return task, {"context": context}
+
+
+def _questions_of(data: NiehSet, name: re.Match[str] | None) -> Sequence[Question]:
+    """Return the questions whose rows a log counts: those of the file in its name, else of the whole set."""
+    if name is None or name["file"] not in data.files:
+        return [question for questions in data.files.values() for question in questions]
+    return data.files[name["file"]]
+
+
+def _add_log(
+    run: ImportedRun, log: Path, rows: Sequence[LoggedReply | UnreadRow], questions: Sequence[Question]
+) -> None:
+    by_id = {question.id: question for question in questions}
+    answered = {record.id for record in run.records}
+    before = len(run.records)
+    for row in rows:
+        found = _find_question(row, questions, by_id)
+        if isinstance(found, str):
+            run.refused.append(Refusal(log, row.line, found))
+        elif found.id in answered:
+            run.refused.append(Refusal(log, row.line, f"answers {found.id} again; the first reply is kept"))
+        elif isinstance(row, LoggedReply):
+            answered.add(found.id)
+            run.records.append(_record(run.task, found, row))
+            run.rescored += _compare_scores(log, row, run.records[-1])
+    if len(run.records) == before:
+        reasons = "; ".join(dict.fromkeys(item.reason for item in run.refused[:3])) or "it is empty"
+        raise UsageError(f"{log}: no row answers a question of this set ({reasons}); give the set that it is about")
+    run.logs.append(log)
+    run.n_questions += len(questions)
+
+
+def _find_question(
+    row: LoggedReply | UnreadRow, questions: Sequence[Question], by_id: Mapping[str, Question]
+) -> Question | str:
+    """Return the question of a row, or the reason why it has none."""
+    if isinstance(row, UnreadRow):
+        return row.reason
+    if row.question_id is not None:
+        return by_id.get(row.question_id) or f"answers {row.question_id!r:.80}, which is not in the set"
+    if row.row is None or not 0 <= row.row < len(questions):
+        return f"answers question {row.row}; the file has {len(questions)}"
+    question, said = questions[row.row], row.published
+    if said and (said.traj_id, said.text, said.clues, said.answers) != (
+        question.traj_id,
+        question.text,
+        question.clues,
+        question.answers,
+    ):
+        return f"answers another question than row {row.row} of the file"
+    return question
+
+
+def _record(task: str, question: Question, reply: LoggedReply) -> UnitRecord[NiehAnswer]:
+    unit = Unit(UnitKey(task, question.id), question.traj_id, NiehAnswer.of(question))
+    return unit.record(
+        fingerprint({"question": question.id, "reply": reply.text}),
+        unit.payload.with_reply(reply.text, scores(reply.text, question.answers)),
+        seconds=reply.seconds,
+        tokens=Tokens(context=reply.n_context_tokens, reply=reply.n_reply_tokens),
+        usage=Usage(1, reply.n_context_tokens or 0, 0, reply.n_reply_tokens or 0),
+    )
+
+
+def _compare_scores(log: Path, reply: LoggedReply, record: UnitRecord[NiehAnswer]) -> Iterator[Refusal]:
+    ours = record.payload.scores["reference"]
+    if reply.score is not None and abs(reply.score - ours) > 1e-9:
+        yield Refusal(log, reply.line, f"has the score {reply.score:g}; the reference scorer gives {ours:g}")

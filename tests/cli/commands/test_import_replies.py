@@ -1,0 +1,232 @@
+"""Replies that others made: logs in three forms, and what is wrong with them."""
+
+import gzip
+import json
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.formats.qa_csv import read_questions, write_questions
+from infthor_eval.formats.question import PublishedColumns, Question
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import read_run
+
+SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
+LOG = f"eval_{SINGLE}_Some-VL-7B_full_traj.log"
+PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
+
+
+def question(file, number, text, answer, clues=(1,)):
+    return Question(f"t{number % 3}", text, clues, (answer,), published=PublishedColumns(file, f"q{file}{number}"))
+
+
+QUESTIONS = (
+    question("single", 0, "Where is Mug now?", "SideTable"),
+    question("single", 1, "Was Box open?", "Yes"),
+    question("single", 2, "Was Box open?", "Yes"),
+    question("single", 3, "How many objects were on the Bed?", 3),
+)
+OTHERS = (question("multi", 4, "Is Mug on the Bed?", "No", (2, 5)),)
+REPLIES = ("side table", "yes", "no", "three")
+
+
+@pytest.fixture
+def data(tmp_path):
+    """A set of the published form, without frames."""
+    folder = tmp_path / "set"
+    folder.mkdir()
+    write_questions(folder / f"{SINGLE}.csv", QUESTIONS)
+    write_questions(folder / f"{MULTI}.csv", OTHERS)
+    return folder
+
+
+def row(number, reply, score, questions=QUESTIONS, **more):
+    """A row as the published scripts write it."""
+    asked = questions[number]
+    published = {"qidx": number, "traj_id": asked.traj_id, "question": asked.text, "gt_img_idx": list(asked.clues)}
+    published |= {"ctx_size_k": 32, "n_imgs": 6, "ctx_n_tokens": 726, "llm_response": reply}
+    return published | {"gt_answer": list(asked.answers), "score": score} | more
+
+
+ROWS = [row(number, reply, float(number != 2)) for number, reply in enumerate(REPLIES)]
+
+
+@pytest.fixture
+def import_log(data, tmp_path, run):
+    """Imports rows, texts or bytes as logs; returns exit code, what was said, and the records of the last run."""
+
+    def import_log(content, name=LOG, *options):
+        path = tmp_path / name
+        if isinstance(content, list):
+            content = "".join(one if isinstance(one, str) else json.dumps(one) + "\n" for one in content).encode()
+            content = gzip.compress(content, mtime=0) if name.endswith(".gz") else content
+        path.write_bytes(content)
+        output = tmp_path / "out"
+        code, out, err = run("import-replies", path, "--data", data, "--output", output, *options)
+        folders = sorted(output.glob("*/*"), key=lambda folder: folder.stat().st_mtime)
+        return code, out + err, read_run(folders[-1], RECORDS) if folders else None
+
+    return import_log
+
+
+def replies_in(read):
+    return {record.id: record.payload.reply for record in read[1]}
+
+
+@pytest.mark.parametrize("name", [LOG, f"{LOG}.gz"])
+def test_a_published_log_becomes_a_run(import_log, tmp_path, run, name):
+    code, said, read = import_log(ROWS, name)
+    assert (code, "4 replies imported, 0 of 4 questions without one" in said) == (0, True)
+    header, records = read
+    assert (header.name, list(header.config["tasks"])) == ("Some-VL-7B", ["nieh_full"])
+    assert replies_in(read) == {f"qsingle{number}": reply for number, reply in enumerate(REPLIES)}
+    assert [record.payload.scores["reference"] for record in records] == [1.0, 1.0, 0.0, 1.0]
+    assert {record.tokens.context for record in records} == {726}
+    (folder,) = (tmp_path / "out" / "Some-VL-7B").iterdir()
+    assert {"results.json", "scores.jsonl", "usage.json", "journal"} <= {path.name for path in folder.iterdir()}
+    for words in (("show", folder, "--full"), ("ls", "runs", tmp_path / "out"), ("compare", folder, folder)):
+        assert run(*words)[0] == 0
+    assert run("report", folder, "--out", tmp_path / "report.html")[0] == 0
+    before = (folder / "results.json").read_bytes()
+    assert import_log(ROWS, name)[0] == 0
+    assert (folder / "results.json").read_bytes() == before
+    assert len(list((tmp_path / "out" / "Some-VL-7B").iterdir())) == 1
+
+
+def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run):
+    single, multi = tmp_path / LOG, tmp_path / f"eval_{MULTI}_Some-VL-7B_full_traj.log"
+    single.write_text("\n".join(map(json.dumps, ROWS)))
+    multi.write_text(json.dumps(row(0, "no", 1.0, OTHERS)))
+    assert run("import-replies", single, multi, "--data", data, "--output", tmp_path / "out")[0] == 0
+    (folder,) = (tmp_path / "out" / "Some-VL-7B").iterdir()
+    by_clues = json.loads((folder / "results.json").read_text())["summary"]["tasks"]["nieh_full"]["by_clues"]
+    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {"1": 4, "2": 1, ">=3": 0, "total": 5}
+
+
+@pytest.mark.parametrize(
+    ("more", "task", "setting"),
+    [
+        ({"eval_mode": "truncate_head", "ctx_size_k": 64}, "nieh_truncate_head_64k", ("ctx_size", 64.0)),
+        ({"eval_mode": "clip_retrieval", "n_imgs": 20}, "nieh_clip_retrieval", ("top_k", 20)),
+        ({"eval_mode": "video"}, "nieh_video", ("context", "video")),
+    ],
+)
+def test_the_mode_is_part_of_the_run(import_log, more, task, setting):
+    _, _, (header, _) = import_log([{**one, **more} for one in ROWS])
+    assert list(header.config["tasks"]) == [task]
+    assert header.config["tasks"][task]["config"]["dataset_kwargs"][setting[0]] == setting[1]
+
+
+def test_half_a_log_is_a_run_with_the_rest_missing(import_log, tmp_path):
+    code, said, read = import_log([ROWS[0], json.dumps(ROWS[1])[:60]])
+    assert code == 1
+    assert "1 replies imported, 3 of 4 questions without one" in said
+    assert f"{LOG}, line 2: is not a reply (" in said
+    assert len(read[1]) == 1
+    (results,) = (tmp_path / "out").glob("*/*/results.json")
+    assert json.loads(results.read_text())["n_missing"] == 3
+
+
+BAD = {
+    "another question": ({**ROWS[1], "question": "Was Safe open?"}, "answers another question than row 1"),
+    "swapped": ({**ROWS[1], "qidx": 3}, "answers another question than row 3"),
+    "another answer": ({**ROWS[1], "gt_answer": ["No"]}, "answers another question than row 1"),
+    "beyond the end": ({**ROWS[1], "qidx": 4}, "answers question 4; the file has 4"),
+    "before the start": ({**ROWS[1], "qidx": -1}, "answers question -1; the file has 4"),
+    "the same again": (ROWS[0], "answers qsingle0 again; the first reply is kept"),
+    "too long": (
+        {**ROWS[1], "llm_response": "yes " * 2_500_000},
+        "has a reply of 10,000,000 characters; at most 20,000",
+    ),
+    "no reply": ({**ROWS[1], "llm_response": None}, "is not a reply (Expected `str`, got `null`"),
+    "a list": ("[1, 2]\n", "is not a reply (not a JSON object)"),
+    "nested": ("[" * 5000 + "\n", "is not a reply ("),
+}
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_a_row_that_does_not_fit_is_counted_and_named(import_log, bad):
+    line, reason = BAD[bad]
+    code, said, read = import_log([ROWS[0], line, ROWS[2]])
+    assert code == 1
+    assert "1 row(s) not imported" in said
+    assert f"{LOG}, line 2: {reason}" in said
+    assert list(replies_in(read)) == ["qsingle0", "qsingle2"]
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "options", "reason"),
+    [
+        ([{**one, "traj_id": "x"} for one in ROWS], LOG, (), "no row answers a question of this set (answers another"),
+        ([], LOG, (), "no row answers a question of this set (it is empty)"),
+        (ROWS, "replies.log", (), "replies.log: its name has no model; give one with --model"),
+        (
+            [{**ROWS[0], "eval_mode": "dreams"}],
+            LOG,
+            (),
+            "the mode 'dreams' is unknown; there are full_traj, truncate_head",
+        ),
+        (b"\x1f\x8b broken", f"{LOG}.gz", (), "cannot be read after line 0"),
+    ],
+)
+def test_a_log_that_cannot_be_imported_is_one_line(import_log, content, name, options, reason):
+    code, said, read = import_log(content, name, *options)
+    assert (code, read, said.count("\n")) == (2, None, 1)
+    assert reason in said
+
+
+def test_scores_that_differ_from_ours_are_named(import_log):
+    code, said, _ = import_log([{**ROWS[0], "score": 0.5}, *ROWS[1:]])
+    assert code == 0
+    assert "1 row(s) scored otherwise than logged" in said
+    assert f"{LOG}, line 1: has the score 0.5; the reference scorer gives 1" in said
+
+
+def test_replies_in_any_language_are_scored(import_log):
+    code, _, read = import_log([{**ROWS[0], "llm_response": "на столе 桌子", "score": 0.0}])
+    assert (code, read[1][0].payload.scores) == (0, {"reference": 0.0, "strict": 0.0})
+
+
+def test_the_neutral_form(import_log):
+    rows = [
+        {"question_id": "qsingle0", "reply": "SideTable", "n_context_tokens": 9, "n_reply_tokens": 2, "seconds": 1.5},
+        {"question_id": "qmulti4", "reply": "no"},
+        {"question_id": "q?", "reply": "no"},
+    ]
+    code, said, (header, records) = import_log(rows, "mine.jsonl", "--model", "a person")
+    assert (code, header.name, list(header.config["tasks"])) == (1, "a person", ["imported"])
+    assert "2 replies imported, 3 of 5 questions without one" in said
+    assert "mine.jsonl, line 3: answers 'q?', which is not in the set" in said
+    assert [(record.id, record.payload.scores["strict"]) for record in records] == [("qmulti4", 1.0), ("qsingle0", 1.0)]
+    assert (records[1].tokens.context, records[1].tokens.reply, records[1].seconds) == (9, 2, 1.5)
+
+
+def test_samples_of_lm_eval(make_nieh_set, tmp_path, run):
+    """What our own run exports in lm-eval's files comes back with the same scores."""
+    data, out = make_nieh_set(size=56), tmp_path / "out"
+    assert run("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0] == 0
+    (samples,) = out.rglob("samples_nieh_gt_*.jsonl")
+    words = ("import-replies", samples, "--data", data, "--model", "again", "--output", out)
+    assert run(*words)[0] == 0
+    first, again = (read_run(next((out / name).iterdir()), RECORDS)[1] for name in ("blind", "again"))
+    assert len(again) == len(read_questions(next(data.glob("qa_set*.csv"))))
+    assert {record.id: record.payload for record in first} == {record.id: record.payload for record in again}
+
+
+@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
+def test_every_published_reply_has_its_logged_score(tmp_path, run):
+    logs = sorted((PUBLISHED / "replies").glob("*.log.gz"))
+    code, _, err = run("import-replies", *logs, "--data", PUBLISHED, "--output", tmp_path)
+    assert (code, "not imported" in err, "scored otherwise" in err) == (0, False, False)
+    means = {}
+    for folder in (tmp_path / "Qwen2.5-VL-7B-Instruct").iterdir():
+        ((task, summary),) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].items()
+        cells = [summary["by_clues"][name] for name in ("1", "total")]
+        means[task] = [(cell["n"], round(100 * cell["scores"]["reference"]["mean"], 2)) for cell in cells]
+    # The first of each is the mean of the single-clue log, as counted by hand.
+    assert means == {
+        "nieh_full": [(829, 55.86), (1303, 51.08)],
+        "nieh_truncate_head_32k": [(829, 56.71), (1303, 54.77)],
+        "nieh_clip_retrieval": [(829, 54.4), (1303, 50.65)],
+    }
