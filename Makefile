@@ -23,7 +23,7 @@ shell: $(INSTALLED)
 	@. $(BIN)/activate && exec "$${SHELL:-/bin/sh}"
 
 test: $(INSTALLED) $(PEERS)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile -m "not slow"
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 # The slow ones too; half an hour on two cores.
 test-all: $(INSTALLED) $(PEERS)

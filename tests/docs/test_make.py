@@ -20,13 +20,13 @@ def venv(tmp_path):
 
 
 def test_the_shell_has_the_environment(venv):
-    words = ["make", "--silent", "shell", f"VENV={venv}", "SHELL=/bin/sh"]
+    words = ["make", "--silent", "--no-print-directory", "shell", f"VENV={venv}", "SHELL=/bin/sh"]
     done = subprocess.run(words, cwd=ROOT, input="infthor-eval\n", capture_output=True, text=True, check=True)
     assert done.stdout == "this one\n"
 
 
 def test_the_demo_ends_with_how_to_activate_the_environment(venv):
-    words = ["make", "--dry-run", "demo", f"VENV={venv}"]
+    words = ["make", "--dry-run", "--no-print-directory", "demo", f"VENV={venv}"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
     assert f". {venv}/bin/activate" in done.stdout.splitlines()[-1]
     assert "make shell" in done.stdout.splitlines()[-1]
