@@ -70,7 +70,7 @@ def _compare_task(
 
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
     """Return a table with a row per task and metric, each in its own unit; `first` and `second` name the runs."""
-    numbers = ("first", "second", "difference", "95 % interval", "p", "units", "only in one")
+    numbers = ("first", "second", "difference", "95 % interval", "p", "samples", "only in one")
     columns = (Column("task", False), Column("metric", False), Column("unit", False), *map(Column, numbers))
     return Table(f"{second} against {first}", columns, tuple(map(_row, comparisons)))
 

@@ -205,7 +205,7 @@ def test_where_all_is_left_out_the_exit_code_says_so(run, tmp_path):
     code, out, err = run("run", *arguments)
     assert code == 1
     assert "scene FloorPlan7" in out and "--scenes DIR" in " ".join(out.split())
-    assert "no result: every unit was excluded" in err
+    assert "no result: every sample was excluded" in err
 
 
 BROKEN = {

@@ -82,9 +82,9 @@ def test_where_every_unit_fails_nothing_is_told(tmp_path, capfd):
         def run(self, asked, session):
             raise ModelError("no memory for a single frame")
 
-    with pytest.raises(ModelError, match="every measured unit failed; fix the failures above"):
+    with pytest.raises(ModelError, match="every measured sample failed; fix the failures above"):
         plan(request(tmp_path), suite_of(Broken), 6, None)
-    assert "sums: 4 measured unit(s) failed: no memory for a single frame" in capfd.readouterr().err
+    assert "sums: 4 measured sample(s) failed: no memory for a single frame" in capfd.readouterr().err
 
 
 def test_the_command_prints_units_tokens_time_memory_and_money(run, tmp_path):

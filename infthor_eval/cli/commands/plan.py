@@ -49,19 +49,19 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
         price_per_hour: price of a worker's machine in US dollars; None for no such cost.
 
     Returns:
-        Exit code: 1 if a measured unit failed, else 0.
+        Exit code: 1 if a measured sample failed, else 0.
 
     Raises:
-        ModelError: every measured unit failed.
+        ModelError: every measured sample failed.
     """
     with progress_bar(NOTES) as progress:
         bar = progress.add_task(f"{request.label}: measuring", total=None)
         estimate = estimate_run(request, suite, measure, lambda: progress.advance(bar))
     print_workload(estimate.workload)
     for task, reason, n in count_reasons(estimate.failures):
-        print_note(f"{task}: {n} measured unit(s) failed: {reason}", "red")
+        print_note(f"{task}: {n} measured sample(s) failed: {reason}", "red")
     if not estimate.tasks:
-        raise ModelError(f"{request.label}: every measured unit failed; fix the failures above")
+        raise ModelError(f"{request.label}: every measured sample failed; fix the failures above")
     console = table_console()
     print_table(_table(request, estimate.tasks), console)
     for line in _totals(request, estimate.tasks, price_per_hour):
@@ -70,7 +70,7 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
 
 
 def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
-    title = f"Estimate for {request.label}, from {sum(item.n_measured for item in tasks)} measured units"
+    title = f"Estimate for {request.label}, from {sum(item.n_measured for item in tasks)} measured samples"
     return Table(title, (Column("task", False), *map(Column, _COLUMNS)), tuple(map(_row, tasks)))
 
 

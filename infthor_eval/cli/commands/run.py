@@ -84,7 +84,7 @@ def evaluate(
 def _print_if_void(outcome: RunOutcome) -> bool:
     is_void = bool(outcome.records) and all(record.excluded is not None for record in outcome.records)
     if is_void:
-        print_failure(f"{outcome.summary.header.name}: no result: every unit was excluded")
+        print_failure(f"{outcome.summary.header.name}: no result: every sample was excluded")
     return is_void
 
 

@@ -24,7 +24,8 @@ class _ProgressObserver:
 
     def begin(self, workload: Workload, n_recovered: int) -> None:
         if n_recovered:
-            print_note(f"{self._name}: {n_recovered} bad line(s) of the journal set aside; those units are tried again")
+            set_aside = f"{n_recovered} bad line(s) of the journal set aside"
+            print_note(f"{self._name}: {set_aside}; those samples are tried again")
         print_workload(workload)
         self.bar = PacedBar(self._progress, self._name, workload.n_units)
         self._stop.has_begun = True

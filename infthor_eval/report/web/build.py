@@ -138,7 +138,7 @@ def _about(run: ReportRun) -> About:
         "seed": str(config.get("seed", "")),
         "limit": str(config["limit"]) if config.get("limit") is not None else "",
         "infthor-eval": str(config.get("infthor_eval", "")),
-        "units": f"{len(run.records):,}",
+        "samples": f"{len(run.records):,}",
         "folder": str(run.folder),
     }
     known = tuple((name, value) for name, value in facts.items() if value)

@@ -20,7 +20,7 @@ def primary_metrics_table(runs: Sequence[ReportRun]) -> Table:
         for run in runs
         for task, rate in run.suite.primary_metrics(run.summary.summary).items()
     ]
-    columns = (*_NAMES, Column("measure", False), *map(Column, ("%", "95 % interval", "units")))
+    columns = (*_NAMES, Column("measure", False), *map(Column, ("%", "95 % interval", "samples")))
     return Table("", columns, tuple(rows))
 
 
@@ -32,8 +32,8 @@ def _cells(rate: Rate) -> tuple[str, str]:
 def costs_table(runs: Sequence[ReportRun]) -> Table:
     """Return speed and cost, with a row per run."""
     tokens = ("tokens read", "of them cached, %", "tokens written")
-    columns = ("units", "seconds", "units / s", "requests", *tokens, "cost")
-    note = "Seconds are the units' own, added up: several workers take less by the clock. Cost is in US dollars."
+    columns = ("samples", "seconds", "samples / s", "requests", *tokens, "cost")
+    note = "Seconds are the samples' own, added up: several workers take less by the clock. Cost is in US dollars."
     return Table("", (Column("run", False), *map(Column, columns)), tuple(map(_cost_row, runs)), (note,))
 
 
@@ -58,7 +58,7 @@ def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
     rows += [Row((run.label, "", "not attempted", str(run.n_missing), why)) for run in runs if run.n_missing]
     if not rows:
         return None
-    columns = (*_NAMES, Column("what", False), Column("units"), Column("reason", False))
+    columns = (*_NAMES, Column("what", False), Column("samples"), Column("reason", False))
     return Table("", columns, tuple(rows))
 
 

@@ -113,7 +113,7 @@ def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
 
     code, _, err = ask("--recover")
     assert code == 0
-    assert "qwen2.5-vl-tiny: 2 bad line(s) of the journal set aside; those units are tried again" in err
+    assert "qwen2.5-vl-tiny: 2 bad line(s) of the journal set aside; those samples are tried again" in err
     assert "2 evaluated now, 3 resumed from the journal" in err
     assert replies(path.parents[1]) == before
     assert (path.parent / "bad_lines.txt").read_bytes() == lines[2] + lines[4]
