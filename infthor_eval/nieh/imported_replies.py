@@ -14,7 +14,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS, scores
-from infthor_eval.runs import RunHeader, Tokens, Unit, UnitKey, UnitRecord, Usage
+from infthor_eval.runs import RunHeader, Tokens, Unit, UnitKey, UnitRecord
 
 __all__ = ["ImportedRun", "Refusal", "import_logs"]
 
@@ -62,11 +62,6 @@ class ImportedRun:
     refused: list[Refusal] = field(default_factory=list)
     rescored: list[Refusal] = field(default_factory=list)
     n_questions: int = 0
-
-    @property
-    def usage(self) -> Usage:
-        """Usage of all imported replies."""
-        return Usage.total(record.usage for record in self.records)
 
     def header(self, data: NiehSet) -> RunHeader:
         """Return the header of the run: the model's name, the mode, and the digests of the logs."""
@@ -193,7 +188,6 @@ def _record(task: str, question: Question, reply: LoggedReply) -> UnitRecord[Nie
         unit.payload.with_reply(reply.text, scores(reply.text, question.answers)),
         seconds=reply.seconds,
         tokens=Tokens(context=reply.n_context_tokens, reply=reply.n_reply_tokens),
-        usage=Usage(1, reply.n_context_tokens or 0, 0, reply.n_reply_tokens or 0),
     )
 
 

@@ -36,6 +36,7 @@ def command(logs: tuple[Path, ...], data: Path, model: str | None, output: Path)
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.imported_replies import import_logs
     from infthor_eval.nieh.suite import NiehSuite
+    from infthor_eval.runs import NOTHING
     from infthor_eval.runs.stored_run import store_run
 
     questions, suite = NiehSet(data), NiehSuite()
@@ -44,7 +45,7 @@ def command(logs: tuple[Path, ...], data: Path, model: str | None, output: Path)
         n_missing = run.n_questions - len(run.records)
         folder, summary = store_run(output, run.header(questions), suite, run.records, n_missing)
         _print_counts(run, n_missing)
-        results.append(RunResults(folder, suite, summary, run.usage, n_missing))
+        results.append(RunResults(folder, suite, summary, NOTHING, n_missing))
         n_refused += len(run.refused)
     print_results(results, ShowOptions())
     return 1 if n_refused else 0
