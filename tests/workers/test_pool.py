@@ -56,10 +56,12 @@ def of(events, kind):
     return [event for event in events if isinstance(event, kind)]
 
 
-def test_every_job_is_done_once_and_in_its_order_by_all_workers(pool):
+def test_every_job_is_done_once_and_in_its_order_by_all_workers(pool, tmp_path):
+    meeting = tmp_path / "meeting"
+    meeting.mkdir()
     shared = pool()
     shared.open()
-    events = list(shared.run(6, lambda job: Job(job + 1, slow=0.1)))
+    events = list(shared.run(6, lambda job: Job(job + 1, meets=meeting)))
     assert [counts(events, job) for job in range(6)] == [list(range(job + 1)) for job in range(6)]
     assert len({event.result[0] for event in events}) == 2
     assert {event.worker for event in events} == {1, 2}

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError, ModelError
 
+from ..waiting import wait_until
+
 
 @dataclass(frozen=True)
 class Job:
@@ -20,6 +22,7 @@ class Job:
         once: a file that says that a worker has died of it already; None dies every time.
         raises: what is raised in the end.
         slow: seconds before each result.
+        meets: an empty folder in which each worker leaves its name before its first result, and waits for another's.
     """
 
     number: int
@@ -27,6 +30,7 @@ class Job:
     once: Path | None = None
     raises: Exception | None = None
     slow: float = 0.0
+    meets: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,9 @@ class Counter:
         self.greeting = {"pid": os.getpid(), "number": number, "threads": os.environ["OMP_NUM_THREADS"]}
 
     def do(self, job: Job) -> Iterator[tuple[int, int]]:
+        if job.meets is not None:
+            (job.meets / str(os.getpid())).touch()
+            wait_until(lambda: len(list(job.meets.iterdir())) > 1)
         for count in range(job.number):
             time.sleep(job.slow)
             if count == job.dies and not (job.once and job.once.exists()):
