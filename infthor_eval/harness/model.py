@@ -131,7 +131,8 @@ class InfthorLM(LM):
     def _session(self, suite: Suite[U, P]) -> JournalSession[P]:
         """Return the session of a suite, whose journal is in a folder of the suite's name."""
         if suite.name not in self._sessions:
-            config = run_config(suite.name, self._model, self._code, {"host": "lm-eval"}, None, self._seed)
+            model = {"name": self._model.name, **self._model.identity()}
+            config = run_config(suite.name, model, self._code, {"host": "lm-eval"}, seed=self._seed)
             header = RunHeader(suite=suite.name, name=self._name, config=config)
             self._sessions[suite.name] = JournalSession(Journal(self._folder / suite.name, header, suite.records))
         return self._sessions[suite.name]

@@ -6,15 +6,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import infthor_eval
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
+from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.runs import RunHeader, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.run_config import run_config
 
 __all__ = ["ImportedRun", "Refusal", "import_logs"]
 
@@ -51,7 +52,7 @@ class ImportedRun:
         records: a record per imported reply.
         refused: the rows that are not imported.
         rescored: rows whose logged score is not that of the reference scorer.
-        n_questions: number of questions that the logs are about.
+        question_ids: ids of the questions that the logs are about.
     """
 
     model: str
@@ -61,7 +62,12 @@ class ImportedRun:
     records: list[UnitRecord[NiehAnswer]] = field(default_factory=list)
     refused: list[Refusal] = field(default_factory=list)
     rescored: list[Refusal] = field(default_factory=list)
-    n_questions: int = 0
+    question_ids: set[str] = field(default_factory=set)
+
+    @property
+    def n_missing(self) -> int:
+        """Number of questions without a reply."""
+        return len(self.question_ids) - len(self.records)
 
     def header(self, data: NiehSet) -> RunHeader:
         """Return the header of the run: the model's name, the mode, and the digests of the logs."""
@@ -72,21 +78,11 @@ class ImportedRun:
             "data": data.fingerprint,
             "simulator": data.simulator,
             "sources": {"logs": {log.name: digest_of_file(log) for log in self.logs}},
-            "n_samples": self.n_questions,
+            "n_samples": len(self.question_ids),
             "skipped": [],
         }
-        config = {
-            "infthor_eval": infthor_eval.__version__,
-            "suite": "nieh",
-            "model": {"name": self.model, "imported": True},
-            "adapter": {},
-            "limit": None,
-            "seed": 0,
-            "tasks": {self.task: task},
-            "k_tokens": None,
-            "tokens_per_frame": None,
-            "frames": "shown",
-        }
+        workload = {"tasks": {self.task: task}, "k_tokens": None, "tokens_per_frame": None, "frames": SHOWN}
+        config = run_config("nieh", {"name": self.model, "imported": True}, {}, workload)
         return RunHeader(suite="nieh", name=self.model, config=config)
 
 
@@ -142,22 +138,23 @@ def _add_log(
 ) -> None:
     by_id = {question.id: question for question in questions}
     answered = {record.id for record in run.records}
-    before = len(run.records)
+    n_before, refused = len(run.records), []
     for row in rows:
-        found = _find_question(row, questions, by_id)
-        if isinstance(found, str):
-            run.refused.append(Refusal(log, row.line, found))
-        elif found.id in answered:
-            run.refused.append(Refusal(log, row.line, f"answers {found.id} again; the first reply is kept"))
+        question = _find_question(row, questions, by_id)
+        if isinstance(question, str):
+            refused.append(Refusal(log, row.line, question))
+        elif question.id in answered:
+            refused.append(Refusal(log, row.line, f"answers {question.id} again; the first reply is kept"))
         elif isinstance(row, LoggedReply):
-            answered.add(found.id)
-            run.records.append(_record(run.task, found, row))
+            answered.add(question.id)
+            run.records.append(_record(run.task, question, row))
             run.rescored += _compare_scores(log, row, run.records[-1])
-    if len(run.records) == before:
-        reasons = "; ".join(dict.fromkeys(item.reason for item in run.refused[:3])) or "it is empty"
+    if len(run.records) == n_before:
+        reasons = "; ".join(dict.fromkeys(item.reason for item in refused[:3])) or "it is empty"
         raise UsageError(f"{log}: no row answers a question of this set ({reasons}); give the set that it is about")
     run.logs.append(log)
-    run.n_questions += len(questions)
+    run.refused += refused
+    run.question_ids.update(by_id)
 
 
 def _find_question(

@@ -11,7 +11,7 @@ from infthor_eval.runs.executor import Executor, LocalExecutor
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import P, U, Unit, UnitRecord
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.results import results_document, write_results, write_scores, write_usage
+from infthor_eval.runs.results import write_run_files
 from infthor_eval.runs.samples import StoredSamples
 from infthor_eval.runs.stored_command import write_command
 from infthor_eval.runs.suite import RunSummary, UnitSample, Workload
@@ -125,7 +125,5 @@ def _write_results(
     summary = RunSummary(journal.header, run.suite.summarise(journal.header, records))
     n_missing = workload.n_units - len(records)
     usage = Usage.total([record.usage for record in records] + [artifact.usage for artifact in journal.artifacts])
-    write_results(folder, results_document(summary, run.suite, n_missing, usage))
-    write_scores(folder, run.suite, records)
-    write_usage(folder, records, usage)
+    write_run_files(folder, summary, run.suite, records, n_missing, usage)
     return summary, records, usage

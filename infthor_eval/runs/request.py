@@ -1,6 +1,6 @@
 """The request for a run, checked before anything expensive is loaded."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic
@@ -13,7 +13,7 @@ from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
-__all__ = ["PreparedRun", "RunRequest", "prepare"]
+__all__ = ["PreparedRun", "RunRequest", "prepare", "run_folder"]
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,13 @@ class RunRequest:
         return self.name or label(self.model, self.model_options)
 
     def folder(self, header: RunHeader) -> Path:
-        """Return the run's folder, `<output>/<name>/<tasks>-<config hash>`."""
-        return self.output / header.name / f"{'+'.join(self.asked)[:80]}-{fingerprint(header.config)}"
+        """Return the run's folder."""
+        return run_folder(self.output, header, self.asked)
+
+
+def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
+    """Return the folder of a run of these tasks, `<output>/<name>/<tasks>-<config hash>`."""
+    return output / header.name / f"{'+'.join(tasks)[:80]}-{fingerprint(header.config)}"
 
 
 @dataclass(frozen=True)

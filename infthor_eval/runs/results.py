@@ -14,7 +14,7 @@ from infthor_eval.runs.records import UnitRecord
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
 
-__all__ = ["RESULTS", "results_document", "write_results", "write_scores", "write_usage"]
+__all__ = ["RESULTS", "results_document", "write_results", "write_run_files", "write_scores", "write_usage"]
 
 RESULTS = "results.json"
 _SCORES = "scores.jsonl"
@@ -34,6 +34,24 @@ def results_document(run: RunSummary, suite: Suite[Any, Any], n_missing: int | N
         # Without cached tokens: their number differs between a run and the same run resumed, or run by workers.
         "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
     }
+
+
+def write_run_files(
+    folder: Path,
+    run: RunSummary,
+    suite: Suite[Any, Any],
+    records: Sequence[UnitRecord[Any]],
+    n_missing: int,
+    usage: Usage,
+) -> None:
+    """Write results, scores and usage of a run; see the functions below for each.
+
+    Raises:
+        DataError: a file cannot be written.
+    """
+    write_results(folder, results_document(run, suite, n_missing, usage))
+    write_scores(folder, suite, records)
+    write_usage(folder, records, usage)
 
 
 def write_results(folder: Path, document: dict[str, Any]) -> None:

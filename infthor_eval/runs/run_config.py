@@ -19,18 +19,24 @@ def header_of(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -
     code = {} if request.model in suite.baselines else adapter_identity(request.model)
     tasks = request.tasks
     ours = {"suite_code": dict(request.suite_code)} if request.suite_code else {}
-    config = run_config(suite.name, subject, code, {**ours, **workload.config}, tasks.limit, tasks.seed)
+    model = {"name": subject.name, **subject.identity()}
+    config = run_config(suite.name, model, code, {**ours, **workload.config}, tasks.limit, tasks.seed)
     return RunHeader(suite=suite.name, name=request.label, config=config)
 
 
 def run_config(
-    suite: str, subject: Subject, code: Mapping[str, Any], workload: Mapping[str, Any], limit: int | None, seed: int
+    suite: str,
+    model: Mapping[str, Any],
+    code: Mapping[str, Any],
+    workload: Mapping[str, Any],
+    limit: int | None = None,
+    seed: int = 0,
 ) -> dict[str, Any]:
     """Return the config of a run as JSON values.
 
     Args:
         suite: name of the suite.
-        subject: the evaluated model, policy or baseline.
+        model: name and identity of the evaluated model, policy or baseline.
         code: identity of a model adapter that is not this package's (`model_adapters.adapter_identity`).
         workload: config of the workload.
         limit: number of items of each task; None for all.
@@ -39,7 +45,7 @@ def run_config(
     config = {
         "infthor_eval": infthor_eval.__version__,
         "suite": suite,
-        "model": {"name": subject.name, **subject.identity()},
+        "model": dict(model),
         "adapter": dict(code),
         "limit": limit,
         "seed": seed,

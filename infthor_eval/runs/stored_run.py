@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from infthor_eval.formats.digests import fingerprint
 from infthor_eval.runs.journal import Journal
 from infthor_eval.runs.records import P, RunHeader, U, UnitRecord
-from infthor_eval.runs.results import results_document, write_results, write_scores, write_usage
+from infthor_eval.runs.request import run_folder
+from infthor_eval.runs.results import write_run_files
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
 
@@ -31,14 +31,11 @@ def store_run(
         UsageError: another process writes the run.
         DataError: the journal has a bad line, or something cannot be written.
     """
-    folder = output / header.name / f"{'+'.join(header.config['tasks'])[:80]}-{fingerprint(header.config)}"
+    folder = run_folder(output, header, header.config["tasks"])
     with Journal(folder, header, suite.records) as journal:
         for record in records:
             if journal.find_record(record.key, record.fingerprint) is None:
                 journal.append(record)
         summary = RunSummary(header, suite.summarise(header, records))
-        usage = Usage.total(record.usage for record in records)
-        write_results(folder, results_document(summary, suite, n_missing, usage))
-        write_scores(folder, suite, records)
-        write_usage(folder, records, usage)
+        write_run_files(folder, summary, suite, records, n_missing, Usage.total(record.usage for record in records))
     return folder, summary

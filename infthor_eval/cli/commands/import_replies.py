@@ -1,6 +1,5 @@
 """`infthor-eval import-replies`: replies that others made, as runs."""
 
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,24 +41,24 @@ def command(logs: tuple[Path, ...], data: Path, model: str | None, output: Path)
     questions, suite = NiehSet(data), NiehSuite()
     results, n_refused = [], 0
     for run in import_logs(logs, questions, model):
-        n_missing = run.n_questions - len(run.records)
-        folder, summary = store_run(output, run.header(questions), suite, run.records, n_missing)
-        _print_counts(run, n_missing)
-        results.append(RunResults(folder, suite, summary, NOTHING, n_missing))
+        folder, summary = store_run(output, run.header(questions), suite, run.records, run.n_missing)
+        _print_counts(run)
+        results.append(RunResults(folder, suite, summary, NOTHING, run.n_missing))
         n_refused += len(run.refused)
     print_results(results, ShowOptions())
     return 1 if n_refused else 0
 
 
-def _print_counts(run: "ImportedRun", n_missing: int) -> None:
+def _print_counts(run: "ImportedRun") -> None:
     from infthor_eval.cli.progress.notes import print_note
 
     name = f"{run.model}, {run.task}"
-    print_note(f"{name}: {len(run.records)} replies imported, {n_missing} of {run.n_questions} questions without one")
+    counts = f"{run.n_missing} of {len(run.question_ids)} questions without one"
+    print_note(f"{name}: {len(run.records)} replies imported, {counts}")
     for kind, items in (("not imported", run.refused), ("scored otherwise than logged", run.rescored)):
         if items:
             print_note(f"{name}: {len(items)} row(s) {kind}")
         for item in items[:_SHOWN]:
             print_note(f"  {item.log.name}, line {item.line}: {item.reason}")
         if len(items) > _SHOWN:
-            print_note(f"  and {len(items) - _SHOWN} more in {len(Counter(item.log for item in items))} log(s)")
+            print_note(f"  and {len(items) - _SHOWN} more in {len({item.log for item in items})} log(s)")

@@ -103,6 +103,14 @@ def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run):
     assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {"1": 4, "2": 1, ">=3": 0, "total": 5}
 
 
+def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run):
+    for name, question_id in (("first.jsonl", "qsingle0"), ("second.jsonl", "qmulti4")):
+        (tmp_path / name).write_text(json.dumps({"question_id": question_id, "reply": "no"}))
+    logs = [tmp_path / "first.jsonl", tmp_path / "second.jsonl"]
+    code, _, err = run("import-replies", *logs, "--model", "me", "--data", data, "--output", tmp_path / "out")
+    assert (code, "2 replies imported, 3 of 5 questions without one" in err) == (0, True)
+
+
 @pytest.mark.parametrize(
     ("more", "task", "setting"),
     [
