@@ -6,6 +6,8 @@ INSTALLED := $(VENV)/.installed
 # lm-eval's own multimodal model insists on torchvision, which has no CPU build; one test loads its Python half from
 # here. It must stay out of the environment itself, where transformers would find it and fail.
 PEERS := $(VENV)/test-peers
+# The renderer is compiled once; otherwise each process that finds it missing would compile it.
+COMPILE := $(BIN)/python -m pytest -q tests/sim/test_pictures.py -k "test_ids_frame_names or numba"
 
 .PHONY: demo shell test test-all test-times lint docs clean
 
@@ -23,6 +25,7 @@ shell: $(INSTALLED)
 	@. $(BIN)/activate && exec "$${SHELL:-/bin/sh}"
 
 test: $(INSTALLED) $(PEERS)
+	$(COMPILE)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 # The slow ones too; half an hour on two cores.
@@ -31,7 +34,7 @@ test-all: $(INSTALLED) $(PEERS)
 
 # Measures all tests, and lists those that are slow in tests/slow_tests.txt.
 test-times: $(INSTALLED) $(PEERS)
-	$(BIN)/python -m pytest tests/sim/test_pictures.py tests/sim/arm # numba compiles, which counts for no test
+	$(COMPILE)
 	rm -rf build/processor_times
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
