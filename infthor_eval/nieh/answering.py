@@ -15,10 +15,13 @@ from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.baselines import Predict
 from infthor_eval.nieh.contexts import ContextPart, Sample
+from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.notebook import Notebook
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitKey, UnitRecord, Usage
 from model_adapters import Model, Reply, wrap_request_errors
@@ -33,10 +36,12 @@ class NiehUnit(Unit[NiehAnswer]):
     sample: Sample
 
     @classmethod
-    def of(cls, task: str, sample: Sample) -> "NiehUnit":
-        """Return the unit of a task's sample."""
+    def of(cls, task: str, task_samples: TaskSamples, sample: Sample) -> "NiehUnit":
+        """Return the unit of a task's sample, with what can be guessed of it and how much of its evidence is shown."""
         question = sample.question
-        return cls(UnitKey(task, question.id, sample.variant), question.traj_id, NiehAnswer.of(question), sample)
+        guesses = find_guesses(task_samples.data, visible_knowledge(task_samples.context_name))
+        payload = NiehAnswer.of(question, guesses.get(question.id), shown_clues(task_samples, sample))
+        return cls(UnitKey(task, question.id, sample.variant), question.traj_id, payload, sample)
 
 
 @dataclass(frozen=True)

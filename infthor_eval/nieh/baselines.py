@@ -10,19 +10,14 @@ from infthor_eval.formats.digests import seed_of
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.guessing import Chain, Guesser, chains_of_words, chains_of_words_and_count
+from infthor_eval.nieh.guessing.chains import Chain, Guesser, chains_of_words, chains_of_words_and_count
+from infthor_eval.nieh.guessing.forms import question_type
 from infthor_eval.runs.baseline import BaselineSubject
 from model_adapters import Subject
 
-__all__ = ["BASELINES", "Baseline", "Predict", "question_type"]
+__all__ = ["BASELINES", "Baseline", "Predict"]
 
 Predict = Callable[[Sample], str]
-_LEADING_WORDS = 2
-
-
-def question_type(question: Question) -> str:
-    """Return the question's type, or its leading words in lower case if the file names no type."""
-    return question.question_type or " ".join(question.text.lower().split()[:_LEADING_WORDS])
 
 
 @runtime_checkable

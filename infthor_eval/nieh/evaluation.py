@@ -163,7 +163,7 @@ def _groups(prepared: Mapping[str, PreparedTask]) -> list[Group[NiehUnit]]:
         for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
             same = list(samples)
             frames = len({frame for sample in same for frame in sample.frames})
-            groups.append(Group([NiehUnit.of(task, sample) for sample in same], frames))
+            groups.append(Group([NiehUnit.of(task, item.task_samples, sample) for sample in same], frames))
     return groups
 
 

@@ -6,7 +6,35 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.runs.records import RecordTypes
 
-__all__ = ["RECORDS", "NiehAnswer", "NiehNote"]
+__all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "ShownClues"]
+
+
+class Guess(msgspec.Struct, frozen=True, kw_only=True):
+    """What can be guessed of a question without a frame (`infthor_eval.nieh.guessing`).
+
+    Attributes:
+        form: the question's form, with its file if the set has several.
+        scores: scores by scorer of the guess at this question; of the guesser that is best at its form.
+        form_scores: means of these scores over the set's questions of that form.
+    """
+
+    form: str
+    scores: dict[str, float]
+    form_scores: dict[str, float]
+
+
+class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
+    """How much of the evidence was among the shown frames.
+
+    Attributes:
+        n_shown: number of clue frames among them.
+        n_clues: number of different clue frames.
+        n_after: number of frames of the trajectory after the last clue; None if its length is not known.
+    """
+
+    n_shown: int
+    n_clues: int
+    n_after: int | None = None
 
 
 class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="nieh_answer"):
@@ -18,6 +46,8 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
         n_clues: number of frames that are evidence; 0 for an absence.
         clue_column: column in the tables by number of clues (`Question.clue_column`).
         answers: the gold answers.
+        guess: what can be guessed of the question; None if it is not known.
+        shown_clues: clue frames among the shown ones; None if they are not known, or if no frame is evidence.
         reply: the reply; None if the model failed.
         scores: scores of the reply by metric; empty if there is none.
     """
@@ -27,11 +57,13 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     n_clues: int
     clue_column: str
     answers: tuple[str | int | float, ...]
+    guess: Guess | None = None
+    shown_clues: ShownClues | None = None
     reply: str | None = None
     scores: dict[str, float] = {}
 
     @classmethod
-    def of(cls, question: Question) -> "NiehAnswer":
+    def of(cls, question: Question, guess: Guess | None = None, shown_clues: ShownClues | None = None) -> "NiehAnswer":
         """Return the payload of a question before it is asked."""
         return cls(
             question=question.text,
@@ -39,6 +71,8 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
             n_clues=question.n_clues,
             clue_column=question.clue_column,
             answers=question.answers,
+            guess=guess,
+            shown_clues=shown_clues,
         )
 
     def with_reply(self, reply: str, scores: dict[str, float]) -> "NiehAnswer":

@@ -5,8 +5,9 @@ import pytest
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.baselines import BASELINES, Baseline, Blind, BlindCount, Oracle, Random, question_type
+from infthor_eval.nieh.baselines import BASELINES, Baseline, Blind, BlindCount, Oracle, Random
 from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.guessing.forms import question_type
 from model_adapters import names
 
 

@@ -29,6 +29,7 @@ CONTEXTS = {
         video.video,
         intro="Answer the question given the video showing the agent's trajectory over time.",
         frames=video.video_frames,
+        positions=video.video_positions,
         sources=video.video_identity,
     ),
     "memory_frames": Context(retrieval.memory_frames, sources=retrieval.retriever_identity),

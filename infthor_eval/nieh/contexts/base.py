@@ -129,6 +129,10 @@ def _only_frames(_data: NiehSet, _sample: Sample, frames: Sequence[FrameRef]) ->
     return list(frames)
 
 
+def _frames_of(_data: NiehSet, sample: Sample) -> Sequence[int]:
+    return sample.frames
+
+
 def _no_sources(_data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
     return {}
 
@@ -143,6 +147,7 @@ class Context:
         intro: the sentence that says what the model sees; the published one where the context is published.
         parts: returns what the model sees before that sentence, given the frames of a sample.
         frames: returns the frames that the positions of a sample refer to.
+        positions: returns where in the trajectory's time order the frames of a sample are.
         sources: returns whatever the frames depend on besides the set's fingerprint and the settings, as JSON values.
     """
 
@@ -151,6 +156,7 @@ class Context:
     intro: str = "Answer the question given the agent's views in time order."
     parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(default=_only_frames)
     frames: Callable[[NiehSet, str], Sequence[FrameRef]] = field(default=NiehSet.frames)
+    positions: Callable[[NiehSet, Sample], Sequence[int]] = field(default=_frames_of)
     sources: Callable[[NiehSet, ContextSettings], dict[str, Any]] = field(default=_no_sources)
 
     def select_frames(self, data: NiehSet, sample: Sample) -> list[FrameRef]:

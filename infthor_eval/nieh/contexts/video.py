@@ -10,7 +10,9 @@ from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
-__all__ = ["video", "video_frames", "video_identity"]
+__all__ = ["video", "video_frames", "video_identity", "video_positions"]
+
+_PER_SECOND = 10  # frames of the trajectory a second of its video
 
 
 def video(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
@@ -35,6 +37,12 @@ def video_frames(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
     """
     path = data.video(traj_id)
     return data.frames(traj_id) if path is None else data.video_frames(traj_id)
+
+
+def video_positions(data: NiehSet, sample: Sample) -> Sequence[int]:
+    """Return the frames of the trajectory that the shown ones are, by the video's 10 frames per second."""
+    is_video = data.video(sample.question.traj_id) is not None
+    return [_PER_SECOND * second for second in sample.frames] if is_video else sample.frames
 
 
 def video_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:

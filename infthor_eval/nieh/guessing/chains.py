@@ -16,16 +16,24 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import doc_target
 
-__all__ = ["Guesser", "chains_of_words", "chains_of_words_and_count"]
+__all__ = [
+    "Guesser",
+    "chains_of_words",
+    "chains_of_words_and_count",
+    "chains_of_words_and_place",
+    "held_out",
+    "words_of",
+]
 
 Chain = Sequence[Hashable]
 _STEM = 3  # leading words that tell the forms of questions apart
+_PLACE = 100  # frames that count as one place
 _DIGITS = 9  # of a log probability; what is beyond is rounding, which must not decide between equal answers
 
 
 def chains_of_words(sample: Sample) -> list[Chain]:
     """Return chains of a question's words: the leading words, and each later word, alone and after the first two."""
-    words = _words(sample.question)
+    words = words_of(sample.question)
     later = sorted(set(words[2:]))
     leading = [("leading", *words[:n]) for n in range(1, len(words) + 1)]
     return [leading, *([("word", word), ("word", *words[:2], word)] for word in later)]
@@ -33,12 +41,27 @@ def chains_of_words(sample: Sample) -> list[Chain]:
 
 def chains_of_words_and_count(sample: Sample) -> list[Chain]:
     """Return the chains of words, and one of the number of frames after the question's stem."""
-    stem = _words(sample.question)[:_STEM]
+    stem = words_of(sample.question)[:_STEM]
     return [*chains_of_words(sample), [("stem", *stem), ("count", *stem, len(sample.frames))]]
 
 
-def _words(question: Question) -> list[str]:
+def chains_of_words_and_place(sample: Sample) -> list[Chain]:
+    """Return the chains of words, and of the place of the last clue and the span of the clues after the stem."""
+    stem = words_of(sample.question)[:_STEM]
+    first, last = sample.frames[0], sample.frames[-1]
+    place, span = ("place", *stem, last // _PLACE), ("span", *stem, (last - first).bit_length())
+    return [*chains_of_words(sample), [("stem", *stem), place], [("stem", *stem), span]]
+
+
+def words_of(question: Question) -> list[str]:
+    """Return the words of a question in lower case."""
     return re.findall(r"\w+", question.text.lower())
+
+
+def held_out(samples: Sequence[Sample]) -> Callable[[Sample], str]:
+    """Return what a sample is left out with: its trajectory, or itself if all are on one trajectory."""
+    is_alone = len({sample.question.traj_id for sample in samples}) == 1
+    return lambda sample: sample.question.id if is_alone else sample.question.traj_id
 
 
 class Guesser:
@@ -47,7 +70,7 @@ class Guesser:
     def __init__(self, samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]) -> None:
         """Count the answer key; if it is of one trajectory, each question is guessed from the others."""
         self._chains = chains
-        self._is_alone = len({sample.question.traj_id for sample in samples}) == 1
+        self._held_out = held_out(samples)
         self._answers = sorted({doc_target(sample.question) for sample in samples})
         self._number = {answer: number for number, answer in enumerate(self._answers)}
         self._seen: dict[Hashable, Counter[int]] = defaultdict(Counter)
@@ -57,34 +80,31 @@ class Guesser:
 
     def guess(self, sample: Sample) -> str:
         """Return the likeliest answer (of equal ones, the first in the alphabet); empty if nothing was learned."""
-        held_out = self._held_out(sample)
-        counts = self._vector(self._others((), held_out))
+        group = self._held_out(sample)
+        counts = self._vector(self._others((), group))
         if not counts.any():
             return ""
         with np.errstate(divide="ignore"):
             prior = np.log(counts / counts.sum())
-            evidence = [np.log(self._probability(chain, counts, held_out)) for chain in self._chains(sample)]
+            evidence = [np.log(self._probability(chain, counts, group)) for chain in self._chains(sample)]
         known = np.flatnonzero(counts)
         total = prior[known] + sum(item[known] - prior[known] for item in evidence)
         return self._answers[known[np.argmax(np.round(total, _DIGITS))]]
 
     def _count(self, sample: Sample) -> None:
-        answer, held_out = self._number[doc_target(sample.question)], self._held_out(sample)
+        answer, group = self._number[doc_target(sample.question)], self._held_out(sample)
         for context in {(), *(context for chain in self._chains(sample) for context in chain)}:
             self._seen[context][answer] += 1
-            self._own[held_out, context][answer] += 1
+            self._own[group, context][answer] += 1
 
-    def _held_out(self, sample: Sample) -> str:
-        return sample.question.id if self._is_alone else sample.question.traj_id
+    def _others(self, context: Hashable, group: str) -> Counter[int]:
+        """Return the answers after a context, without those that are left out with a question."""
+        return self._seen.get(context, Counter()) - self._own.get((group, context), Counter())
 
-    def _others(self, context: Hashable, held_out: str) -> Counter[int]:
-        """Return the answers after a context, without the held-out ones."""
-        return self._seen.get(context, Counter()) - self._own.get((held_out, context), Counter())
-
-    def _probability(self, chain: Chain, counts: np.ndarray, held_out: str) -> np.ndarray:
+    def _probability(self, chain: Chain, counts: np.ndarray, group: str) -> np.ndarray:
         mixed = counts / counts.sum()
         for context in chain:
-            seen = self._others(context, held_out)
+            seen = self._others(context, group)
             n_different = len(seen)
             mixed = (self._vector(seen) + n_different * mixed) / (seen.total() + n_different) if seen else mixed
         return mixed

@@ -1,0 +1,93 @@
+"""Guessers that see no frame, from what they know: each guesses the questions of a file from other trajectories."""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Flag, auto
+from functools import partial
+
+from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.chains import (
+    Chain,
+    Guesser,
+    chains_of_words,
+    chains_of_words_and_count,
+    chains_of_words_and_place,
+    held_out,
+)
+from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.learner import guess_by_learning
+
+__all__ = ["GUESSERS", "Knowledge", "NamedGuesser"]
+
+
+class Knowledge(Flag):
+    """What a guesser knows of a question beside its file."""
+
+    FILE = 0
+    WORDS = auto()
+    NUMBER = auto()  # of clue frames
+    PLACE = auto()  # of the clue frames in the trajectory
+
+
+@dataclass(frozen=True)
+class NamedGuesser:
+    """A guesser.
+
+    Attributes:
+        name: its name in tables.
+        knows: what it knows.
+        guess: returns a guess for each sample of a file (on the clue frames); an empty text for none.
+    """
+
+    name: str
+    knows: Knowledge
+    guess: Callable[[Sequence[Sample]], list[str]]
+
+
+def _guess_constant(samples: Sequence[Sample], group_of: Callable[[Sample], str]) -> list[str]:
+    """Guess the commonest answer to questions of a group on other trajectories; the first in the alphabet of equals."""
+    own_of = held_out(samples)
+    everywhere: dict[str, Counter[str]] = defaultdict(Counter)
+    own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
+    for sample in samples:
+        group, answer = group_of(sample), doc_target(sample.question)
+        everywhere[group][answer] += 1
+        own[group, own_of(sample)][answer] += 1
+    guesses = []
+    for sample in samples:
+        group = group_of(sample)
+        counts = everywhere[group] - own[group, own_of(sample)]
+        guesses.append(min(counts, key=lambda answer: (-counts[answer], answer), default=""))
+    return guesses
+
+
+def _guess_by_chains(samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]) -> list[str]:
+    guesser = Guesser(samples, chains)
+    return [guesser.guess(sample) for sample in samples]
+
+
+_WORDS, _NUMBER, _PLACE = Knowledge.WORDS, Knowledge.NUMBER, Knowledge.PLACE
+GUESSERS = (
+    NamedGuesser("one answer a file", Knowledge.FILE, partial(_guess_constant, group_of=lambda _: "")),
+    NamedGuesser(
+        "one answer a form", _WORDS, partial(_guess_constant, group_of=lambda sample: form_of(sample.question))
+    ),
+    NamedGuesser("words (blind)", _WORDS, partial(_guess_by_chains, chains=chains_of_words)),
+    NamedGuesser(
+        "words, number of frames (blind-count)",
+        _WORDS | _NUMBER,
+        partial(_guess_by_chains, chains=chains_of_words_and_count),
+    ),
+    NamedGuesser(
+        "words, place of the clues", _WORDS | _PLACE, partial(_guess_by_chains, chains=chains_of_words_and_place)
+    ),
+    NamedGuesser("learner: words", _WORDS, partial(guess_by_learning, number=False, place=False)),
+    NamedGuesser(
+        "learner: words, number of frames", _WORDS | _NUMBER, partial(guess_by_learning, number=True, place=False)
+    ),
+    NamedGuesser(
+        "learner: words, number, place", _WORDS | _NUMBER | _PLACE, partial(guess_by_learning, number=True, place=True)
+    ),
+)

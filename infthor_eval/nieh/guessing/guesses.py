@@ -1,0 +1,81 @@
+"""The best guess at each question of a set, by which runs are measured above guessing."""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
+from infthor_eval.nieh.records import Guess
+from infthor_eval.nieh.scoring import SCORERS, scores
+
+__all__ = ["find_guesses", "questions_by_file", "sample_on_clues", "visible_knowledge"]
+
+_Scores = Sequence[Mapping[str, float]]  # by scorer, of each question
+
+
+def visible_knowledge(context: str) -> Knowledge:
+    """Return what a model is told in a context of that name without looking at a frame.
+
+    On the clue frames alone their number is in the request; elsewhere it says nothing of the question.
+    """
+    return Knowledge.WORDS | Knowledge.NUMBER if context == "clues" else Knowledge.WORDS
+
+
+@lru_cache(maxsize=8)
+def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
+    """Return by id of a question what can be guessed of it by guessers that know no more than that.
+
+    Of each file and form the guesser with the highest mean counts, for each scorer of its own; so the guess is rather
+    too good than too bad.
+    """
+    files = questions_by_file(data)
+    guesses: dict[str, Guess] = {}
+    for file, questions in files.items():
+        samples = [sample_on_clues(question) for question in questions]
+        by_guesser = [
+            [scores(reply, question.answers) for reply, question in zip(guesser.guess(samples), questions, strict=True)]
+            for guesser in GUESSERS
+            if guesser.knows in knowledge
+        ]
+        prefix = f"{file}: " if len(files) > 1 else ""
+        guesses |= _best_by_form(questions, by_guesser, prefix)
+    return guesses
+
+
+def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
+    """Return the questions that can be asked by the name of their file."""
+    files = {question.id: file for file, questions in reversed(data.files.items()) for question in questions}
+    by_file: dict[str, list[Question]] = {}
+    for question in data.questions:
+        by_file.setdefault(files[question.id], []).append(question)
+    return by_file
+
+
+def sample_on_clues(question: Question) -> Sample:
+    """Return the question on its clue frames, by their numbers in the file."""
+    return Sample(question, tuple(sorted(question.clues)))
+
+
+def _best_by_form(questions: Sequence[Question], by_guesser: Sequence[_Scores], prefix: str) -> dict[str, Guess]:
+    places: dict[str, list[int]] = {}
+    for place, question in enumerate(questions):
+        places.setdefault(form_of(question), []).append(place)
+    guesses = {}
+    for form, of_form in places.items():
+        best: dict[str, _Scores] = {scorer: _best(by_guesser, of_form, scorer) for scorer in SCORERS}
+        means = {scorer: _mean(scored, of_form, scorer) for scorer, scored in best.items()}
+        for place in of_form:
+            own = {scorer: scored[place][scorer] for scorer, scored in best.items()}
+            guesses[questions[place].id] = Guess(form=prefix + form, scores=own, form_scores=means)
+    return guesses
+
+
+def _best(by_guesser: Sequence[_Scores], places: Sequence[int], scorer: str) -> _Scores:
+    return max(by_guesser, key=lambda scored: _mean(scored, places, scorer))
+
+
+def _mean(scored: _Scores, places: Sequence[int], scorer: str) -> float:
+    return sum(scored[place][scorer] for place in places) / len(places)
