@@ -10,7 +10,7 @@ Question files alone, without `metadata/`, are a set too: for whatever needs no 
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -78,7 +78,7 @@ class NiehSet:
             raise DataError(f"{trajectories}: no such folder; give the folder of the trajectories with --trajectories")
         self.trajectories = trajectories
         self.simulator = simulator_of(self._folder)
-        self.files = {file.stem: tuple(read_questions(file)) for file in self._files}
+        self.files = {file.stem: self._read_file(file) for file in self._files}
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
         # One tuple per trajectory, shared by all its questions: a copy each would be thousands of references.
         self._all_frames: dict[str, tuple[FrameRef, ...] | DataError] = {}
@@ -119,6 +119,10 @@ class NiehSet:
             for index, frame in self._trajectory(traj_id).items():
                 digest.update(f"{traj_id}/{index}:{frame.path.name}:{_size(frame.path)}\n".encode())
         return digest.hexdigest()
+
+    def _read_file(self, file: Path) -> tuple[Question, ...]:
+        name = file.stem if len(self._files) > 1 else ""
+        return tuple(replace(question, file=name) for question in read_questions(file))
 
     def reasons(self) -> Counter[str]:
         """Return the number of skipped questions by reason."""

@@ -1,6 +1,6 @@
 """One NIEH question, the type that all packages of the project share."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -44,6 +44,7 @@ class Question:
         question_type: content of the `question_type` column, or None if the file has none.
         absence: True if the answer is that something is nowhere. No frame is evidence; the clues are a sample.
         published: further columns of a published file; None elsewhere.
+        file: name of its file without suffix, among several of a set; empty elsewhere. It is no part of what is asked.
     """
 
     traj_id: str
@@ -53,6 +54,7 @@ class Question:
     question_type: str | None = None
     absence: bool = False
     published: PublishedColumns | None = None
+    file: str = field(default="", compare=False)
 
     @property
     def n_clues(self) -> int:

@@ -7,7 +7,7 @@
 | lm-eval's `samples_<task>_<time>.jsonl` | `doc`: `question_id` | `resps` |
 
 A published row repeats its question (`question`, `traj_id`, `gt_img_idx`, `gt_answer`) and has a `score`. A neutral one
-may have `n_context_tokens`, `n_reply_tokens` and `seconds`.
+may have `n_context_tokens`, `n_reply_tokens`, `seconds` and `frames_shown`, the numbers of the frames that were shown.
 """
 
 import json
@@ -40,6 +40,7 @@ class _PublishedRow(msgspec.Struct, frozen=True):
     eval_mode: str | None = None
     ctx_size_k: float | None = None
     n_imgs: int | None = None
+    selected_img_indices: tuple[int, ...] | None = None
 
 
 class _NeutralRow(msgspec.Struct, frozen=True):
@@ -48,6 +49,7 @@ class _NeutralRow(msgspec.Struct, frozen=True):
     n_context_tokens: int | None = None
     n_reply_tokens: int | None = None
     seconds: float = 0.0
+    frames_shown: tuple[int, ...] | None = None
 
 
 class _Doc(msgspec.Struct, frozen=True):
@@ -73,6 +75,7 @@ class LoggedReply:
         mode: published name of the evaluation mode (`truncate_head`); None if the row names none.
         size: size of the context in kilo-tokens, in published rows.
         n_frames: number of frames that the model saw, in published rows.
+        frames: numbers of these frames; None if they are not in the row.
         n_context_tokens: tokens of the request; None if they are not in the row.
         n_reply_tokens: tokens of the reply; None likewise.
         seconds: duration; 0 if it is not in the row.
@@ -87,6 +90,7 @@ class LoggedReply:
     mode: str | None = None
     size: float | None = None
     n_frames: int | None = None
+    frames: tuple[int, ...] | None = None
     n_context_tokens: int | None = None
     n_reply_tokens: int | None = None
     seconds: float = 0.0
@@ -133,6 +137,7 @@ def _read_row(number: int, entry: Any) -> LoggedReply:
         number,
         row.reply,
         row.question_id,
+        frames=row.frames_shown,
         n_context_tokens=row.n_context_tokens,
         n_reply_tokens=row.n_reply_tokens,
         seconds=row.seconds,
@@ -149,5 +154,6 @@ def _published_reply(number: int, row: _PublishedRow) -> LoggedReply:
         mode=row.eval_mode,
         size=row.ctx_size_k,
         n_frames=row.n_imgs,
+        frames=row.selected_img_indices,
         n_context_tokens=row.ctx_n_tokens,
     )

@@ -33,6 +33,7 @@ def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> D
         "question_type": question.question_type or "",
         "absence": question.absence,
         "published": question.published and {"file": question.published.file, "qid": question.published.qid},
+        "file": question.file,
         "clues": list(question.clues),
         "answers": json.dumps(question.answers),
         "context": task_samples.context_name,
@@ -56,6 +57,7 @@ def sample_of(doc: Doc) -> Sample:
         question_type=doc["question_type"] or None,
         absence=doc["absence"],
         published=PublishedColumns(**doc["published"]) if doc["published"] else None,
+        file=doc["file"],
     )
     notes = NoteSettings(*doc["notes"]) if doc["notes"] else None
     return Sample(question, tuple(doc["frames"]), doc["variant"], notes=notes)

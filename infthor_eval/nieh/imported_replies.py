@@ -1,7 +1,7 @@
 """Replies that others made, as runs: scored, with a journal and results like those of our own runs."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,9 @@ from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
+from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.options import SHOWN
-from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.runs import RunHeader, Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.run_config import run_config
@@ -28,6 +29,7 @@ _MODES = {
     "clip_retrieval": ("nieh_clip_retrieval", "clip_retrieval"),
     "video": ("nieh_video", "video"),
 }
+_WHOLE = (None, "full_traj")  # modes that show all frames; early logs name no mode
 _OTHER = ("imported", "imported")  # of logs that name no mode
 
 
@@ -99,16 +101,32 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
         DataError: a log cannot be read.
     """
     runs: dict[tuple[str, str, str], ImportedRun] = {}
+    rows_of = {log: list(read_reply_log(log)) for log in dict.fromkeys(logs)}
+    replies_of = {log: [row for row in rows if isinstance(row, LoggedReply)] for log, rows in rows_of.items()}
+    n_frames = _trajectory_lengths(reply for replies in replies_of.values() for reply in replies)
     for log in logs:
-        rows = list(read_reply_log(log))
-        replies = [row for row in rows if isinstance(row, LoggedReply)]
         name = _PUBLISHED_NAME.match(log.name)
         if model is None and name is None:
             raise UsageError(f"{log}: its name has no model; give one with --model")
-        of_model, (task, settings) = model or (name and name["model"]) or "", _mode_of(replies, log)
+        of_model, (task, settings) = model or (name and name["model"]) or "", _mode_of(replies_of[log], log)
         run = runs.setdefault((of_model, task, repr(settings)), ImportedRun(of_model, task, settings))
-        _add_log(run, log, rows, _questions_of(data, name))
+        guesses = find_guesses(data, visible_knowledge(settings["context"]))
+        _add_log(run, log, rows_of[log], _questions_of(data, name), _Known(guesses, n_frames))
     return list(runs.values())
+
+
+def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
+    """Return the numbers of frames of trajectories, from published rows on whole ones or on their ends."""
+    lengths: dict[str, int] = {}
+    for reply in replies:
+        n_frames = None
+        if reply.mode in _WHOLE:
+            n_frames = reply.n_frames
+        elif reply.mode == "truncate_head" and reply.frames:
+            n_frames = max(reply.frames) + 1
+        if reply.published and n_frames:
+            lengths[reply.published.traj_id] = n_frames
+    return lengths
 
 
 def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, Any]]:
@@ -133,8 +151,20 @@ def _questions_of(data: NiehSet, name: re.Match[str] | None) -> Sequence[Questio
     return data.files[name["file"]]
 
 
+@dataclass(frozen=True)
+class _Known:
+    """What is known of the questions: guesses by question, and numbers of frames by trajectory."""
+
+    guesses: Mapping[str, Guess]
+    n_frames: Mapping[str, int]
+
+
 def _add_log(
-    run: ImportedRun, log: Path, rows: Sequence[LoggedReply | UnreadRow], questions: Sequence[Question]
+    run: ImportedRun,
+    log: Path,
+    rows: Sequence[LoggedReply | UnreadRow],
+    questions: Sequence[Question],
+    known: _Known,
 ) -> None:
     by_id = {question.id: question for question in questions}
     answered = {record.id for record in run.records}
@@ -147,7 +177,7 @@ def _add_log(
             refused.append(Refusal(log, row.line, f"answers {question.id} again; the first reply is kept"))
         elif isinstance(row, LoggedReply):
             answered.add(question.id)
-            run.records.append(_record(run.task, question, row))
+            run.records.append(_record(run.task, question, row, known))
             run.rescored += _compare_scores(log, row, run.records[-1])
     if len(run.records) == n_before:
         reasons = "; ".join(dict.fromkeys(item.reason for item in refused[:3])) or "it is empty"
@@ -178,14 +208,27 @@ def _find_question(
     return question
 
 
-def _record(task: str, question: Question, reply: LoggedReply) -> UnitRecord[NiehAnswer]:
-    unit = Unit(UnitKey(task, question.id), question.traj_id, NiehAnswer.of(question))
+def _record(task: str, question: Question, reply: LoggedReply, known: _Known) -> UnitRecord[NiehAnswer]:
+    shown = _shown_clues(question, reply, known.n_frames.get(question.traj_id))
+    payload = NiehAnswer.of(question, known.guesses.get(question.id), shown)
+    unit = Unit(UnitKey(task, question.id), question.traj_id, payload)
     return unit.record(
         fingerprint({"question": question.id, "reply": reply.text}),
         unit.payload.with_reply(reply.text, scores(reply.text, question.answers)),
         seconds=reply.seconds,
         tokens=Tokens(context=reply.n_context_tokens, reply=reply.n_reply_tokens),
     )
+
+
+def _shown_clues(question: Question, reply: LoggedReply, n_frames: int | None) -> ShownClues | None:
+    """Return the clue frames that the model saw; None if the row does not tell, or if no frame is evidence."""
+    clues = set(question.clues)
+    is_whole = reply.published is not None and reply.mode in _WHOLE
+    if question.absence or (reply.frames is None and not is_whole):
+        return None
+    n_shown = len(clues if reply.frames is None else clues.intersection(reply.frames))
+    n_after = None if n_frames is None else n_frames - 1 - max(clues)
+    return ShownClues(n_shown=n_shown, n_clues=len(clues), n_after=n_after)
 
 
 def _compare_scores(log: Path, reply: LoggedReply, record: UnitRecord[NiehAnswer]) -> Iterator[Refusal]:

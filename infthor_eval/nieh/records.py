@@ -13,9 +13,9 @@ class Guess(msgspec.Struct, frozen=True, kw_only=True):
     """What can be guessed of a question without a frame (`infthor_eval.nieh.guessing`).
 
     Attributes:
-        form: the question's form, with its file if the set has several.
+        form: the question's form.
         scores: scores by scorer of the guess at this question; of the guesser that is best at its form.
-        form_scores: means of these scores over the set's questions of that form.
+        form_scores: means of these scores over the questions of that form in its file.
     """
 
     form: str
@@ -46,6 +46,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
         n_clues: number of frames that are evidence; 0 for an absence.
         clue_column: column in the tables by number of clues (`Question.clue_column`).
         answers: the gold answers.
+        file: name of its file, in a set of several; empty elsewhere.
         guess: what can be guessed of the question; None if it is not known.
         shown_clues: clue frames among the shown ones; None if they are not known, or if no frame is evidence.
         reply: the reply; None if the model failed.
@@ -57,6 +58,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     n_clues: int
     clue_column: str
     answers: tuple[str | int | float, ...]
+    file: str = ""
     guess: Guess | None = None
     shown_clues: ShownClues | None = None
     reply: str | None = None
@@ -71,6 +73,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
             n_clues=question.n_clues,
             clue_column=question.clue_column,
             answers=question.answers,
+            file=question.file,
             guess=guess,
             shown_clues=shown_clues,
         )

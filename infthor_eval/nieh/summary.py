@@ -4,24 +4,33 @@ Times and cache hits are not in it: they differ between a run and the same run r
 """
 
 import math
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import msgspec
 
 from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.above_guessing import AboveGuessing, above_guessing
 from infthor_eval.nieh.answer_form import YesNo, format_failures, yes_no
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord
 from infthor_eval.statistics import bootstrap_interval, clustered_mean
 
 __all__ = [
     "CLUE_COLUMNS",
+    "DISTANCES",
+    "LENGTHS",
     "OPEN_ENDED",
+    "SHOWN_CLUES",
     "Cell",
+    "EvidenceCells",
     "Failure",
+    "LengthCell",
     "NiehSummary",
     "Score",
     "SkippedSummary",
@@ -33,6 +42,13 @@ __all__ = [
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
 OPEN_ENDED = "open-ended"  # column of questions whose answer is neither yes, no nor a number, as published
+
+SHOWN_CLUES = ("all", "some", "none")
+# Bins double in width, so that they serve trajectories of hundreds and of thousands of frames alike.
+_DISTANCES = (0, 50, 100, 200, 400, 800, 1600, 3200)
+DISTANCES = (*(f"{low}-{high - 1}" for low, high in pairwise(_DISTANCES)), f">={_DISTANCES[-1]}")
+_LENGTHS = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)  # thousand tokens
+LENGTHS = (*(f"{low}-{high}" for low, high in pairwise(_LENGTHS)), f">={_LENGTHS[-1]}")
 
 Record = UnitRecord[NiehAnswer]
 
@@ -60,6 +76,25 @@ class Cell(msgspec.Struct, frozen=True):
     scores: dict[str, Score]
 
 
+class EvidenceCells(msgspec.Struct, frozen=True):
+    """The scores of samples by what was shown of their evidence; samples of which it is not known are in no cell.
+
+    Attributes:
+        by_shown_clues: cells of the samples with all, some and none of their clue frames shown.
+        by_distance: cells by the number of frames between the last clue and the end of the trajectory ("50-99").
+    """
+
+    by_shown_clues: dict[str, Cell]
+    by_distance: dict[str, Cell]
+
+
+class LengthCell(msgspec.Struct, frozen=True):
+    """The scores of samples with a context of about one length, and their scores above guessing by scorer."""
+
+    cell: Cell
+    above_guessing: dict[str, float | None]
+
+
 class SkippedSummary(msgspec.Struct, frozen=True):
     """The number of samples that were not asked, by reason; and the mean by metric if they were counted as wrong."""
 
@@ -82,6 +117,10 @@ class TaskSummary(msgspec.Struct, frozen=True):
         simulator: simulator that rendered the frames; None if the set does not say.
         by_clues: cells of the columns of Table 4; of absence questions, which are in the total too; and of open-ended
             questions, which are in the other columns too.
+        by_file: cells by question file, in a set of several.
+        evidence: cells by what was shown of the evidence: of all samples ("total"), and of each file.
+        by_length: cells by thousand tokens of the context ("32-64").
+        above_guessing: the share of what cannot be guessed that the replies got, by scorer.
         format_failures: number of replies that are not of the form asked for, by reason.
         below_full_marks: samples with a score below 1, by metric.
         scores: scores by metric and trajectory, in the order of the samples' keys, by which runs are paired.
@@ -94,6 +133,10 @@ class TaskSummary(msgspec.Struct, frozen=True):
     by_clues: dict[str, Cell]
     by_question_type: dict[str, Cell]
     by_variant: dict[str, Cell]
+    by_file: dict[str, Cell]
+    evidence: dict[str, EvidenceCells]
+    by_length: dict[str, LengthCell]
+    above_guessing: dict[str, AboveGuessing]
     skipped: SkippedSummary
     yes_no: YesNo
     format_failures: dict[str, int]
@@ -129,6 +172,8 @@ def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
 
 def _task(records: Sequence[Record], about: Mapping[str, Any]) -> TaskSummary:
     metrics = list(about["metrics"]["names"])
+    names = sorted({record.payload.file for record in records} - {""})
+    files = {name: [record for record in records if record.payload.file == name] for name in names}
     return TaskSummary(
         n=len(records),
         context=about["config"]["dataset_kwargs"]["context"],
@@ -137,6 +182,10 @@ def _task(records: Sequence[Record], about: Mapping[str, Any]) -> TaskSummary:
         by_clues=_by_clues(records, metrics),
         by_question_type=_group(records, metrics, lambda record: record.payload.question_type or "untyped"),
         by_variant=_group(records, metrics, lambda record: record.variant or "-"),
+        by_file={name: _cell(of_file, metrics) for name, of_file in files.items()},
+        evidence={name: _evidence(of_file, metrics) for name, of_file in {"total": records, **files}.items()},
+        by_length=_by_length(records, metrics),
+        above_guessing=_above_guessing(records, metrics),
         skipped=_summarise_skipped(records, metrics, about["skipped"]),
         yes_no=yes_no(records),
         format_failures=format_failures(records, about["decoding"]["max_new_tokens"]),
@@ -175,6 +224,54 @@ def _is_open_ended(record: Record) -> bool:
 def _group(records: Sequence[Record], metrics: Sequence[str], name_of: Callable[[Record], str]) -> dict[str, Cell]:
     names = sorted({name_of(record) for record in records})
     return {name: _cell([r for r in records if name_of(r) == name], metrics) for name in names}
+
+
+def _evidence(records: Sequence[Record], metrics: Sequence[str]) -> EvidenceCells:
+    return EvidenceCells(
+        by_shown_clues=_in_order(records, metrics, _share_shown, SHOWN_CLUES),
+        by_distance=_in_order(records, metrics, _distance, DISTANCES),
+    )
+
+
+def _in_order(
+    records: Sequence[Record], metrics: Sequence[str], name_of: Callable[[Record], str | None], names: Sequence[str]
+) -> dict[str, Cell]:
+    """Return the cells of the groups that have samples, in the order of their names; some samples are in none."""
+    chosen = {name: [record for record in records if name_of(record) == name] for name in names}
+    return {name: _cell(of_group, metrics) for name, of_group in chosen.items() if of_group}
+
+
+def _by_length(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, LengthCell]:
+    cells = {}
+    for name, cell in _in_order(records, metrics, _length, LENGTHS).items():
+        chosen = [record for record in records if _length(record) == name]
+        cells[name] = LengthCell(cell, {name: item.mean for name, item in _above_guessing(chosen, metrics).items()})
+    return cells
+
+
+def _above_guessing(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, AboveGuessing]:
+    return {name: above_guessing(records, name) for name in metrics if name in SCORERS}
+
+
+def _share_shown(record: Record) -> str | None:
+    clues = record.payload.shown_clues
+    if clues is None:
+        return None
+    return SHOWN_CLUES[0 if clues.n_shown == clues.n_clues else 1 if clues.n_shown else 2]
+
+
+def _distance(record: Record) -> str | None:
+    clues = record.payload.shown_clues
+    return None if clues is None or clues.n_after is None else _bin_of(clues.n_after, _DISTANCES, DISTANCES)
+
+
+def _length(record: Record) -> str | None:
+    tokens = record.tokens.context
+    return None if tokens is None else _bin_of(tokens / 1000, _LENGTHS, LENGTHS)
+
+
+def _bin_of(value: float, edges: Sequence[int], names: Sequence[str]) -> str:
+    return names[bisect_right(edges, value) - 1]
 
 
 def _cell(records: Sequence[Record], metrics: Sequence[str]) -> Cell:

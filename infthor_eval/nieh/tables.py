@@ -4,6 +4,8 @@ from collections.abc import Iterator, Sequence
 
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.effective_length import effective_lengths
+from infthor_eval.nieh.evidence_tables import above_guessing_cell, above_guessing_notes, evidence_tables
 from infthor_eval.nieh.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
@@ -29,10 +31,19 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return the tables of runs: by depth and by clues, the gains over blank frames, and the form of the replies.
 
     Published rows by clues are below ours; a published table of other columns (question types) is a table with ours in
-    it. The tables by depth and of gains need a task with depths, and a pair of runs on true and on blank frames.
+    it. The tables by depth and of gains need a task with depths, and a pair of runs on true and on blank frames. Those
+    of the evidence and of the effective length are there if a task shows part of a trajectory.
     """
     others = [_beside(table, runs) for table in published_tables("nieh") if not _is_by_clues(table)]
-    return [*_depth_table(runs), *others, clues_table(runs), *_gains_table(runs), _replies_table(runs)]
+    return [
+        *_depth_table(runs),
+        *others,
+        clues_table(runs),
+        *_gains_table(runs),
+        *evidence_tables(runs),
+        *effective_lengths(runs),
+        _replies_table(runs),
+    ]
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
@@ -85,12 +96,14 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
     """Return the accuracy by number of clues: a row per run, task and metric, then the published rows."""
-    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", OPEN_ENDED, ABSENCE, "n", "skipped", "failed")
+    apart = (OPEN_ENDED, ABSENCE, "above guessing")
+    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", "skipped", "failed")
     rows = [row for run in runs for row in _rows_of(run)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
     columns = (*_NAMES, _METRIC, *map(Column, numbers))
-    return Table("NIEH accuracy, % by number of clues (questions)", columns, tuple(rows), (*_LEGEND, *_notes(runs)))
+    notes = (*_LEGEND, *above_guessing_notes(runs), *_notes(runs))
+    return Table("NIEH accuracy, % by number of clues (questions)", columns, tuple(rows), notes)
 
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
@@ -111,7 +124,8 @@ def _cells(task: TaskSummary, metric: str) -> list[str]:
         [_mean_of(task.by_clues[name], metric) for name in names]
         for names in (CLUE_COLUMNS[:-1], (OPEN_ENDED, ABSENCE))
     )
-    return [*by_clues, _mean(total, metric), *_intervals(total, metric), *apart, str(total.n), *_left_out(task)]
+    above = above_guessing_cell(task.above_guessing.get(metric))
+    return [*by_clues, _mean(total, metric), *_intervals(total, metric), *apart, above, str(total.n), *_left_out(task)]
 
 
 def _intervals(cell: Cell, metric: str) -> tuple[str, str]:

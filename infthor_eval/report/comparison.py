@@ -62,10 +62,28 @@ def _compare_task(
     scores = [(suite.scores(ours), suite.scores(theirs)) for ours, theirs in pairs]
     clusters = [ours.cluster for ours, _ in pairs]
     for metric in dict.fromkeys(name for pair in scores for of_run in pair for name in of_run):
-        first, second = ([pair[place].get(metric, 0.0) for pair in scores] for place in (0, 1))
-        is_share = presenter.is_share(metric, [*first, *second])
-        means = sum(first) / len(first), sum(second) / len(second)
-        yield Comparison(task, metric, is_share, *means, paired_difference(first, second, clusters), n_unshared)
+        # A unit without results has no scores, and counts as 0.
+        both = [(ours.get(metric, 0.0), theirs.get(metric, 0.0)) for ours, theirs in scores]
+        yield _compare_metric(presenter, task, metric, both, clusters, n_unshared)
+    further = [(presenter.further_scores(ours), presenter.further_scores(theirs)) for ours, theirs in pairs]
+    for metric in dict.fromkeys(name for ours, theirs in further for name in ours if name in theirs):
+        chosen = [place for place, (ours, theirs) in enumerate(further) if metric in ours and metric in theirs]
+        both = [(further[place][0][metric], further[place][1][metric]) for place in chosen]
+        yield _compare_metric(presenter, task, metric, both, [clusters[place] for place in chosen], n_unshared)
+
+
+def _compare_metric(
+    presenter: Presenter,
+    task: str,
+    metric: str,
+    scores: Sequence[tuple[float, float]],
+    clusters: Sequence[str],
+    n_unshared: int,
+) -> Comparison:
+    first, second = map(list, zip(*scores, strict=True))
+    is_share = presenter.is_share(metric, [*first, *second])
+    means = sum(first) / len(first), sum(second) / len(second)
+    return Comparison(task, metric, is_share, *means, paired_difference(first, second, clusters), n_unshared)
 
 
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:

@@ -35,6 +35,10 @@ class PlainPresenter:
         """See `Presenter.is_share`: a metric with a value below 0 or above 1 is none."""
         return all(0 <= score <= 1 for score in scores)
 
+    def further_scores(self, record: UnitRecord[Any]) -> Mapping[str, float]:
+        """See `Presenter.further_scores`: none."""
+        return {}
+
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """See `Presenter.charts`: none."""
         return ()

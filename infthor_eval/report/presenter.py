@@ -229,6 +229,9 @@ class Presenter(Protocol):
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """Whether a metric with these scores is a share, which is shown in percent; others are shown as they are."""
 
+    def further_scores(self, record: Record) -> Mapping[str, float]:
+        """Return scores that not every sample has, by name; runs are compared in them on the samples that have them."""
+
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """Draw the charts of the suite's section; its tables are `Suite.tables`."""
 

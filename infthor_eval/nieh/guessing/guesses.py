@@ -31,26 +31,23 @@ def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
     Of each file and form the guesser with the highest mean counts, for each scorer of its own; so the guess is rather
     too good than too bad.
     """
-    files = questions_by_file(data)
     guesses: dict[str, Guess] = {}
-    for file, questions in files.items():
+    for questions in questions_by_file(data).values():
         samples = [sample_on_clues(question) for question in questions]
         by_guesser = [
             [scores(reply, question.answers) for reply, question in zip(guesser.guess(samples), questions, strict=True)]
             for guesser in GUESSERS
             if guesser.knows in knowledge
         ]
-        prefix = f"{file}: " if len(files) > 1 else ""
-        guesses |= _best_by_form(questions, by_guesser, prefix)
+        guesses |= _best_by_form(questions, by_guesser)
     return guesses
 
 
 def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
-    """Return the questions that can be asked by the name of their file."""
-    files = {question.id: file for file, questions in reversed(data.files.items()) for question in questions}
+    """Return the questions that can be asked by the name of their file; empty if the set has one file alone."""
     by_file: dict[str, list[Question]] = {}
     for question in data.questions:
-        by_file.setdefault(files[question.id], []).append(question)
+        by_file.setdefault(question.file, []).append(question)
     return by_file
 
 
@@ -59,7 +56,7 @@ def sample_on_clues(question: Question) -> Sample:
     return Sample(question, tuple(sorted(question.clues)))
 
 
-def _best_by_form(questions: Sequence[Question], by_guesser: Sequence[_Scores], prefix: str) -> dict[str, Guess]:
+def _best_by_form(questions: Sequence[Question], by_guesser: Sequence[_Scores]) -> dict[str, Guess]:
     places: dict[str, list[int]] = {}
     for place, question in enumerate(questions):
         places.setdefault(form_of(question), []).append(place)
@@ -69,7 +66,7 @@ def _best_by_form(questions: Sequence[Question], by_guesser: Sequence[_Scores], 
         means = {scorer: _mean(scored, of_form, scorer) for scorer, scored in best.items()}
         for place in of_form:
             own = {scorer: scored[place][scorer] for scorer, scored in best.items()}
-            guesses[questions[place].id] = Guess(form=prefix + form, scores=own, form_scores=means)
+            guesses[questions[place].id] = Guess(form=form, scores=own, form_scores=means)
     return guesses
 
 

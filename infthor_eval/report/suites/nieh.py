@@ -3,7 +3,9 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from infthor_eval.nieh.above_guessing import score_above_guessing
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Timelines
 from infthor_eval.report.runs import ReportRun
@@ -28,6 +30,11 @@ class NiehPresenter(PlainPresenter):
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""
         return True
+
+    def further_scores(self, record: Record) -> Mapping[str, float]:
+        """See `Presenter.further_scores`: scores above guessing, of questions that guessing does not solve."""
+        scores = {scorer: score_above_guessing(record.payload, scorer) for scorer in SCORERS}
+        return {f"{scorer}, above guessing": score for scorer, score in scores.items() if score is not None}
 
     def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
         """See `Presenter.charts`."""
