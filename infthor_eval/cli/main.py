@@ -31,8 +31,9 @@ _COMMANDS = {
         "compare": "Compare two runs on the same data.",
         "report": "Write a page with results and all samples, or a figure of the paper.",
         "watch": "Write a video of an agent or an arm.",
-        "import-replies": "Score replies that others made, as a run.",
+        "import-replies": "Store replies and counts of plans that others made, as runs.",
         "table4": "Compute the paper's Table 4 from the published question files.",
+        "table-final": "Compute the paper's table of final tasks from the published plan logs.",
     },
     "Make data": {
         "generate": "Generate long-horizon trajectories in a scene.",

@@ -1,4 +1,4 @@
-"""Numbers reported in the paper, as data: `results/published/*.yaml`. A new table is a new file.
+"""Numbers that the authors published, as data: `results/published/*.yaml`. A new table is a new file.
 
 A row is compared with a run if the run's checkpoint has one of the row's names and about as many parameters. The name
 alone is not enough: one adapter runs a 3B and a 7B checkpoint, and a local folder can have any name.
@@ -25,17 +25,21 @@ class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         checkpoints: hub ids of the evaluated checkpoints.
-        parameters: number of parameters of the checkpoint, in billions.
+        parameters: number of parameters of the checkpoint, in billions; None if it is not known.
         values: one number per column, in percent.
+        source: origin of the row, if it is not that of the table.
         match: column of the published question files with the scores behind the row, if they have it.
+        log: model in the name of the published plan log behind the row, if there is one.
         misprints: by column, the number that the row should have; only where the printed one is known to be wrong.
     """
 
     name: str
     checkpoints: tuple[str, ...]
-    parameters: float
+    parameters: float | None
     values: tuple[float, ...]
+    source: str | None = None
     match: str | None = None
+    log: str | None = None
     misprints: Mapping[str, float] = {}
 
     def matches(self, model: Mapping[str, Any]) -> bool:
@@ -44,19 +48,22 @@ class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if checkpoint not in {name.rpartition("/")[2].lower() for name in self.checkpoints}:
             return False
         count = model.get("n_parameters")
-        return count is None or abs(count / 1e9 - self.parameters) <= _SAME_SIZE * self.parameters
+        if count is None or self.parameters is None:
+            return True
+        return abs(count / 1e9 - self.parameters) <= _SAME_SIZE * self.parameters
 
 
 class PublishedTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A table of the paper.
+    """A table of the paper, or one of numbers that are published elsewhere.
 
     Attributes:
         title: short name ("Table 4").
-        source: paper and table that the numbers are from.
+        source: paper and table, or the file, that the numbers are from.
         suite: suite whose results can be compared with the table.
         context: evaluated setting (for NIEH: the context).
-        columns: names of the columns, as in the suite's summary.
+        columns: names of the columns, as in the suite's summary if it has them.
         rows: rows in the paper's order.
+        notes: what is to be known about the numbers, such as other published ones; shown below them.
     """
 
     title: str
@@ -66,6 +73,7 @@ class PublishedTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     metric: str
     columns: tuple[str, ...]
     rows: tuple[PublishedRow, ...]
+    notes: tuple[str, ...] = ()
 
 
 @cache

@@ -32,7 +32,7 @@ def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 def _success_table(runs: Sequence[RunSummary]) -> Table:
     """Return the success by kind, with a row for each radius of a run's tasks."""
-    rows = []
+    rows, notes = [], [*result_notes(runs)]
     for run in runs:
         tasks = list(run.summary.tasks.values())
         by_kind = [[task for task in tasks if task.kind == kind] for kind in ManipulationKind]
@@ -42,9 +42,10 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
         for row in table.rows:
             values = (f"{value:.2f}" for value in row.values)
             rows.append(Row((row.name, f"published, {table.title}", *values), is_published=True))
+        notes += table.notes
     names = ("Pick-up", "Put", "pick-ups", "puts", "trajectories", "excluded", "skipped", "failed")
     columns = (Column("model", False), Column("radius, m", False), *map(Column, names))
-    return Table("Low-level manipulation, success %", columns, tuple(rows), result_notes(runs))
+    return Table("Low-level manipulation, success %", columns, tuple(rows), tuple(notes))
 
 
 def _cells(pair: Sequence[ArmTaskSummary | None]) -> Iterator[str]:

@@ -8,7 +8,7 @@ from infthor_eval.nieh.summary import DISTANCES, SHOWN_CLUES, Cell, EvidenceCell
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
 
-__all__ = ["above_guessing_cell", "above_guessing_notes", "evidence_tables"]
+__all__ = ["above_guessing_cell", "above_guessing_notes", "evidence_tables", "short_name"]
 
 _WITH_INTERVAL = "In brackets: 95 % interval, clustered by trajectory; in parentheses: questions."
 
@@ -29,6 +29,11 @@ def evidence_tables(runs: Sequence[RunSummary]) -> list[Table]:
         title = "Accuracy, % by frames between the last clue and the end of the trajectory (questions)"
         tables.append(_table(title, distances, far))
     return tables
+
+
+def short_name(file: str) -> str:
+    """Return the name of a question file in tables."""
+    return file.removeprefix("qa_set_")
 
 
 def above_guessing_cell(above: AboveGuessing | None) -> TableCell:

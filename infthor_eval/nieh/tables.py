@@ -5,7 +5,12 @@ from collections.abc import Iterator, Sequence
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.effective_length import effective_lengths
-from infthor_eval.nieh.evidence_tables import above_guessing_cell, above_guessing_notes, evidence_tables
+from infthor_eval.nieh.evidence_tables import (
+    above_guessing_cell,
+    above_guessing_notes,
+    evidence_tables,
+    short_name,
+)
 from infthor_eval.nieh.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
@@ -30,11 +35,17 @@ _EMBEDDED = (
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return the tables of runs: by depth and by clues, the gains over blank frames, and the form of the replies.
 
-    Published rows by clues are below ours; a published table of other columns (question types) is a table with ours in
-    it. The tables by depth and of gains need a task with depths, and a pair of runs on true and on blank frames. Those
-    of the evidence and of the effective length are there if a task shows part of a trajectory.
+    Published rows by clues are below ours; a published table of other columns (question types, question files) is a
+    table of its own beside runs in its context, with ours in it where they have its columns. The tables by depth and
+    of gains need a task with depths, and a pair of runs on true and on blank frames. Those of the evidence and of the
+    effective length are there if a task shows part of a trajectory.
     """
-    others = [_beside(table, runs) for table in published_tables("nieh") if not _is_by_clues(table)]
+    contexts = {task.context for _, _, task in _tasks(runs)}
+    others = [
+        _beside(table, runs)
+        for table in published_tables("nieh")
+        if not _is_by_clues(table) and table.context in contexts
+    ]
     return [
         *_depth_table(runs),
         *others,
@@ -98,12 +109,12 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
     """Return the accuracy by number of clues: a row per run, task and metric, then the published rows."""
     apart = (OPEN_ENDED, ABSENCE, "above guessing")
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", "skipped", "failed")
-    rows = [row for run in runs for row in _rows_of(run)]
+    rows, notes = [row for run in runs for row in _rows_of(run)], [*_LEGEND, *above_guessing_notes(runs)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
+        notes += table.notes
     columns = (*_NAMES, _METRIC, *map(Column, numbers))
-    notes = (*_LEGEND, *above_guessing_notes(runs), *_notes(runs))
-    return Table("NIEH accuracy, % by number of clues (questions)", columns, tuple(rows), notes)
+    return Table("NIEH accuracy, % by number of clues (questions)", columns, tuple(rows), (*notes, *_notes(runs)))
 
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
@@ -188,17 +199,21 @@ def _difference(cell: Cell, value: float | None, metric: str) -> str:
 
 
 def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
-    """Return the published rows, and the runs that asked in the same context."""
+    """Return the published rows, and the runs that asked in the same context and have one of the columns."""
     rows = [
-        Row((row.name, table.context, table.metric, *(f"{value:.2f}" for value in row.values)), is_published=True)
+        Row((row.name, row.source or table.context, table.metric, *map("{:.2f}".format, row.values)), is_published=True)
         for row in table.rows
     ]
     for run, name, task in _tasks([run for run in runs if frames_of(run) == SHOWN]):
         if task.context == table.context and table.metric in task.metrics:
-            cells = task.by_clues | task.by_question_type | task.by_variant
+            by_file = {short_name(file): cell for file, cell in task.by_file.items()}
+            cells = task.by_clues | task.by_question_type | task.by_variant | by_file
+            if not cells.keys() & set(table.columns):
+                continue
             means = [_mean(cells[column], table.metric) if column in cells else "-" for column in table.columns]
             rows.append(Row((run, name, table.metric, *means)))
-    return Table(f"{table.title}: {table.source}", (*_NAMES, _METRIC, *map(Column, table.columns)), tuple(rows))
+    columns = (*_NAMES, _METRIC, *map(Column, table.columns))
+    return Table(f"{table.title}: {table.source}", columns, tuple(rows), (*table.notes, *_notes(runs)))
 
 
 # -- gain by frames

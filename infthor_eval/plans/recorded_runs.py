@@ -1,9 +1,10 @@
 """Recorded runs of plans, and the plans that several of them have in common."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
-from infthor_eval.episodes.recorded_runs import RecordedRun, TaskConfig
+from infthor_eval.episodes.recorded_runs import RecordedRun, RunConfig, TaskConfig
 from infthor_eval.episodes.shared_units import SharedUnits, difference_notes, shared_tasks, shared_units
 from infthor_eval.errors import UsageError
 from infthor_eval.plans.records import RECORDS, PlanRecord
@@ -12,10 +13,13 @@ __all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
 
 
 class PlanTaskConfig(TaskConfig, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules` decodes it."""
+    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules` decodes it.
+
+    Both are None for imported counts.
+    """
 
     rewards: Any
-    after_failure: str
+    after_failure: str | None
 
 
 class PlansRun(RecordedRun[PlanRecord, PlanTaskConfig]):
@@ -25,6 +29,14 @@ class PlansRun(RecordedRun[PlanRecord, PlanTaskConfig]):
     record_types = RECORDS
     task_config = PlanTaskConfig
     planner = "planner"
+
+    @cached_property
+    def config(self) -> RunConfig[PlanTaskConfig]:
+        """See `RecordedRun.config`; raises UsageError if the run has counts alone."""
+        config = super().config
+        if any(task.rewards is None for task in config.tasks.values()):
+            raise UsageError(f"{self.label}: imported counts have no steps and no rewards; give runs made here")
+        return config
 
 
 def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[PlanRecord]:

@@ -30,6 +30,9 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="plan"):
     """One plan, and what an agent did in it; `kind` is that of the plan ("PickupObject"), `ended` see `Ended`.
 
+    A plan from imported counts (`infthor_eval.plans.imported_counts`) has its kind and whether it was done, no more:
+    the goal is empty, and all numbers but its index are 0.
+
     Attributes:
         goal: goal of its task, in words.
         task: index of its task in the trajectory.

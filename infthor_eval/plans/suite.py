@@ -36,9 +36,12 @@ class PlansSuite:
         return summarise_plans(header.config, records)
 
     def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:
-        """See `Suite.scores`: whether the plan was completed, and its reward."""
+        """See `Suite.scores`: whether the plan was completed, and its reward if there are rewards."""
         payload = record.payload
-        return {"success": float(payload.done), "reward": payload.reward} if payload.attempted else {}
+        if not payload.attempted:
+            return {}
+        reward = {} if payload.max_reward is None else {"reward": payload.reward}
+        return {"success": float(payload.done), **reward}
 
     def primary_metrics(self, summary: PlansSummary) -> Mapping[str, Rate]:
         """See `Suite.primary_metrics`: share of completed plans."""

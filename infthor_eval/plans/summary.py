@@ -29,7 +29,7 @@ FINAL_COLUMNS = tuple(_COLUMNS)  # of the paper's table of final tasks
 
 
 class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
-    """Results of one task.
+    """Results of one task; those of rewards, goals and actions are None for imported counts.
 
     Attributes:
         n_plans: plans that count; a failed one earns nothing.
@@ -49,7 +49,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     reward: Rate | None
     max_reward: Rate | None
     goals: Rate | None
-    n_actions: int
+    n_actions: int | None
 
 
 PlansSummary = EpisodesSummary[PlanTaskSummary]
@@ -62,16 +62,18 @@ def summarise_plans(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
 
 def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> PlanTaskSummary:
     counted = counted_records(records)
+    has_steps = config["rewards"] is not None  # which imported counts have not
+    acted = counted if has_steps else []
     return PlanTaskSummary(
         **common_results(config, records),
         n_plans=len(counted),
         success={name: rate for name, kinds in _COLUMNS.items() if (rate := _success(counted, kinds))},
         by_kind={str(kind): rate for kind in PlanKind if (rate := _success(counted, frozenset({kind})))},
-        reward_share=_rate_of_trajectories(counted, lambda reward, most: reward / most if most else 0.0),
-        reward=_rate_of_trajectories(counted, lambda reward, _: reward),
-        max_reward=_rate_of_trajectories(counted, lambda _, most: most),
-        goals=_goals(counted),
-        n_actions=sum(len(record.payload.steps) for record in counted),
+        reward_share=_rate_of_trajectories(acted, lambda reward, most: reward / most if most else 0.0),
+        reward=_rate_of_trajectories(acted, lambda reward, _: reward),
+        max_reward=_rate_of_trajectories(acted, lambda _, most: most),
+        goals=_goals(acted),
+        n_actions=sum(len(record.payload.steps) for record in acted) if has_steps else None,
     )
 
 

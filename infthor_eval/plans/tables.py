@@ -25,7 +25,7 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
 def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return all tables of some runs."""
     tasks = list(named_tasks(runs))
-    endings = endings_table("How plans ended", tasks, "actions", lambda task: task.n_actions)
+    endings = endings_table("How plans ended", tasks, "actions", _actions)
     return [_success_table(runs, tasks), _reward_table(tasks), endings]
 
 
@@ -35,13 +35,15 @@ def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, P
         Row((*names, *(format_percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
         for *names, task in tasks
     ]
+    notes = [*result_notes(runs)]
     if any(_has_final_task(run) for run in runs):
         for table in published_tables("plans"):
             for row in table.rows:
                 values = (f"{value:.1f}" for value in row.values)
                 rows.append(Row((row.name, f"published, {table.title}", *values), is_published=True))
+            notes += (f"Published, {table.title}: {note}" for note in table.notes)
     columns = (*NAME_COLUMNS, *map(Column, (*FINAL_COLUMNS, "plans", "trajectories", "excluded", "skipped", "failed")))
-    return Table("Plans completed, %", columns, tuple(rows), result_notes(runs))
+    return Table("Plans completed, %", columns, tuple(rows), tuple(notes))
 
 
 def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
@@ -51,6 +53,10 @@ def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
         rows.append(Row((*names, *of_trajectory, format_percent(task.goals))))
     columns = (*NAME_COLUMNS, *map(Column, ("reward", "at most", "% of it", "goals reached, %")))
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows))
+
+
+def _actions(task: PlanTaskSummary) -> str:
+    return "-" if task.n_actions is None else str(task.n_actions)
 
 
 def _sizes(task: PlanTaskSummary) -> tuple[str, ...]:

@@ -119,6 +119,31 @@ def test_what_is_in_a_name_is_shown_as_text():
     assert any(row[:1] == ["[red]run[/red]"] for row in shown(run))
 
 
+def beside(*runs):
+    return [table for table in tables(runs) if table.title.startswith("NIEH on full trajectories")]
+
+
+def test_published_rows_by_file_are_a_table_of_their_own_beside_runs_in_their_context():
+    (table,) = beside(run_of(identity(context="trajectory"), [record(0, "mug")]))
+    assert [column.name for column in table.columns] == [
+        "model",
+        "task",
+        "scorer",
+        "nieh_single_clue",
+        "nsieh_multi_clue",
+    ]
+    assert all(row.is_published for row in table.rows)  # no column of ours is a file
+    assert [(row.cells[0], *row.cells[3:]) for row in table.rows] == [
+        ("Qwen2.5-VL 7B", "47.35", "36.60"),
+        ("Gemini 2.0 Flash", "67.36", "30.94"),
+        ("Qwen2.5-VL 7B", "55.86", "42.72"),
+    ]
+    assert "Both stand" in table.notes[0]
+    assert beside(run_of(identity(), [record(0, "mug")])) == []
+    (simulated,) = beside(run_of(identity(context="trajectory", simulator="embedded"), [record(0, "mug")]))
+    assert "not comparable" in simulated.notes[-1]
+
+
 # -- gain by frames
 
 

@@ -1,5 +1,6 @@
-"""`infthor-eval import-replies`: replies that others made, as runs."""
+"""`infthor-eval import-replies`: what others made, as runs: replies to questions, and counts of plans."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,29 +10,49 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
 
 if TYPE_CHECKING:
-    from infthor_eval.nieh.imported_replies import ImportedRun
+    from infthor_eval.cli.results import RunResults
 
 __all__ = ["command"]
-
-_SHOWN = 3  # rows that are named for each reason
 
 
 @click.command(
     "import-replies", cls=ExampleCommand, example="infthor-eval import-replies LOG --data SET --output results"
 )
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
-@click.option("--data", type=PATH, required=True, metavar="SET", help="Folder of the NIEH set that the logs are about.")
+@click.option("--data", type=PATH, metavar="SET", help="Folder of the NIEH set that the replies are about.")
 @click.option("--model", metavar="NAME", help="Name of the model. Default: the one in the names of published logs.")
 @click.option("--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs.")
-def command(logs: tuple[Path, ...], data: Path, model: str | None, output: Path) -> int:
-    """Score replies to NIEH questions that others made, and store them as runs.
+def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path) -> int:
+    """Score replies to NIEH questions that others made, and store them as runs; counts of plans too.
 
-    LOG is a published log, lm-eval's samples, or has a JSON object a line with question_id and reply. SET needs no
-    frames. Logs of one model in one mode become one run, which `show`, `compare` and `report` read like any other. A
-    row that answers no question of SET is counted and named; the exit code is then 1.
+    LOG is a published log of replies or of plans, lm-eval's samples, or has a JSON object a line with question_id and
+    reply. SET needs no frames; logs of plans need no SET. Logs of one model in one mode become one run, which `show`,
+    `compare` and `report` read like any other. A row that answers no question of SET is counted and named; the exit
+    code is then 1.
     """
     from infthor_eval.cli.options.show import ShowOptions
-    from infthor_eval.cli.results import RunResults, print_results
+    from infthor_eval.cli.results import print_results
+    from infthor_eval.errors import UsageError
+    from infthor_eval.formats.plan_logs import is_plan_log
+
+    of_plans = [log for log in logs if is_plan_log(log)]
+    of_replies = [log for log in logs if log not in of_plans]
+    if of_replies and data is None:
+        raise UsageError(f"{of_replies[0]}: has replies to questions; give their NIEH set with --data")
+    imported = [*_import_plans(of_plans, model, output)]
+    if data is not None:
+        imported += _import_replies(of_replies, data, model, output)
+    print_results([results for results, _ in imported], ShowOptions())
+    return 1 if any(n_refused for _, n_refused in imported) else 0
+
+
+def _import_replies(
+    logs: Sequence[Path], data: Path, model: str | None, output: Path
+) -> Iterator[tuple["RunResults", int]]:
+    """Yield the results of the runs of logs of replies, and the number of rows that are not imported."""
+    from infthor_eval.cli.progress.notes import print_note
+    from infthor_eval.cli.progress.refused_lines import print_refused
+    from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.imported_replies import import_logs
     from infthor_eval.nieh.suite import NiehSuite
@@ -39,26 +60,35 @@ def command(logs: tuple[Path, ...], data: Path, model: str | None, output: Path)
     from infthor_eval.runs.stored_run import store_run
 
     questions, suite = NiehSet(data), NiehSuite()
-    results, n_refused = [], 0
     for run in import_logs(logs, questions, model):
         folder, summary = store_run(output, run.header(questions), suite, run.records, run.n_missing)
-        _print_counts(run)
-        results.append(RunResults(folder, suite, summary, NOTHING, run.n_missing))
-        n_refused += len(run.refused)
-    print_results(results, ShowOptions())
-    return 1 if n_refused else 0
+        name = f"{run.model}, {run.task}"
+        counts = f"{run.n_missing} of {len(run.question_ids)} questions without one"
+        print_note(f"{name}: {len(run.records)} replies imported, {counts}")
+        for what, rows in (("not imported", run.refused), ("scored otherwise than logged", run.rescored)):
+            print_refused(name, what, [(row.log, row.line, row.reason) for row in rows])
+        yield RunResults(folder, suite, summary, NOTHING, run.n_missing), len(run.refused)
 
 
-def _print_counts(run: "ImportedRun") -> None:
+def _import_plans(logs: Sequence[Path], model: str | None, output: Path) -> Iterator[tuple["RunResults", int]]:
+    """Yield the results of the runs of logs of plans, and the number of rows that are not imported."""
     from infthor_eval.cli.progress.notes import print_note
+    from infthor_eval.cli.progress.refused_lines import print_refused
+    from infthor_eval.cli.results import RunResults
+    from infthor_eval.formats.plan_logs import read_plan_log
+    from infthor_eval.plans.imported_counts import import_counts
+    from infthor_eval.plans.suite import PlansSuite
+    from infthor_eval.runs import NOTHING
+    from infthor_eval.runs.stored_run import store_run
 
-    name = f"{run.model}, {run.task}"
-    counts = f"{run.n_missing} of {len(run.question_ids)} questions without one"
-    print_note(f"{name}: {len(run.records)} replies imported, {counts}")
-    for kind, items in (("not imported", run.refused), ("scored otherwise than logged", run.rescored)):
-        if items:
-            print_note(f"{name}: {len(items)} row(s) {kind}")
-        for item in items[:_SHOWN]:
-            print_note(f"  {item.log.name}, line {item.line}: {item.reason}")
-        if len(items) > _SHOWN:
-            print_note(f"  and {len(items) - _SHOWN} more in {len({item.log for item in items})} log(s)")
+    suite = PlansSuite()
+    for run in [import_counts(read_plan_log(log), model) for log in logs]:
+        folder, summary = store_run(output, run.header, suite, run.records, n_missing=0)
+        name, path = run.header.name, run.log.path
+        n_trajectories = len({record.cluster for record in run.records})
+        print_note(
+            f"{name}: {len(run.records)} plans of {n_trajectories} trajectories imported; the set-up of "
+            f"{run.n_failed_set_ups} more failed"
+        )
+        print_refused(name, "not imported", [(path, row.line, row.reason) for row in run.refused])
+        yield RunResults(folder, suite, summary, NOTHING, 0), len(run.refused)

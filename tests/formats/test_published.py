@@ -1,0 +1,78 @@
+"""Published numbers against the published files that they are from, counted without our readers."""
+
+import gzip
+import json
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.formats.published import published_tables
+
+PUBLISHED = Path(__file__).parents[2] / "../shared/data/published_sets"
+needs_logs = pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
+REPLIES = "eval_qa_set_{}_clue_Qwen2.5-VL-7B-Instruct_full_traj{}.log.gz"
+
+
+def rows_of(path):
+    with gzip.open(path) as lines:
+        return [json.loads(line) for line in lines]
+
+
+def table(suite, title):
+    (found,) = [table for table in published_tables(suite) if table.title == title]
+    return found
+
+
+@pytest.mark.parametrize("suite", ["nieh", "plans", "manipulation", "training"])
+def test_every_table_has_a_source_and_a_title_of_its_own(suite):
+    tables = published_tables(suite)
+    assert len({table.title for table in tables}) == len(tables) > 0
+    assert all("pearls-lab/infini-thor" in table.source for table in tables)
+
+
+@needs_logs
+@pytest.mark.parametrize(
+    ("title", "row", "mode"),
+    [
+        ("NIEH on full trajectories", 2, ""),
+        ("NIEH on the end of trajectories", 0, "_truncate_head_32K"),
+        ("NIEH on retrieved frames", 1, "_clip_retrieval_top20"),
+    ],
+)
+def test_means_of_replies_are_those_of_the_logs(title, row, mode):
+    published = table("nieh", title)
+    scores = [
+        [reply["score"] for reply in rows_of(PUBLISHED / "replies" / REPLIES.format(file, mode))]
+        for file in ("nieh_single", "nsieh_multi")
+    ]
+    assert published.columns == ("nieh_single_clue", "nsieh_multi_clue")
+    assert tuple(round(100 * sum(given) / len(given), 2) for given in scores) == published.rows[row].values
+
+
+def test_two_figures_that_disagree_both_stand_and_that_is_said():
+    published = table("nieh", "NIEH on full trajectories")
+    ours = {row.source: row.values for row in published.rows if row.name == "Qwen2.5-VL 7B"}
+    assert list(ours.values()) == [(47.35, 36.6), (55.86, 42.72)]
+    assert "do not agree" in published.notes[0]
+
+
+@needs_logs
+def test_rates_of_plans_are_those_of_the_logs():
+    logs = sorted((PUBLISHED / "plans").glob("*.log.gz"))
+    rows = {row.log: row.values for row in table("plans", "logs on final tasks").rows}
+    assert len(logs) == len(rows) == 7
+    for log in logs:
+        name = log.name.removeprefix("eval_longhrz_checkpoints_").removesuffix(".log.gz").rstrip("_")
+        counts = Counter()
+        for row in rows_of(log):
+            counts.update(row["metric"])
+        rates = [counts[f"{kind}_success"] / counts[f"{kind}_count"] for kind in ("goto", "pick", "put")]
+        rates.append(counts["success_count"] / counts["total_count"])
+        assert tuple(round(100 * rate, 1) for rate in rates) == rows[name], name
+
+
+def test_the_model_of_the_final_tasks_is_qwen():
+    rows = [row for table in published_tables("plans") for row in table.rows]
+    assert {row.name.partition(",")[0] for row in rows} == {"Qwen2.5-VL 7B"}
+    assert {row.parameters for row in rows} == {8.29}
