@@ -32,6 +32,7 @@ _COMMANDS = {
         "report": "Write a page with results and all samples, or a figure of the paper.",
         "watch": "Write a video of an agent or an arm.",
         "import-replies": "Score replies that others made, as a run.",
+        "rescore": "Score the replies of a run again, also with your own scorer or a judge.",
         "table4": "Compute the paper's Table 4 from the published question files.",
     },
     "Make data": {

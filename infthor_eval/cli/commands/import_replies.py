@@ -35,15 +35,14 @@ def command(logs: tuple[Path, ...], data: Path, model: str | None, output: Path)
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.imported_replies import import_logs
     from infthor_eval.nieh.suite import NiehSuite
-    from infthor_eval.runs import NOTHING
     from infthor_eval.runs.stored_run import store_run
 
     questions, suite = NiehSet(data), NiehSuite()
     results, n_refused = [], 0
     for run in import_logs(logs, questions, model):
-        folder, summary = store_run(output, run.header(questions), suite, run.records, run.n_missing)
+        stored = store_run(output, run.header(questions), suite, run.make_records, run.n_missing)
         _print_counts(run)
-        results.append(RunResults(folder, suite, summary, NOTHING, run.n_missing))
+        results.append(RunResults(stored.folder, suite, stored.summary, stored.usage, run.n_missing))
         n_refused += len(run.refused)
     print_results(results, ShowOptions())
     return 1 if n_refused else 0
