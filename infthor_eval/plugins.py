@@ -1,4 +1,4 @@
-"""Classes by name, of this package and of others: a built-in table first, then entry points.
+"""Classes (and scorers, which are functions) by name, of this package and of others: a built-in table first, then entry points.
 
 A class is imported only when it is asked for, so that `--help` stays quick.
 """

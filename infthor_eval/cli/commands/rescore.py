@@ -124,7 +124,11 @@ def _print(rescoring: Rescoring, rescored: Rescored) -> None:
 def _print_counts(report: RescoringReport) -> None:
     from infthor_eval.cli.progress.notes import print_note
 
-    counts = ((report.n_without_reply, "without a reply stay failed"), (report.n_missing, "were never asked"))
+    counts = (
+        (report.n_failed, "failed by the scorer"),
+        (report.n_without_reply, "without a reply stay failed"),
+        (report.n_missing, "were never asked"),
+    )
     print_note("; ".join([f"{report.n_scored} replies scored", *(f"{n} {what}" for n, what in counts if n)]))
     for task, names in report.left_out.items():
         print_note(f"{task}: {', '.join(names)}: left out, as the journal does not say how to compute it", "yellow")
