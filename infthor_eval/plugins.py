@@ -1,6 +1,6 @@
-"""Classes by name, of this package and of others: a built-in table first, then entry points.
+"""Classes and functions by name, of this package and of others: a built-in table first, then entry points.
 
-A class is imported only when it is asked for, so that `--help` stays quick.
+They are imported only when they are asked for, so that `--help` stays quick.
 """
 
 import importlib

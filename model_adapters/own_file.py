@@ -1,4 +1,4 @@
-"""Adapters in a user's own file, `./my_adapter.py:MyModel`, which need no package."""
+"""Adapters and scorers in a user's own file, `./my_adapter.py:MyModel`, which need no package."""
 
 import re
 import sys
@@ -10,33 +10,37 @@ from typing import Any
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.digests import digest
 
-__all__ = ["class_name", "file_identity", "load_class", "names_a_file"]
+__all__ = ["file_identity", "load_from_file", "name_in_file", "names_a_file"]
 
 
 def names_a_file(name: str) -> bool:
-    """Return whether a model's name has the form FILE.py:CLASS."""
+    """Return whether a name has the form FILE.py:NAME."""
     return re.fullmatch(r".+\.py:\w+", name) is not None
 
 
-def class_name(name: str) -> str:
-    """Return the class in a name of the form FILE.py:CLASS."""
+def name_in_file(name: str) -> str:
+    """Return the second part of a name of the form FILE.py:NAME."""
     return name.rpartition(":")[2]
 
 
-def load_class(name: str) -> Any:
-    """Run the file, once for each version of its content, and return the class.
+def load_from_file(name: str, kind: str = "class") -> Any:
+    """Run the file, once for each version of its content, and return what it defines under that name.
 
-    The file cannot import its neighbours: an adapter of several files has to be a package.
+    The file cannot import its neighbours: code of several files has to be a package.
+
+    Args:
+        name: FILE.py:NAME.
+        kind: what is behind the name in words, for messages.
 
     Raises:
-        ModelError: the file or the class does not exist, or the file fails when it is imported.
+        ModelError: the file or the name in it does not exist, or the file fails when it is imported.
     """
     path = _path(name)
     module = _module(path, _source(path))
-    adapter = getattr(module, class_name(name), None)
-    if adapter is None:
-        raise ModelError(f"{path} has no class {class_name(name)}; write FILE.py:CLASS with a class in it")
-    return adapter
+    found = getattr(module, name_in_file(name), None)
+    if found is None:
+        raise ModelError(f"{path} has no {kind} {name_in_file(name)}; write FILE.py:NAME with a {kind} in it")
+    return found
 
 
 def file_identity(name: str) -> dict[str, Any]:
@@ -52,7 +56,7 @@ def file_identity(name: str) -> dict[str, Any]:
 def _path(name: str) -> Path:
     path = Path(name.rpartition(":")[0]).resolve()
     if not path.is_file():
-        raise ModelError(f"{path}: there is no such file; write FILE.py:CLASS with the file of the adapter")
+        raise ModelError(f"{path}: there is no such file; write FILE.py:NAME with a file of your own")
     return path
 
 

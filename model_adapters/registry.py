@@ -18,7 +18,7 @@ from model_adapters.adapter_identity import package_identity
 from model_adapters.built_in import BUILT_IN
 from model_adapters.check.clauses import ContractError, check_members
 from model_adapters.options import describe, parse
-from model_adapters.own_file import class_name, file_identity, load_class, names_a_file
+from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
 from model_adapters.protocols import Adapter, Model, Policy
 from model_adapters.refusals import wrap_adapter_errors
 
@@ -134,7 +134,7 @@ def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
     if name in BUILT_IN:
         return adapter.build(name, given, seed)
     with wrap_adapter_errors(f"model {name}: build() fails"):
-        return adapter.build(class_name(name) if names_a_file(name) else name, given, seed)
+        return adapter.build(name_in_file(name) if names_a_file(name) else name, given, seed)
 
 
 def adapter_identity(name: str) -> dict[str, Any]:
@@ -172,7 +172,7 @@ def label(name: str, options: Mapping[str, str]) -> str:
             label of a model behind a server is the server's name of it.
     """
     checkpoint = options.get("pretrained") or options.get("model")
-    name = class_name(name) if names_a_file(name) else name
+    name = name_in_file(name) if names_a_file(name) else name
     if not checkpoint:
         return _as_component(name)
     revision = options.get("revision")
@@ -219,7 +219,7 @@ def _options(name: str) -> type:
 def _adapter(name: str) -> type[Adapter]:
     target = name if names_a_file(name) else _target(name)
     try:
-        adapter = load_class(name) if names_a_file(name) else _import_target(target)
+        adapter = load_from_file(name) if names_a_file(name) else _import_target(target)
     except (ImportError, AttributeError) as error:
         raise ModelError(f"model {name} cannot be imported from {target} ({error})") from error
     missing = [member for member in ("Options", "build") if not hasattr(adapter, member)]

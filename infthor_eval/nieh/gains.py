@@ -66,4 +66,7 @@ def name_of(run: RunSummary) -> str:
 
 
 def _without_frames(run: RunSummary) -> dict[str, Any]:
-    return {name: value for name, value in run.header.config.items() if name != "frames"}
+    config = {name: value for name, value in run.header.config.items() if name != "frames"}
+    if "rescored" in config:  # from runs that differ in their frames
+        config["rescored"] = {name: value for name, value in config["rescored"].items() if name != "from"}
+    return config

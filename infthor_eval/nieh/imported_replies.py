@@ -15,7 +15,7 @@ from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
 from infthor_eval.nieh.scoring import SCORERS, scores
-from infthor_eval.runs import RunHeader, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.runs import RunHeader, Session, Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.run_config import run_config
 
 __all__ = ["ImportedRun", "Refusal", "import_logs"]
@@ -70,6 +70,10 @@ class ImportedRun:
     def n_missing(self) -> int:
         """Number of questions without a reply."""
         return len(self.question_ids) - len(self.records)
+
+    def make_records(self, _: Session[NiehAnswer]) -> list[UnitRecord[NiehAnswer]]:
+        """Return the records, see `store_run`."""
+        return self.records
 
     def header(self, data: NiehSet) -> RunHeader:
         """Return the header of the run: the model's name, the mode, and the digests of the logs."""

@@ -6,7 +6,8 @@ A task file may name its own function under `process_results`, with its metrics 
 import importlib
 import importlib.util
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import ModuleType
@@ -20,14 +21,14 @@ from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.runs.catalog import TaskFile
 
-__all__ = ["PUBLISHED", "MetricError", "Metrics", "metrics_of"]
+__all__ = ["PUBLISHED", "MetricError", "Metrics", "finite", "metrics_of", "wrap_metric_errors"]
 
 _OURS = "infthor_eval.harness.nieh_task.process_results"
 ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
 
 
 class MetricError(UserCodeError, DataError):
-    """The metrics function of a task raised an exception, or its result lacks a metric."""
+    """A metrics function that is not this package's raised an exception, or its result lacks a metric."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +52,34 @@ class Metrics:
         """
         if self.process is None:
             return scores(reply, sample.question.answers)
-        try:
+        with wrap_metric_errors(f"process_results fails on {sample.question.id}"):
             results = self.process(doc_of(task_samples, sample), [reply])
-            return {name: _finite(name, results[name]) for name in self.names}
-        except Exception as error:
-            raise MetricError(f"process_results fails on {sample.question.id}: {describe_exception(error)}") from error
+            return {name: finite(name, results[name]) for name in self.names}
 
 
-def _finite(name: str, value: Any) -> float:
+@contextmanager
+def wrap_metric_errors(problem: str) -> Iterator[None]:
+    """Turn any exception in a metrics function into a `MetricError` of one line, with the place of the exception.
+
+    Args:
+        problem: the function and the question that it fails on.
+
+    Raises:
+        MetricError: the function raises an exception.
+    """
+    try:
+        yield
+    except Exception as error:  # it is anybody's code
+        raise MetricError(f"{problem}: {describe_exception(error)}") from error
+
+
+def finite(name: str, value: Any) -> float:
+    """Return a metric's value as a number.
+
+    Raises:
+        TypeError: it is no number.
+        ValueError: it is no number, or infinite.
+    """
     if not math.isfinite(number := float(value)):
         raise ValueError(f"{name} is {number}")  # neither a mean nor a journal can hold it
     return number

@@ -1,4 +1,6 @@
-"""Payloads of NIEH's records in the journal: replies to questions, and a model's notes."""
+"""Payloads of NIEH's records in the journal: replies to questions, a model's notes, and a judge's verdicts."""
+
+from typing import Any
 
 import msgspec
 
@@ -6,7 +8,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.runs.records import RecordTypes
 
-__all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "ShownClues"]
+__all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "NiehVerdict", "ShownClues"]
 
 
 class Guess(msgspec.Struct, frozen=True, kw_only=True):
@@ -97,4 +99,26 @@ class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
     seconds: float
 
 
-RECORDS: RecordTypes[NiehAnswer] = RecordTypes(unit=NiehAnswer, artifact=NiehNote)
+class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_verdict"):
+    """A judge's verdict on a reply (`infthor_eval.nieh.judging`).
+
+    Attributes:
+        question: the question's text.
+        answers: the gold answers.
+        reply: the part of the reply that counts.
+        said: the judge's own words.
+        verdict: what they say: yes, no, or None for neither.
+        judge: the judge's identity as JSON values.
+        seconds: duration of the request.
+    """
+
+    question: str
+    answers: tuple[str | int | float, ...]
+    reply: str
+    said: str
+    verdict: str | None
+    judge: dict[str, Any]
+    seconds: float
+
+
+RECORDS: RecordTypes[NiehAnswer] = RecordTypes(unit=NiehAnswer, artifact=NiehNote | NiehVerdict)

@@ -24,7 +24,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Answer
 from infthor_eval.nieh.prompts import last_line
 
-__all__ = ["SCORERS", "Scorer", "says_number", "says_yes_or_no", "score", "scores"]
+__all__ = ["SCORERS", "Scorer", "pieces_of", "plain_form", "says_number", "says_yes_or_no", "score", "scores"]
 
 Scorer = Literal["reference", "strict"]
 SCORERS: tuple[Scorer, ...] = ("reference", "strict")
@@ -64,6 +64,17 @@ def says_number(response: str) -> bool:
     return _is_number(_normalise(response))
 
 
+def pieces_of(response: str) -> list[str]:
+    """Return the answers that a response enumerates, as the strict scorer separates them."""
+    return [piece for piece in re.split(r"[,;\n]|\band\b", response, flags=re.IGNORECASE) if piece.strip()]
+
+
+def plain_form(text: str) -> str:
+    """Return a text without marks and a leading "X is", as both scorers compare it."""
+    bare = re.sub(r"[^\w\s]", "", text)
+    return re.sub(r"^\s*\w+\s+is\s+", "", bare).strip()
+
+
 def _reference(response: str, answers: Sequence[Answer]) -> float:
     if len(answers) == 1:
         return float(_matches_reference(response, answers[0]))
@@ -74,8 +85,7 @@ def _reference(response: str, answers: Sequence[Answer]) -> float:
 def _strict(response: str, answers: Sequence[Answer]) -> float:
     if len(answers) == 1:
         return float(_matches_strict(response, answers[0]))
-    pieces = [piece for piece in re.split(r"[,;\n]|\band\b", response, flags=re.IGNORECASE) if piece.strip()]
-    return _largest_matching(answers, pieces, _matches_strict) / len(answers)
+    return _largest_matching(answers, pieces_of(response), _matches_strict) / len(answers)
 
 
 def _largest_matching(answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]) -> int:
@@ -114,7 +124,7 @@ def _matches_strict(response: str, gold: Answer) -> bool:
     if _is_number(wanted):
         said = _normalise(response)
         return _is_number(said) and float(said) == float(wanted)
-    said = _plain(response.lower().strip())
+    said = plain_form(response.lower().strip())
     return _near(said, wanted) or _synonymous(said, wanted)
 
 
@@ -130,12 +140,7 @@ def _normalise(text: Answer) -> str:
     try:
         return str(w2n.word_to_num(text))
     except (ValueError, IndexError):  # the library's own ways to say "not a number" ("thousand one": IndexError)
-        return _plain(text)
-
-
-def _plain(text: str) -> str:
-    bare = re.sub(r"[^\w\s]", "", text)
-    return re.sub(r"^\s*\w+\s+is\s+", "", bare).strip()
+        return plain_form(text)
 
 
 def _near(said: str, wanted: str) -> bool:

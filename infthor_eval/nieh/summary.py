@@ -35,6 +35,7 @@ __all__ = [
     "Score",
     "SkippedSummary",
     "TaskSummary",
+    "is_open_ended",
     "main_metric",
     "primary_metrics",
     "summarise",
@@ -211,12 +212,12 @@ def _by_trajectory(records: Sequence[Record], metric: str) -> dict[str, list[flo
 def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Cell]:
     chosen = {name: [r for r in records if r.payload.clue_column == name] for name in (*CLUE_COLUMNS, ABSENCE)}
     chosen["total"] = list(records)
-    chosen[OPEN_ENDED] = [record for record in records if _is_open_ended(record)]
+    chosen[OPEN_ENDED] = [record for record in records if is_open_ended(record)]
     return {name: _cell(of_column, metrics) for name, of_column in chosen.items()}
 
 
-def _is_open_ended(record: Record) -> bool:
-    """Apply the published test: the first gold answer decides, and a number in quotes counts as a text."""
+def is_open_ended(record: Record) -> bool:
+    """Return the published test of a question: the first gold answer decides, a number in quotes counts as a text."""
     first = record.payload.answers[0]
     return isinstance(first, str) and first.strip().lower() not in ("yes", "no")
 

@@ -13,6 +13,8 @@ from infthor_eval.nieh.evidence_tables import (
 )
 from infthor_eval.nieh.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.rescoring_report import sources_of
+from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
@@ -118,7 +120,9 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
 
 
 def _notes(runs: Sequence[RunSummary]) -> list[str]:
-    return [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
+    embedded = [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
+    sources = dict.fromkeys(item for run in runs for item in sources_of(run.header.config).items())
+    return [*embedded, *(f"{metric}: {source}." for metric, source in sources if metric not in SCORERS)]
 
 
 def _rows_of(run: RunSummary) -> list[Row]:

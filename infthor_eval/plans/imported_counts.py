@@ -14,7 +14,7 @@ from infthor_eval.formats.plan_logs import LoggedPlans, PlanCount, PlanLog
 from infthor_eval.formats.reply_logs import UnreadRow
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.records import PlanRecord
-from infthor_eval.runs import RunHeader, UnitRecord
+from infthor_eval.runs import RunHeader, Session, UnitRecord
 from infthor_eval.runs.run_config import run_config
 
 __all__ = ["ImportedCounts", "import_counts"]
@@ -41,6 +41,10 @@ class ImportedCounts:
     records: tuple[UnitRecord[PlanRecord], ...]
     n_failed_set_ups: int
     refused: tuple[UnreadRow, ...]
+
+    def make_records(self, _: Session[PlanRecord]) -> tuple[UnitRecord[PlanRecord], ...]:
+        """Return the records, see `store_run`."""
+        return self.records
 
 
 def import_counts(log: PlanLog, model: str | None = None) -> ImportedCounts:

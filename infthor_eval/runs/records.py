@@ -5,6 +5,7 @@ is the suite's own, and tagged in turn.
 """
 
 from dataclasses import dataclass
+from types import UnionType
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import msgspec
@@ -133,11 +134,11 @@ class RecordTypes(Generic[P_co]):
 
     Attributes:
         unit: payload of its units.
-        artifact: payload of its cached artifacts; None where it caches none.
+        artifact: payload of its cached artifacts, a union if there are several kinds; None where it caches none.
     """
 
     unit: type[P_co]
-    artifact: type[Any] | None = None
+    artifact: type[Any] | UnionType | None = None
 
     def decoder(self) -> msgspec.json.Decoder[Any]:
         """Return the decoder of a journal's lines."""

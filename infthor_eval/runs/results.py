@@ -14,7 +14,15 @@ from infthor_eval.runs.records import UnitRecord
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
 
-__all__ = ["RESULTS", "results_document", "write_results", "write_run_files", "write_scores", "write_usage"]
+__all__ = [
+    "RESULTS",
+    "results_document",
+    "write_document",
+    "write_results",
+    "write_run_files",
+    "write_scores",
+    "write_usage",
+]
 
 RESULTS = "results.json"
 _SCORES = "scores.jsonl"
@@ -60,7 +68,7 @@ def write_results(folder: Path, document: dict[str, Any]) -> None:
     Raises:
         DataError: the file cannot be written.
     """
-    _write(folder / RESULTS, document)
+    write_document(folder / RESULTS, document)
 
 
 def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
@@ -100,10 +108,15 @@ def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) 
         "seconds": round(math.fsum(record.seconds for record in records), 4),
         "cost": usage.cost,
     }
-    _write(folder / _USAGE, document)
+    write_document(folder / _USAGE, document)
 
 
-def _write(path: Path, document: dict[str, Any]) -> None:
+def write_document(path: Path, document: Any) -> None:
+    """Write a JSON file into a run's folder, its keys sorted; equal documents give equal bytes.
+
+    Raises:
+        DataError: the file cannot be written.
+    """
     with _atomic_file(path) as partial:
         encoded = msgspec.json.encode(document, order="sorted")
         partial.write_bytes(msgspec.json.format(encoded, indent=2) + b"\n")

@@ -10,7 +10,7 @@ from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Workload
 from model_adapters import Subject, adapter_identity
 
-__all__ = ["header_of", "run_config"]
+__all__ = ["as_json_values", "header_of", "run_config"]
 
 
 def header_of(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -> RunHeader:
@@ -42,14 +42,19 @@ def run_config(
         limit: number of items of each task; None for all.
         seed: seed of the run.
     """
-    config = {
-        "infthor_eval": infthor_eval.__version__,
-        "suite": suite,
-        "model": dict(model),
-        "adapter": dict(code),
-        "limit": limit,
-        "seed": seed,
-        **workload,
-    }
-    # Round trip, so that it equals the one that is read back from a journal: tuples become lists, keys strings.
+    return as_json_values(
+        {
+            "infthor_eval": infthor_eval.__version__,
+            "suite": suite,
+            "model": dict(model),
+            "adapter": dict(code),
+            "limit": limit,
+            "seed": seed,
+            **workload,
+        }
+    )
+
+
+def as_json_values(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a config as it is read back from a journal: tuples become lists, keys strings."""
     return dict(json.loads(json.dumps(config)))

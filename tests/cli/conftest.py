@@ -1,12 +1,17 @@
 """The records of runs started by the command line."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
-from infthor_eval.runs import UnitRecord, read_run
+from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.runs import RunHeader, UnitRecord, read_run
+from infthor_eval.runs.journal import Journal
+
+from ..nieh.made import identity
+from .commands.rescored import REPLIES
 
 
 @pytest.fixture
@@ -18,3 +23,40 @@ def records_in() -> Callable[[Path], list[UnitRecord[NiehAnswer]]]:
         return read_run(journal.parent, RECORDS)[1]
 
     return records_in
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Callable[..., Path]:
+    """Writes the journal of a run, and nothing else; returns its folder."""
+
+    def source(
+        records: Sequence[UnitRecord[NiehAnswer]] = REPLIES,
+        suite: str = "nieh",
+        n_samples: int = 8,
+        metrics: tuple[str, ...] = SCORERS,
+        **changes: object,
+    ) -> Path:
+        config = identity(model="m", checkpoint=None, n_parameters=None, metrics=metrics) | changes
+        config["tasks"]["nieh_gt"]["n_samples"] = n_samples
+        folder = tmp_path / "elsewhere" / "a run"
+        with Journal(folder, RunHeader(suite=suite, name="m", config=config), RECORDS) as journal:
+            for item in records:
+                journal.append(item)
+        return folder
+
+    return source
+
+
+@pytest.fixture
+def rescore(
+    tmp_path: Path, run: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., tuple[int, str, Path | None]]:
+    """Scores a run again; returns exit code, what was said, and the folder of the new run."""
+    monkeypatch.chdir(tmp_path)
+
+    def rescore(folder: Path, *options: object) -> tuple[int, str, Path | None]:
+        code, out, err = run("rescore", folder, "--output", tmp_path / "out", *options)
+        folders = sorted((tmp_path / "out").glob("*/*"), key=lambda path: path.stat().st_mtime)
+        return code, out + err, folders[-1] if folders else None
+
+    return rescore

@@ -56,18 +56,17 @@ def _import_replies(
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.imported_replies import import_logs
     from infthor_eval.nieh.suite import NiehSuite
-    from infthor_eval.runs import NOTHING
     from infthor_eval.runs.stored_run import store_run
 
     questions, suite = NiehSet(data), NiehSuite()
     for run in import_logs(logs, questions, model):
-        folder, summary = store_run(output, run.header(questions), suite, run.records, run.n_missing)
+        stored = store_run(output, run.header(questions), suite, run.make_records, run.n_missing)
         name = f"{run.model}, {run.task}"
         counts = f"{run.n_missing} of {len(run.question_ids)} questions without one"
         print_note(f"{name}: {len(run.records)} replies imported, {counts}")
         for what, rows in (("not imported", run.refused), ("scored otherwise than logged", run.rescored)):
             print_refused(name, what, [(row.log, row.line, row.reason) for row in rows])
-        yield RunResults(folder, suite, summary, NOTHING, run.n_missing), len(run.refused)
+        yield RunResults(stored.folder, suite, stored.summary, stored.usage, run.n_missing), len(run.refused)
 
 
 def _import_plans(logs: Sequence[Path], model: str | None, output: Path) -> Iterator[tuple["RunResults", int]]:
@@ -78,12 +77,11 @@ def _import_plans(logs: Sequence[Path], model: str | None, output: Path) -> Iter
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.imported_counts import import_counts
     from infthor_eval.plans.suite import PlansSuite
-    from infthor_eval.runs import NOTHING
     from infthor_eval.runs.stored_run import store_run
 
     suite = PlansSuite()
     for run in [import_counts(read_plan_log(log), model) for log in logs]:
-        folder, summary = store_run(output, run.header, suite, run.records, n_missing=0)
+        stored = store_run(output, run.header, suite, run.make_records, n_missing=0)
         name, path = run.header.name, run.log.path
         n_trajectories = len({record.cluster for record in run.records})
         print_note(
@@ -91,4 +89,4 @@ def _import_plans(logs: Sequence[Path], model: str | None, output: Path) -> Iter
             f"{run.n_failed_set_ups} more failed"
         )
         print_refused(name, "not imported", [(path, row.line, row.reason) for row in run.refused])
-        yield RunResults(folder, suite, summary, NOTHING, 0), len(run.refused)
+        yield RunResults(stored.folder, suite, stored.summary, stored.usage, 0), len(run.refused)

@@ -111,7 +111,9 @@ class ModelArgs(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> dict[str, str]:
         """See `click.ParamType`."""
-        return dict(value) if isinstance(value, Mapping) else parse_model_args(value)
+        if isinstance(value, Mapping):
+            return dict(value)
+        return parse_pairs(value.split(","), param.opts[0]) if param else parse_model_args(value)
 
 
 class ModelList(click.ParamType):

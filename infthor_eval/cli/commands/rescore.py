@@ -1,0 +1,162 @@
+"""`infthor-eval rescore`: today's scores of the replies in a run's journal, as a run of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.options.values import PATH, ModelArgs, ModelList, ModelSpec, WholeNumber
+
+if TYPE_CHECKING:
+    from infthor_eval.nieh.judging import Judge
+    from infthor_eval.nieh.records import NiehAnswer
+    from infthor_eval.nieh.rescoring import Rescored, Rescoring
+    from infthor_eval.nieh.rescoring_report import Change, RescoringReport
+    from infthor_eval.runs import UnitRecord
+
+__all__ = ["command"]
+
+_JUDGE_TOKENS = 16
+
+
+@click.command(
+    "rescore", cls=ExampleCommand, example="infthor-eval rescore results/blind/RUN --scorer my_scorer.py:measure"
+)
+@click.argument("folder", metavar="RUN", type=PATH)
+@click.option("--scorer", metavar="NAME", help="Your own scorer beside ours: FILE.py:NAME, or the name of a package's.")
+@click.option(
+    "--judge",
+    type=ModelList(),
+    metavar="MODEL",
+    help="Ask this model where the rules are unsure (off by default; any model of `ls models`, usually openai).",
+)
+@click.option("--judge-args", type=ModelArgs(), default="", metavar="K=V,...", help="Options of the judge.")
+@click.option(
+    "--judge-tokens",
+    type=WholeNumber(1),
+    default=_JUDGE_TOKENS,
+    show_default=True,
+    metavar="N",
+    help="Most tokens of a verdict; a model that reasons first needs more.",
+)
+@click.option(
+    "--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of the sample that measures the judge."
+)
+@click.option("--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs.")
+def command(
+    folder: Path,
+    scorer: str | None,
+    judge: tuple[ModelSpec, ...] | None,
+    judge_args: Mapping[str, str],
+    judge_tokens: int,
+    seed: int,
+    output: Path,
+) -> int:
+    """Score the replies in the journal of RUN, a run of NIEH, with today's scorers, and store them as a run.
+
+    Neither the set nor the model is needed. Replies that are not there stay failed. The exit code is 1 if your scorer
+    fails on a reply, or the judge cannot be asked.
+    """
+    from infthor_eval.nieh.own_scorers import find_scorer
+    from infthor_eval.nieh.rescoring import read_source, score_again
+
+    if judge is None and judge_args:
+        raise click.UsageError("--judge-args are options of a judge; give one with --judge")
+    if judge is not None and len(judge) > 1:
+        raise click.UsageError(f"--judge names {len(judge)} models; give one")
+    source, own = read_source(folder), find_scorer(scorer) if scorer is not None else None
+    with _load_judge(judge[0], judge_args, judge_tokens, seed) if judge else nullcontext() as loaded:
+        rescoring = score_again(source, own, loaded)
+        rescored = _store(rescoring, output)
+    _print(rescoring, rescored)
+    return int(_print_failures(rescored) > 0)
+
+
+def _load_judge(
+    judge: ModelSpec, more: Mapping[str, str], max_new_tokens: int, seed: int
+) -> AbstractContextManager[Judge]:
+    from infthor_eval.cli.progress.notes import print_note
+    from infthor_eval.nieh.judging import Judge
+    from model_adapters import model_note
+
+    loaded = Judge.load(judge.name, {**more, **judge.options}, max_new_tokens, seed)
+    if note := model_note(judge.name):
+        print_note(f"{judge.name}: {note}", "yellow")
+    return closing(loaded)
+
+
+def _store(rescoring: Rescoring, output: Path) -> Rescored:
+    from infthor_eval.cli.progress.bar import PacedBar
+    from infthor_eval.cli.progress.notes import NOTES
+    from infthor_eval.terminal import progress_bar
+
+    with progress_bar(NOTES) as progress:
+
+        def track(records: Sequence[UnitRecord[NiehAnswer]]) -> Iterator[UnitRecord[NiehAnswer]]:
+            bar = PacedBar(progress, "verdicts", len(records))
+            for record in records:
+                yield record
+                bar.advance()
+
+        return rescoring.store(output, track)
+
+
+def _print(rescoring: Rescoring, rescored: Rescored) -> None:
+    from infthor_eval.cli.options.show import ShowOptions
+    from infthor_eval.cli.results import RunResults, print_results
+    from infthor_eval.nieh.rescoring_report import agreement_table, change_table, sources_of
+    from infthor_eval.nieh.suite import NiehSuite
+    from infthor_eval.report.terminal import print_table, table_console
+
+    report, run, console = rescored.report, rescored.run, table_console()
+    _print_counts(report)
+    print_table(change_table(report, sources_of(rescoring.header.config)), console)
+    if report.judge is not None and rescoring.judge is not None:
+        print_table(agreement_table(report.judge, rescoring.judge.name), console)
+    print_results([RunResults(run.folder, NiehSuite(), run.summary, run.usage, report.n_missing)], ShowOptions())
+
+
+def _print_counts(report: RescoringReport) -> None:
+    from infthor_eval.cli.progress.notes import print_note
+
+    counts = (
+        (report.n_failed, "failed by the scorer"),
+        (report.n_without_reply, "without a reply stay failed"),
+        (report.n_missing, "were never asked"),
+    )
+    print_note("; ".join([f"{report.n_scored} replies scored", *(f"{n} {what}" for n, what in counts if n)]))
+    for task, names in report.left_out.items():
+        print_note(f"{task}: {', '.join(names)}: left out, as the journal does not say how to compute it", "yellow")
+    for task, changes in report.tasks.items():
+        for name, change in changes.items():
+            if change.n_differ:
+                _print_change(f"{task}, {name}", change)
+
+
+def _print_change(name: str, change: Change) -> None:
+    from infthor_eval.cli.progress.notes import print_note
+
+    print_note(f"{name}: {change.n_differ} of {change.n_before} scores differ from those in the journal")
+    for item in change.examples:
+        print_note(f"  {item.question}: {item.before:g}, now {item.now:g}: {item.reply!r:.60}")
+    if change.n_differ > len(change.examples):
+        print_note(f"  and {change.n_differ - len(change.examples)} more")
+
+
+def _print_failures(rescored: Rescored) -> int:
+    """Print why replies could not be scored or judged; return the number of these."""
+    from infthor_eval.cli.progress.notes import print_failure
+    from infthor_eval.reasons import count_reasons
+
+    failed = [(r.task, r.failure) for r in rescored.records if r.failure is not None and r.payload.reply is not None]
+    for task, reason, n in count_reasons(failed):
+        print_failure(f"{task}: {n} sample(s) failed, counted as wrong: {reason}")
+    unasked = rescored.judgement.failures if rescored.judgement else ()
+    for name, reason, n in count_reasons(("judge", reason) for reason in unasked):
+        print_failure(f"{name}: not asked about {n} replies, whose strict score stands: {reason}")
+    return len(failed) + len(unasked)

@@ -1,0 +1,37 @@
+"""Runs for `rescore`, and what is in the runs that it makes."""
+
+import json
+
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import read_run
+
+from ...nieh.made import record
+
+REPLIES = (
+    record(0, "Sofa", ("Sofa",)),
+    record(1, "the soft thing", ("Sofa",)),  # unsure
+    record(2, "Bed", ("Sofa",)),
+    record(3, "yes", ("yes",)),
+    record(4, "Bed", ("Bed",)),
+    record(5, "the bin", ("Bed",)),  # unsure
+    record(6, None, ("Bed",), failure="m fails"),
+    record(7, "Bed, sofa", ("Bed", "Sofa", "Desk")),  # two of three
+)
+
+
+def scores_in(folder, metric):
+    return {one.id: one.payload.scores.get(metric) for one in read_run(folder, RECORDS)[1]}
+
+
+def lines_of(folder):
+    return (folder / "journal" / "worker-0.jsonl").read_text().splitlines()
+
+
+def report_in(folder):
+    return json.loads((folder / "rescored.json").read_text())
+
+
+def row(said, *beginning):
+    """The rest of the row of a printed table that begins like this."""
+    (found,) = [line.split() for line in said.splitlines() if line.split()[: len(beginning)] == list(beginning)]
+    return found[len(beginning) :]
