@@ -8,7 +8,7 @@ from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.nieh.summary import NiehSummary, summarise
 from infthor_eval.runs import RunHeader, RunSummary, Tokens, UnitRecord
 
-_PAYLOAD = ("question", "question_type")
+_PAYLOAD = ("question", "question_type", "file", "guess", "shown_clues")
 
 
 def record(
@@ -46,12 +46,14 @@ def identity(
     context: str = "clues",
     metrics: tuple[str, ...] = SCORERS,
     frames: str = "shown",
+    **settings: float,
 ) -> dict[str, Any]:
-    """Of a run of `nieh_gt`; `skipped` are the reasons."""
+    """Of a run of `nieh_gt`; `skipped` are the reasons, `settings` those of the context."""
     about = {
-        "config": {"dataset_kwargs": {"context": context}},
+        "config": {"dataset_kwargs": {"context": context, **settings}},
         "decoding": {"max_new_tokens": 50},
         "metrics": {"names": list(metrics)},
+        "data": "d",
         "simulator": simulator,
         "skipped": [{"question_id": f"x{i}", "variant": "", "reason": reason} for i, reason in enumerate(skipped)],
     }

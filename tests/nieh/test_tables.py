@@ -43,7 +43,7 @@ def test_a_row_has_every_column_of_the_table():
         "70.00",
         *said,
         *("70.00", "(10)"),
-        "-",
+        *("-", "-"),
         "10",
         "1",
         "1",
