@@ -1,0 +1,126 @@
+"""The audit of a set: what guessers that see no frame get in each group of its questions."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.formats.question_forms import type_of
+from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.guessers import GUESSERS
+from infthor_eval.nieh.guessing.guesses import questions_by_file, sample_on_clues
+from infthor_eval.nieh.scoring import Scorer, score
+
+__all__ = ["BY", "AuditedQuestion", "Group", "audit", "groups", "sentences"]
+
+_YES_NO = ("yes", "no")
+_MANY = 20  # questions of a group that a sentence is worth
+
+
+@dataclass(frozen=True)
+class AuditedQuestion:
+    """A question with the scores of the guessers, in the order of `GUESSERS`."""
+
+    question: Question
+    scores: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Some questions of a set.
+
+    Attributes:
+        by: what they share: file, type, form or clues.
+        name: the file, type, form or column itself.
+        questions: the questions.
+    """
+
+    by: str
+    name: str
+    questions: Sequence[AuditedQuestion]
+
+    @property
+    def answers(self) -> Counter[str]:
+        """The answers in lower case, with the number of questions that have each."""
+        return Counter(doc_target(item.question).lower() for item in self.questions)
+
+    @property
+    def entropy(self) -> float:
+        """Entropy of the answers in bits; 0 if they are all the same."""
+        n = len(self.questions)
+        return abs(sum(count / n * math.log2(n / count) for count in self.answers.values()))
+
+    @property
+    def share_yes(self) -> float | None:
+        """Share of yes among the answers yes and no; None if there are none."""
+        yes, no = (self.answers[answer] for answer in _YES_NO)
+        return yes / (yes + no) if yes + no else None
+
+    def means(self) -> tuple[float, ...]:
+        """Return the mean score of each guesser."""
+        columns = zip(*(item.scores for item in self.questions), strict=True)
+        return tuple(sum(column) / len(self.questions) for column in columns)
+
+    def best(self) -> tuple[str, float]:
+        """Return the name of the best guesser, the simplest of equals, and its score."""
+        means = self.means()
+        place = max(range(len(means)), key=means.__getitem__)
+        return GUESSERS[place].name, means[place]
+
+
+def audit(data: NiehSet, scorer: Scorer = "strict") -> list[AuditedQuestion]:
+    """Return the questions of a set that can be asked, with the guessers' scores; a file is guessed at a time."""
+    audited: list[AuditedQuestion] = []
+    for questions in questions_by_file(data).values():
+        samples = [sample_on_clues(question) for question in questions]
+        by_guesser = [guesser.guess(samples) for guesser in GUESSERS]
+        for question, guesses in zip(questions, zip(*by_guesser, strict=True), strict=True):
+            scores = tuple(score(guess, question.answers, scorer) for guess in guesses)
+            audited.append(AuditedQuestion(question, scores))
+    return audited
+
+
+def _yes_no(question: Question) -> str:
+    return "yes/no" if doc_target(question).lower() in _YES_NO else "open-ended"
+
+
+BY: Mapping[str, Callable[[Question], str]] = {
+    "file": lambda question: question.file or "all",
+    "answers": _yes_no,
+    "clues": lambda question: question.clue_column or "total alone",
+    "type": lambda question: question.question_type or type_of(question.text) or "untyped",
+    "form": form_of,
+}
+
+
+def groups(questions: Sequence[AuditedQuestion], by: str) -> list[Group]:
+    """Return the groups of some questions; all but whole files are split by file, in a set of several."""
+    split: dict[str, list[AuditedQuestion]] = {}
+    for item in questions:
+        name, file = BY[by](item.question), item.question.file
+        split.setdefault(f"{file}: {name}" if file and by != "file" else name, []).append(item)
+    return [Group(by, name, items) for name, items in sorted(split.items())]
+
+
+def sentences(questions: Sequence[AuditedQuestion]) -> Iterator[str]:
+    """Yield what is striking about a set, in sentences."""
+    for group in groups(questions, "answers"):
+        file, _, _ = group.name.rpartition(": ")
+        where = f"of {file}" if file else "of this set"
+        if group.share_yes in (0, 1) and len(group.questions) >= _MANY:
+            answer = "yes" if group.share_yes else "no"
+            yield f"All {len(group.questions)} yes/no questions {where} are {answer}."
+    for group in groups(questions, "form"):
+        if len(group.questions) < _MANY:
+            continue
+        name, mean = group.best()
+        if len(group.answers) == 1:
+            yield f"{group.name} ({len(group.questions)} questions): the answer is always {next(iter(group.answers))}."
+        elif mean > 0.9:
+            yield f"{group.name} ({len(group.questions)} questions): {name} gets {100 * mean:.1f} % without a frame."
+    for group in groups(questions, "file"):
+        name, mean = group.best()
+        yield f"{group.name}: {100 * mean:.2f} % can be had without a frame ({name})."

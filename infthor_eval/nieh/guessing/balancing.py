@@ -1,0 +1,144 @@
+"""A large part of a set in which guessing without frames does not help.
+
+The algorithm is iterative pruning, as in the debiased sets of Brown et al. (arXiv:2511.04655). The part is one file, so
+all questions count as one file here. Chance is one over the number of answers that a form has in the part.
+
+1. In each form the commonest answer is cut to chance and 3 points: of all ways to keep the k commonest answers, each up
+   to some number of questions, the one that keeps most. A form with one answer alone goes.
+2. All guessers guess what is left, each question from other trajectories. In each form where one of them is more than 3
+   points above chance, the questions that most guessers get right go, half as many as are too many; then step 1 again.
+3. It ends when no guesser is more than 3 points above chance in any form.
+
+It is greedy: a larger part may exist.
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.forms import form_of
+from infthor_eval.nieh.guessing.guessers import GUESSERS
+from infthor_eval.nieh.guessing.guesses import sample_on_clues
+from infthor_eval.nieh.scoring import score
+
+__all__ = ["MARGIN", "Balanced", "balance"]
+
+MARGIN = 0.03
+
+
+@dataclass(frozen=True)
+class Balanced:
+    """A balanced part of a set.
+
+    Attributes:
+        questions: the questions, in the order of the set.
+        chance: mean over them of one over the number of answers of their form.
+        best: name of the best guesser on them all.
+        best_score: its mean score.
+        kept: number of questions that were kept, and that there were, by form and, in a set of several, file.
+    """
+
+    questions: Sequence[Question]
+    chance: float
+    best: str
+    best_score: float
+    kept: Mapping[str, tuple[int, int]]
+
+
+def balance(questions: Sequence[Question]) -> Balanced:
+    """Return the balanced part of some questions; it may be empty."""
+    before = Counter(map(_name, questions))
+    left = _cut_answers(questions)
+    right = _guess(left)
+    while surplus := _surplus(left, right):
+        left = _cut_answers(_prune(left, right, surplus))
+        right = _guess(left)
+    after = Counter(map(_name, left))
+    kept = {name: (after[name], n) for name, n in sorted(before.items())}
+    if not left:
+        return Balanced((), 0.0, "none", 0.0, kept)
+    means = [sum(right[question.id][place] for question in left) / len(left) for place in range(len(GUESSERS))]
+    best = max(range(len(means)), key=means.__getitem__)
+    by_form = _by_form(left)
+    chance = sum(_chance(group) * len(group) for group in by_form.values()) / len(left)
+    return Balanced(left, chance, GUESSERS[best].name, means[best], kept)
+
+
+def _name(question: Question) -> str:
+    return f"{question.file}: {form_of(question)}" if question.file else form_of(question)
+
+
+def _by_form(questions: Sequence[Question]) -> dict[str, list[Question]]:
+    groups: dict[str, list[Question]] = {}
+    for question in questions:
+        groups.setdefault(form_of(question), []).append(question)
+    return groups
+
+
+def _chance(questions: Sequence[Question]) -> float:
+    return 1 / len({doc_target(question) for question in questions})
+
+
+def _cut_answers(questions: Sequence[Question]) -> list[Question]:
+    """Return the questions without those that step 1 cuts; of too many the first ones are kept."""
+    chosen: set[str] = set()
+    for group in _by_form(questions).values():
+        by_answer: dict[str, list[Question]] = {}
+        for question in group:
+            by_answer.setdefault(doc_target(question), []).append(question)
+        commonest = sorted(by_answer.values(), key=len, reverse=True)
+        n_answers, most = _best_cut([len(of_answer) for of_answer in commonest])
+        chosen |= {question.id for of_answer in commonest[:n_answers] for question in of_answer[:most]}
+    return [question for question in questions if question.id in chosen]
+
+
+def _best_cut(sizes: Sequence[int]) -> tuple[int, int]:
+    """Return how many of the commonest answers to keep, and up to how many questions of each; 0 answers for none.
+
+    Args:
+        sizes: number of questions of each answer, descending.
+    """
+    best, kept = (0, 0), 0
+    for n_answers in range(2, len(sizes) + 1):
+        for most in range(sizes[0], 0, -1):
+            total = sum(min(size, most) for size in sizes[:n_answers])
+            if most <= (1 / n_answers + MARGIN) * total:
+                best, kept = ((n_answers, most), total) if total > kept else (best, kept)
+                break
+    return best
+
+
+def _guess(questions: Sequence[Question]) -> dict[str, tuple[float, ...]]:
+    """Return each question's scores by guesser."""
+    if not questions:
+        return {}
+    samples = [sample_on_clues(question) for question in questions]
+    guesses = zip(*(guesser.guess(samples) for guesser in GUESSERS), strict=True)
+    return {
+        question.id: tuple(score(guess, question.answers, "strict") for guess in of_question)
+        for question, of_question in zip(questions, guesses, strict=True)
+    }
+
+
+def _surplus(questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]) -> dict[str, int]:
+    """Return half of what the best guesser of a form gets right beyond chance, if it is beyond the margin too."""
+    surplus = {}
+    for form, group in _by_form(questions).items():
+        chance = _chance(group)
+        best = max(sum(right[question.id][place] for question in group) for place in range(len(GUESSERS)))
+        if best > (chance + MARGIN) * len(group):
+            surplus[form] = max(1, round((best - chance * len(group)) / 2))
+    return surplus
+
+
+def _prune(
+    questions: Sequence[Question], right: Mapping[str, tuple[float, ...]], surplus: Mapping[str, int]
+) -> list[Question]:
+    """Return the questions without those, in forms with a surplus, that most guessers get right."""
+    gone: set[str] = set()
+    for form, group in _by_form(questions).items():
+        easiest = sorted(group, key=lambda question: -sum(right[question.id]))  # stable: the first of equals
+        gone |= {question.id for question in easiest[: surplus.get(form, 0)]}
+    return [question for question in questions if question.id not in gone]
