@@ -20,6 +20,7 @@ from model_adapters.protocols import (
     Role,
     Subject,
     Turn,
+    Video,
 )
 from model_adapters.refusals import check_decoding, check_turns, wrap_request_errors
 from model_adapters.registry import (
@@ -57,6 +58,7 @@ __all__ = [
     "Subject",
     "Transcript",
     "Turn",
+    "Video",
     "adapter_identity",
     "check_adapter",
     "check_decoding",

@@ -63,5 +63,5 @@ class BackendConversation(Transcript):
 
     def _checked_turns(self, continuation: Sequence[Part] = ()) -> tuple[Turn, ...]:
         turns = self.turns_with(continuation)
-        check_turns(self._backend.name, turns)
+        check_turns(self._backend.name, self._backend.capabilities, turns)
         return turns

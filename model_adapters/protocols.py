@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.video import Video
 
 __all__ = [
     "ROLES",
@@ -27,9 +28,10 @@ __all__ = [
     "Role",
     "Subject",
     "Turn",
+    "Video",
 ]
 
-Part = str | FrameRef
+Part = str | FrameRef | Video
 Role = Literal["system", "user", "assistant"]
 ROLES: tuple[Role, ...] = ("system", "user", "assistant")
 
@@ -40,7 +42,7 @@ class Turn:
 
     Attributes:
         role: speaker of the turn.
-        parts: texts and frames in order; adjacent texts are joined, empty ones dropped.
+        parts: texts, frames and videos in order; adjacent texts are joined, empty texts dropped.
     """
 
     role: Role
@@ -122,6 +124,7 @@ class Capabilities:
         deterministic: the same request gets the same reply, greedily or with the same seed.
         sampling: temperatures above 0 are supported.
         choices: replies can be restricted to given texts.
+        video_input: conversations take videos; if false, a video is refused, and its frames can be given as images.
         batch_size: continuations of a conversation that the model answers together.
         max_in_flight: conversations that may be asked at the same time, each from its own thread.
         max_tokens: limit of context and reply together, in tokens, or None if there is none or it is unknown.
@@ -133,6 +136,7 @@ class Capabilities:
     deterministic: bool = True
     sampling: bool = False
     choices: bool = False
+    video_input: bool = False
     batch_size: int = 1
     max_in_flight: int = 1
     max_tokens: int | None = None
@@ -152,7 +156,7 @@ class Mark:
 
 @runtime_checkable
 class Conversation(Protocol):
-    """The turns of texts and frames that a model has seen so far."""
+    """The turns of texts, frames and videos that a model has seen so far."""
 
     @property
     def n_tokens(self) -> int | None:
@@ -169,7 +173,7 @@ class Conversation(Protocol):
         Adjacent texts of a turn are joined without a separator.
 
         Raises:
-            TypeError: a part is neither text nor a frame reference.
+            TypeError: a part is neither text, frame reference nor video.
             ValueError: the role is unknown.
         """
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 
 from infthor_eval.errors import AdapterError, InfthorError, ModelError, describe_exception
-from model_adapters.protocols import Capabilities, Decoding, Turn
+from model_adapters.protocols import Capabilities, Decoding, Turn, Video
 
 __all__ = ["check_decoding", "check_turns", "wrap_adapter_errors", "wrap_request_errors"]
 
@@ -23,15 +23,18 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
         raise ModelError(f"{name} does not support choices ({len(decoding.choices)} given); ask without choices")
 
 
-def check_turns(name: str, turns: Sequence[Turn]) -> None:
-    """Check that it is the turn of the model of this name.
+def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) -> None:
+    """Check that it is the turn of the model of this name, and that it takes all parts of the conversation.
 
     Raises:
-        ModelError: the conversation is empty, or its last turn is not the user's.
+        ModelError: the conversation is empty, its last turn is not the user's, or it has a video and the model no
+            video input.
     """
     if not turns or turns[-1].role != "user":
         state = f"the last turn is the {turns[-1].role}'s" if turns else "the conversation is empty"
         raise ModelError(f"{name} has nothing to reply to: {state}; append a user turn")
+    if not capabilities.video_input and any(isinstance(part, Video) for turn in turns for part in turn.parts):
+        raise ModelError(f"{name} has no video input; give it the video's frames as images")
 
 
 @contextmanager

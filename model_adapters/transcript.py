@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
-from infthor_eval.formats.frames import FrameRef
 from model_adapters.protocols import ROLES, Conversation, Decoding, Mark, Part, Reply, Role, Turn
 
 __all__ = ["Transcript"]
@@ -29,7 +28,7 @@ class Transcript:
         """Return the turns as if these parts had been appended by the user; the conversation is unchanged.
 
         Raises:
-            TypeError: a part is neither text nor a frame reference.
+            TypeError: a part is neither text, frame reference nor video.
         """
         items = [item for item in (*self._items, *_items(continuation, "user")) if item[1] != ""]
         return tuple(
@@ -41,7 +40,7 @@ class Transcript:
         """Add parts at the end: all of them, or none if one is invalid.
 
         Raises:
-            TypeError: a part is neither text nor a frame reference.
+            TypeError: a part is neither text, frame reference nor video.
             ValueError: the role is unknown.
         """
         self._items.extend(_items(parts, role))
@@ -80,8 +79,8 @@ def _items(parts: Sequence[Part], role: Role) -> list[tuple[Role, Part]]:
     if role not in ROLES:
         raise ValueError(f"there is no role {role!r}; roles: {', '.join(ROLES)}")
     for part in parts:
-        if not isinstance(part, str | FrameRef):
-            raise TypeError(f"a part is a str or a FrameRef, not {type(part).__name__}")
+        if not isinstance(part, Part):
+            raise TypeError(f"a part is a str, a FrameRef or a Video, not {type(part).__name__}")
     return [(role, part) for part in parts]
 
 

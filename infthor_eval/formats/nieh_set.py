@@ -24,11 +24,12 @@ from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
-from infthor_eval.formats.video import frames_per_second
+from infthor_eval.formats.video import Video, read_video
 
 __all__ = ["NiehSet", "SkippedQuestion"]
 
 T = TypeVar("T")
+K = TypeVar("K")
 _LONGEST = 40  # characters of a name in a message
 _HINT = "unpack the trajectory again"
 _NO_FRAMES = "has no metadata/ with frames; unpack the set's metadata.tar there"
@@ -82,7 +83,7 @@ class NiehSet:
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
         # One tuple per trajectory, shared by all its questions: a copy each would be thousands of references.
         self._all_frames: dict[str, tuple[FrameRef, ...] | DataError] = {}
-        self._videos: dict[str, tuple[FrameRef, ...] | DataError] = {}
+        self._videos: dict[tuple[str, float], Video | DataError] = {}
         self._outlines: dict[str, Outline | DataError] = {}
         self._action_frames: dict[str, dict[int, tuple[int, ...]]] = {}
 
@@ -194,13 +195,13 @@ class NiehSet:
         path = self._video_path(traj_id)
         return path if path.is_file() else None
 
-    def video_frames(self, traj_id: str) -> tuple[FrameRef, ...]:
-        """Return one frame per second of the trajectory's video.
+    def sampled_video(self, traj_id: str, fps: float) -> Video:
+        """Return the trajectory's video, sampled at this rate.
 
         Raises:
             DataError: the video is missing or cannot be decoded.
         """
-        return _read_once(self._videos, traj_id, lambda: frames_per_second(self._video_path(traj_id)))
+        return _read_once(self._videos, (traj_id, fps), lambda: read_video(self._video_path(traj_id), fps))
 
     def _video_path(self, traj_id: str) -> Path:
         return self.folder(traj_id) / f"{traj_id}_10fps.mp4"
@@ -230,15 +231,15 @@ class NiehSet:
         return _read_once(self._frames, traj_id, lambda: _read_frames(self.folder(traj_id)))
 
 
-def _read_once(cache: dict[str, T | DataError], traj_id: str, read: Callable[[], T]) -> T:
+def _read_once(cache: dict[K, T | DataError], key: K, read: Callable[[], T]) -> T:
     """Read something of a trajectory, or repeat the earlier result or error."""
     # Errors are cached too, or a broken trajectory would be read again for each of its questions.
-    if traj_id not in cache:
+    if key not in cache:
         try:
-            cache[traj_id] = read()
+            cache[key] = read()
         except DataError as error:
-            cache[traj_id] = error
-    result = cache[traj_id]
+            cache[key] = error
+    result = cache[key]
     if isinstance(result, DataError):
         raise result
     return result

@@ -1,12 +1,17 @@
-"""Frames of videos, as references like other frames.
+"""Videos as models are given them: some frames of a film, as references like other frames.
 
-Models need single frames, some repeatedly, but a video can only be decoded from its start. So the sampled frames are
-decoded in one pass and stored in the user's cache under the video's digest.
+Frames are sampled as qwen-vl-utils does it, which the published evaluation used. Models need single frames, some
+repeatedly, but a film can only be decoded from its start. So the sampled frames are decoded together and stored in the
+user's cache under the film's digest.
 """
 
+import json
+import math
 import os
 import shutil
 import tempfile
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 
 from PIL import Image
@@ -17,51 +22,93 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.reading import require_file
 from infthor_eval.formats.user_cache import user_cache
 
-__all__ = ["frames_per_second"]
+__all__ = ["FILM_FPS", "Video", "read_video", "sample_positions"]
+
+FILM_FPS = 10  # of the published films, whose frames are those of a trajectory
 
 # Silences FFmpeg, which prints errors of its own beside our one-line error. OpenCV reads the level when it first uses
 # FFmpeg, so it is set on import.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
-_COUNT = "n_frames"  # file with the number of frames
+# Limits of qwen-vl-utils (FPS_MIN_FRAMES, FPS_MAX_FRAMES, FRAME_FACTOR).
+_FEWEST_FRAMES = 4
+_MOST_FRAMES = 768
+_FACTOR = 2
+
+_SAMPLED = "sampled.json"  # file with the number of frames and their rate
 _HINT = "create the video again, or delete it to show the frames instead"
 
 
-def frames_per_second(path: Path) -> tuple[FrameRef, ...]:
-    """Return one frame per second of a video: the frames nearest to 0 s, 1 s, 2 s, ...
+@dataclass(frozen=True)
+class Video:
+    """Frames sampled from a film, in time order.
 
-    OpenCV decodes the video at the first call for its content. The name of the cache folder has the digest of the
-    content and the version of the decoder.
+    Attributes:
+        frames: references to the frames, at least one.
+        fps: sampled frames per second of the film, above 0.
+    """
+
+    frames: tuple[FrameRef, ...]
+    fps: float
+
+    def __post_init__(self) -> None:
+        """Raise ValueError if there is no frame, or the rate is not above 0."""
+        if not self.frames or not self.fps > 0:
+            raise ValueError(f"a video has frames and a rate above 0, not {len(self.frames)} frames at {self.fps} fps")
+
+
+def sample_positions(n_frames: int, film_fps: float, fps: float) -> tuple[int, ...]:
+    """Return the positions of the frames that are sampled from a film, ascending, as qwen-vl-utils chooses them.
+
+    There are `n_frames / film_fps * fps` of them, at least 4 and at most 768, rounded down to an even number, and
+    evenly spread from the first frame to the last. Of a film of one frame, which qwen-vl-utils refuses, it is taken.
+
+    Args:
+        n_frames: frames of the film, at least 1.
+        film_fps: its frames per second.
+        fps: frames per second to sample.
+    """
+    wanted = max(n_frames / film_fps * fps, _FEWEST_FRAMES)
+    n = math.floor(min(wanted, _MOST_FRAMES, n_frames) / _FACTOR) * _FACTOR
+    return tuple(round(rank * (n_frames - 1) / (n - 1)) for rank in range(n)) or (0,)
+
+
+def read_video(path: Path, fps: float) -> Video:
+    """Return the frames that are sampled from a film at this rate.
+
+    OpenCV decodes the film at the first call for its content and the rate. The name of the cache folder has the digest
+    of the content, the rate and the version of the decoder.
 
     Raises:
-        DataError: the video cannot be decoded to its end, or its frames cannot be stored.
+        DataError: the film cannot be decoded to its end, or its frames cannot be stored.
     """
     import cv2
 
     require_file(path, _HINT)
     with wrap_errors(f"{path}: cannot be read", _HINT):
         digest = digest_of_file(path)
-    folder = user_cache("video_frames") / f"{digest}-1fps-opencv{cv2.__version__}"
+    folder = user_cache("video_frames") / f"{digest}-spread-{fps:g}fps-opencv{cv2.__version__}"
     if not _is_complete(folder):
         with wrap_errors(f"{folder}: cannot be written", "make room, or set XDG_CACHE_HOME"):
-            _extract(path, folder)
-    return tuple(FrameRef(file) for file in sorted(folder.glob("*.png")))
+            _extract(path, fps, folder)
+    sampled = json.loads((folder / _SAMPLED).read_text())
+    return Video(tuple(FrameRef(file) for file in sorted(folder.glob("*.png"))), sampled["fps"])
 
 
 def _is_complete(folder: Path) -> bool:
     """Return False also if frames were deleted later, as programs that clean caches do."""
-    count = folder / _COUNT
-    return count.is_file() and count.read_text() == str(len(list(folder.glob("*.png"))))
+    sampled = folder / _SAMPLED
+    return sampled.is_file() and json.loads(sampled.read_text())["n_frames"] == len(list(folder.glob("*.png")))
 
 
-def _extract(path: Path, folder: Path) -> None:
+def _extract(path: Path, fps: float, folder: Path) -> None:
     """Decode the frames into a temporary folder and rename it when it is complete."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix="partial-") as partial:
         frames = Path(partial) / "frames"
         frames.mkdir()
-        _decode(path, frames)
+        _decode(path, fps, frames)
         try:
             frames.rename(folder)
         except OSError:
@@ -69,26 +116,49 @@ def _extract(path: Path, folder: Path) -> None:
                 raise
 
 
-def _decode(path: Path, folder: Path) -> None:
+def _decode(path: Path, fps: float, folder: Path) -> None:
+    film_fps, promised = _header(path)
+    positions = sample_positions(max(promised, 1), film_fps, fps)
+    n_frames = _store(path, positions, folder)
+    # The number in the header can be an estimate, so a second less is no error.
+    if not n_frames or n_frames < promised - film_fps:
+        raise DataError(f"{path}: only {n_frames} of its {promised} frames can be decoded; {_HINT}")
+    if n_frames != promised:
+        for file in folder.iterdir():
+            file.unlink()
+        positions = sample_positions(n_frames, film_fps, fps)
+        _store(path, positions, folder)
+    sampled = {"n_frames": len(positions), "fps": len(positions) / n_frames * film_fps}
+    (folder / _SAMPLED).write_text(json.dumps(sampled))
+
+
+def _header(path: Path) -> tuple[float, int]:
+    """Return the frames per second of a film, and their number if the header is right."""
     import cv2
 
-    video = cv2.VideoCapture(str(path))
+    film = cv2.VideoCapture(str(path))
     try:
-        fps, promised = video.get(cv2.CAP_PROP_FPS), int(video.get(cv2.CAP_PROP_FRAME_COUNT))
-        if not video.isOpened() or not fps > 0:
+        film_fps, promised = film.get(cv2.CAP_PROP_FPS), int(film.get(cv2.CAP_PROP_FRAME_COUNT))
+        if not film.isOpened() or not film_fps > 0:
             raise DataError(f"{path}: not a video that OpenCV can decode; {_HINT}")
-        n_frames = n_sampled = 0
-        while video.grab():
-            if n_frames >= n_sampled * fps - 0.5:  # the frame nearest to second `n_sampled`
-                decoded, pixels = video.retrieve()
+    finally:
+        film.release()
+    return film_fps, promised
+
+
+def _store(path: Path, positions: Collection[int], folder: Path) -> int:
+    """Store the frames at these positions; return the number of frames of the film."""
+    import cv2
+
+    film, wanted, n_frames = cv2.VideoCapture(str(path)), set(positions), 0
+    try:
+        while film.grab():
+            if n_frames in wanted:
+                decoded, pixels = film.retrieve()
                 if not decoded:
                     raise DataError(f"{path}: frame {n_frames} cannot be decoded; {_HINT}")
-                Image.fromarray(pixels[:, :, ::-1]).save(folder / f"{n_sampled:09d}.png")
-                n_sampled += 1
+                Image.fromarray(pixels[:, :, ::-1]).save(folder / f"{n_frames:09d}.png")
             n_frames += 1
     finally:
-        video.release()
-    # The number in the header can be an estimate, so a second less is no error.
-    if not n_sampled or n_frames < promised - fps:
-        raise DataError(f"{path}: only {n_frames} of its {promised} frames can be decoded; {_HINT}")
-    (folder / _COUNT).write_text(str(n_sampled))
+        film.release()
+    return n_frames

@@ -6,7 +6,7 @@ by joining the words.
 
 import re
 
-__all__ = ["canonical_type", "compact_name", "noun", "plural", "with_article"]
+__all__ = ["canonical_type", "compact_name", "noun", "object_type", "plural", "with_article"]
 
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
@@ -28,6 +28,13 @@ def noun(object_type: str) -> str:
         return f"sliced {noun(object_type.removesuffix('Sliced'))}"
     words: list[str] = re.findall(r"[A-Z]+(?![a-z])|[A-Z][a-z]*|[a-z0-9]+", object_type)
     return " ".join(word.lower() for word in words)
+
+
+def object_type(words: str) -> str:
+    """Return the object type of a result of `noun`."""
+    whole = words.removeprefix("sliced ")
+    name = "".join(word[:1].upper() + word[1:] for word in whole.split())
+    return name if whole == words else f"{name}Sliced"
 
 
 def with_article(words: str) -> str:

@@ -8,13 +8,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
-from typing import Protocol
+from typing import Any, Protocol
 
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.video import Video
 from infthor_eval.nieh.baselines import Predict
 from infthor_eval.nieh.contexts import ContextPart, Sample
+from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.notebook import Notebook
@@ -24,7 +26,7 @@ from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitKey, UnitRecord, Usage
-from model_adapters import Model, Reply, wrap_request_errors
+from model_adapters import Model, Part, Reply, wrap_request_errors
 
 __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answer_units"]
 
@@ -59,7 +61,7 @@ class _UnitRequest:
         return cls(unit, prepared, tuple(context), text)
 
     @property
-    def shown(self) -> tuple[str | FrameRef, ...]:
+    def shown(self) -> tuple[Part, ...]:
         """The context for the model, once its notes are taken."""
         shown = tuple(part for part in self.context if not isinstance(part, Notes))
         if len(shown) < len(self.context):
@@ -75,7 +77,7 @@ class _UnitRequest:
         """
         return fingerprint(
             {
-                "context": [[part.digest] if isinstance(part, FrameRef) else part for part in self.shown],
+                "context": [_content(part) for part in self.shown],
                 "text": self.text,
                 "answers": list(self.unit.payload.answers),
                 "decoding": self.prepared.decoding.document(),
@@ -109,8 +111,10 @@ class Answerer(Protocol):
     def batch_size(self) -> int:
         """Number of units worth answering at once."""
 
-    def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
-        """Return a context with the model's notes as text; missing ones are taken now.
+    def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
+        """Return a context as the model is given it: its notes as text, missing ones are taken now; films as images.
+
+        Films are left as they are for a model with a video input.
 
         Raises:
             DataError: a frame cannot be read.
@@ -135,16 +139,18 @@ class ModelAnswerer:
     def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self.batch_size = model.capabilities.batch_size
         self._name = model.name
+        self._video_input = model.capabilities.video_input
         self._notebook = Notebook(model, session)
         self._conversation = model.conversation()
         self._start = self._conversation.mark()
         self._after_context = self._start
-        self._context: tuple[str | FrameRef, ...] | None = None
+        self._context: tuple[Part, ...] | None = None
 
-    def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
+    def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
         """See `Answerer`."""
+        shown = context if self._video_input else as_images(context)
         with wrap_request_errors(self._name):
-            return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in context)
+            return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in shown)
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
@@ -171,7 +177,7 @@ class BaselineAnswerer:
     def __init__(self, predict: Predict) -> None:
         self._predict = predict
 
-    def read(self, context: Sequence[ContextPart]) -> tuple[str | FrameRef, ...]:
+    def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
         """See `Answerer`."""
         return tuple(part for part in context if not isinstance(part, Notes))
 
@@ -202,6 +208,13 @@ def answer_units(
         yield from _in_context(list(in_one_context), answerer, session)
 
 
+def _content(part: Part) -> Any:
+    """Return a part as JSON values, frames by the digests of their content."""
+    if isinstance(part, Video):
+        return {"video": [frame.digest for frame in part.frames], "fps": part.fps}
+    return [part.digest] if isinstance(part, FrameRef) else part
+
+
 def _names(request: _UnitRequest) -> list[str]:
     return [name for part in request.context for name in _names_in(part)]
 
@@ -209,6 +222,8 @@ def _names(request: _UnitRequest) -> list[str]:
 def _names_in(part: ContextPart) -> list[str]:
     if isinstance(part, Notes):
         return [f"notes of {part.settings}", *(frame.path.name for frame in part.frames)]
+    if isinstance(part, Video):
+        return [f"video of {part.fps} fps", *(frame.path.name for frame in part.frames)]
     return [part.path.name if isinstance(part, FrameRef) else part]
 
 

@@ -24,7 +24,13 @@ _BASELINE_TOKENS_PER_FRAME = 121
 
 
 class AnsweringModel(Protocol):
-    """A subject that answers questions: a model or a baseline."""
+    """A subject that answers questions: a model or a baseline.
+
+    Attributes:
+        video_input: True if it is given films as videos, False if as images; None if it sees nothing.
+    """
+
+    video_input: bool | None
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
         """Return the size of a frame in contexts that are measured in tokens.
@@ -43,6 +49,7 @@ class AnsweringModel(Protocol):
 class _ConversationModel:
     def __init__(self, model: Model) -> None:
         self._model = model
+        self.video_input: bool | None = model.capabilities.video_input
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
         tokens = self._model.tokens_per_frame(frame)
@@ -53,13 +60,19 @@ class _ConversationModel:
         return tokens
 
     def cost(self, prepared: PreparedTask) -> str | None:
-        return budget_of(prepared, self._model).description if self._model.capabilities.counts_tokens else None
+        lines = [budget_of(prepared, self._model).description] if self._model.capabilities.counts_tokens else []
+        if prepared.task_samples.shows_films:
+            name, as_video = self._model.name, "the film is given as a video"
+            lines.append(as_video if self.video_input else f"{name} has no video input, the film is given as images")
+        return "; ".join(lines) or None
 
     def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
         return lambda _, session: ModelAnswerer(self._model, session)
 
 
 class _BaselineModel:
+    video_input: bool | None = None
+
     def __init__(self, baseline: Baseline) -> None:
         self._baseline = baseline
 

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.errors import DataError, ModelError
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.contexts import ContextPart, Sample
+from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.task import PreparedTask
-from model_adapters import Model
+from model_adapters import Model, Part
 
 __all__ = ["Budget", "budget_of"]
 
@@ -91,6 +91,7 @@ def _counts(model: Model, prepared: PreparedTask, samples: Sequence[Sample]) -> 
     refusals: list[ModelError] = []
     for sample in samples:
         context, text = prepared.task_samples.request(sample)
+        context = context if model.capabilities.video_input else as_images(context)
         try:
             counts.append(_most_tokens(model, [*context, text], prepared.decoding.max_new_tokens))
         except ModelError as error:  # one question's text may be the reason; the run records it as failed
@@ -114,7 +115,7 @@ def _most_tokens(model: Model, parts: Sequence[ContextPart], max_new_tokens: int
     return max([_tokens(model, empty) + room + max_new_tokens, *reading])
 
 
-def _tokens(model: Model, parts: Sequence[str | FrameRef]) -> int:
+def _tokens(model: Model, parts: Sequence[Part]) -> int:
     conversation = model.conversation()
     conversation.append(*parts)
     try:

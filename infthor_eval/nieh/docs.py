@@ -11,7 +11,9 @@ from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import PublishedColumns, Question
+from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
+from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.notes import Notes, NoteSettings
 from infthor_eval.nieh.samples import TaskSamples, open_set
@@ -19,7 +21,8 @@ from infthor_eval.nieh.samples import TaskSamples, open_set
 __all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "prompt_of", "sample_of", "samples_of"]
 
 Doc = dict[str, Any]
-_PLACEHOLDERS = {FrameRef: "<image>", Notes: "<notes>"}  # the first is lm-eval's own mark of an image in a text
+# The first is lm-eval's own mark of an image in a text.
+_PLACEHOLDERS = {FrameRef: "<image>", Video: "<video>", Notes: "<notes>"}
 
 
 def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
@@ -39,6 +42,7 @@ def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> D
         "context": task_samples.context_name,
         "variant": sample.variant,
         "frames": list(sample.frames),
+        "fps": sample.fps,
         "notes": [sample.notes.window, sample.notes.max_new_tokens] if sample.notes else [],
         "set": str(task_samples.data.root),
         "frame_ablation": asdict(task_samples.frame_ablation),
@@ -60,7 +64,7 @@ def sample_of(doc: Doc) -> Sample:
         file=doc["file"],
     )
     notes = NoteSettings(*doc["notes"]) if doc["notes"] else None
-    return Sample(question, tuple(doc["frames"]), doc["variant"], notes=notes)
+    return Sample(question, tuple(doc["frames"]), doc["variant"], notes=notes, fps=doc["fps"])
 
 
 def samples_of(docs: Sequence[Doc]) -> TaskSamples:
@@ -73,9 +77,9 @@ def samples_of(docs: Sequence[Doc]) -> TaskSamples:
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:
-    """Return the request of a doc, with the question's text last."""
+    """Return the request of a doc, with the question's text last and films as images, for lm-eval's own models."""
     context, text = samples_of([doc]).request(sample_of(doc))
-    return [*context, text]
+    return [*as_images(context), text]
 
 
 def doc_prompt(doc: Doc) -> str:
@@ -83,10 +87,11 @@ def doc_prompt(doc: Doc) -> str:
     return prompt_of(samples_of([doc]), sample_of(doc))
 
 
-def prompt_of(task_samples: TaskSamples, sample: Sample) -> str:
-    """Return the text of a sample's request, with placeholders for frames and notes."""
+def prompt_of(task_samples: TaskSamples, sample: Sample, *, videos: bool = False) -> str:
+    """Return the text of a sample's request, with placeholders for frames and notes, and for videos if it has them."""
     context, text = task_samples.request(sample)
-    return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*context, text))
+    shown = context if videos else as_images(context)
+    return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*shown, text))
 
 
 def doc_target(question: Question) -> str:

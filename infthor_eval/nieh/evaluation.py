@@ -57,14 +57,14 @@ class NiehEvaluation:
                 for skipped in item.task_samples.skipped
             ],
             config={
-                "tasks": {name: task.config(prepared[name]) for name, task in tasks.items()},
+                "tasks": {name: task.config(prepared[name], model.video_input) for name, task in tasks.items()},
                 "k_tokens": self._options.k_tokens,
                 "tokens_per_frame": tokens,
                 "frames": self._options.frames,
             },
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
         )
-        return BoundNieh(workload, prepared, open_answerer)
+        return BoundNieh(workload, prepared, open_answerer, model.video_input)
 
     def _tokens_per_frame(self, model: AnsweringModel) -> int | None:
         """Return the size of a frame where a context is measured in it: the option's value, or the subject's own."""
@@ -109,19 +109,32 @@ class PreparedEvaluation:
 
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
-        return BoundNieh(Workload(_groups(self._prepared)), self._prepared, answering_model(subject).fit({}))
+        model = answering_model(subject)
+        return BoundNieh(Workload(_groups(self._prepared)), self._prepared, model.fit({}), model.video_input)
 
 
 class BoundNieh:
     """NIEH for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
     def __init__(
-        self, workload: Workload[NiehUnit], prepared: Mapping[str, PreparedTask], open_answerer: OpenAnswerer
+        self,
+        workload: Workload[NiehUnit],
+        prepared: Mapping[str, PreparedTask],
+        open_answerer: OpenAnswerer,
+        video_input: bool | None,
     ) -> None:
-        """Take the work, the tasks by name, and a function that opens the answerer of a task on a trajectory."""
+        """Take the work and what does it.
+
+        Args:
+            workload: the work.
+            prepared: the tasks by name.
+            open_answerer: opens the answerer of a task on a trajectory.
+            video_input: whether the model is given films as videos (`AnsweringModel.video_input`).
+        """
         self.workload = workload
         self._prepared = prepared
         self._open_answerer = open_answerer
+        self._video_input = video_input
 
     def run(self, group: Group[NiehUnit], session: Session[NiehAnswer]) -> Iterator[UnitRecord[NiehAnswer]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
@@ -137,7 +150,7 @@ class BoundNieh:
             number=number,
             doc=doc_of(prepared.task_samples, sample),
             target=doc_target(sample.question),
-            prompt=prompt_of(prepared.task_samples, sample),
+            prompt=prompt_of(prepared.task_samples, sample, videos=bool(self._video_input)),
             settings=prepared.generation_kwargs,
             reply=record.payload.reply or "",
         )

@@ -8,7 +8,8 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.contexts import Context, ContextPart
+from infthor_eval.formats.video import Video
+from infthor_eval.nieh.contexts import Context, ContextPart, Sample
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.options import SHOWN, check_frames
 
@@ -41,7 +42,7 @@ class FrameAblation:
         if self.frames == "other" and len(_trajectories(data)) < 2:
             raise UsageError(f"--frames other: {data.root} has questions on one trajectory only; give another set")
 
-    def apply(self, parts: Sequence[ContextPart], data: NiehSet, context: Context, traj_id: str) -> list[ContextPart]:
+    def apply(self, parts: Sequence[ContextPart], data: NiehSet, context: Context, sample: Sample) -> list[ContextPart]:
         """Return the parts of a request with the frames replaced."""
         if self.frames == SHOWN:
             return list(parts)
@@ -49,9 +50,9 @@ class FrameAblation:
         if self.frames == "blank":
             shown = [blank_like(frame) for frame in frames]
         elif self.frames == "shuffled":
-            shown = self._shuffle(frames, traj_id)
+            shown = self._shuffle(frames, sample.question.traj_id)
         else:
-            shown = self._of_another(frames, data, context, traj_id)
+            shown = self._of_another(frames, data, context, sample)
         left = iter(shown)
         return [_with_frames(part, [next(left) for _ in _frames_in(part)]) for part in parts]
 
@@ -63,11 +64,14 @@ class FrameAblation:
             draw.shuffle(shuffled)
         return shuffled
 
-    def _of_another(self, frames: Sequence[FrameRef], data: NiehSet, context: Context, traj_id: str) -> list[FrameRef]:
+    def _of_another(
+        self, frames: Sequence[FrameRef], data: NiehSet, context: Context, sample: Sample
+    ) -> list[FrameRef]:
         """Return the frames at the same positions of another trajectory; of a shorter one, modulo its length."""
+        traj_id = sample.question.traj_id
         others = [other for other in _trajectories(data) if other != traj_id]
-        shown = context.frames(data, random.Random(f"{self.seed}/{traj_id}").choice(others))
-        positions = {frame: position for position, frame in enumerate(context.frames(data, traj_id))}
+        shown = context.frames(data, random.Random(f"{self.seed}/{traj_id}").choice(others), sample.fps)
+        positions = {frame: position for position, frame in enumerate(context.frames(data, traj_id, sample.fps))}
         return [shown[positions[frame] % len(shown)] for frame in frames]
 
 
@@ -76,7 +80,7 @@ def _trajectories(data: NiehSet) -> list[str]:
 
 
 def _frames_in(part: ContextPart) -> tuple[FrameRef, ...]:
-    if isinstance(part, Notes):
+    if isinstance(part, Notes | Video):
         return part.frames
     return (part,) if isinstance(part, FrameRef) else ()
 
@@ -84,4 +88,6 @@ def _frames_in(part: ContextPart) -> tuple[FrameRef, ...]:
 def _with_frames(part: ContextPart, frames: Sequence[FrameRef]) -> ContextPart:
     if isinstance(part, Notes):
         return Notes(part.traj_id, tuple(frames), part.settings)
+    if isinstance(part, Video):
+        return Video(tuple(frames), part.fps)
     return frames[0] if frames else part

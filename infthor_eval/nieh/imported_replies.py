@@ -21,6 +21,7 @@ from infthor_eval.runs.run_config import run_config
 __all__ = ["ImportedRun", "Refusal", "import_logs"]
 
 _PUBLISHED_NAME = re.compile(r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$")
+_RATE = re.compile(r"(?P<fps>\d+) ?_?fps", re.IGNORECASE)
 # Published modes: the task of ours, and its context.
 _MODES = {
     None: ("nieh_full", "trajectory"),
@@ -143,6 +144,10 @@ def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, 
     task, context = _MODES[first.mode]
     if context == "truncate_head" and first.size:
         return f"{task}_{first.size:g}k", {"context": context, "ctx_size": first.size}
+    rate = _RATE.search(log.name)
+    if context == "video" and rate:
+        fps = float(rate["fps"])
+        return task if fps == 1 else f"{task}_{fps:g}fps", {"context": context, "fps": fps}
     if context == "clip_retrieval" and first.n_frames:
         return task, {"context": context, "top_k": max(reply.n_frames or 0 for reply in replies)}
     return task, {"context": context}

@@ -36,10 +36,15 @@ class TaskSamples:
     sources: Mapping[str, Any]
     frame_ablation: FrameAblation = field(default_factory=FrameAblation)
 
+    @property
+    def shows_films(self) -> bool:
+        """True if the samples show films, which a model is given as a video or as images."""
+        return any(sample.fps is not None for sample in self.samples)
+
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows it."""
         parts, text = self.context.request(self.data, sample)
-        return self.frame_ablation.apply(parts, self.data, self.context, sample.question.traj_id), text
+        return self.frame_ablation.apply(parts, self.data, self.context, sample), text
 
 
 @lru_cache(maxsize=8)

@@ -73,10 +73,16 @@ class NiehTask:
             return prepared.task_samples.samples
         return find_samples(self._config | {"tokens_per_frame": tokens_per_frame}).samples
 
-    def config(self, prepared: PreparedTask) -> dict[str, Any]:
-        """Return everything that the numbers of the task depend on, as JSON values."""
+    def config(self, prepared: PreparedTask, video_input: bool | None) -> dict[str, Any]:
+        """Return everything that the numbers of the task depend on, as JSON values.
+
+        Args:
+            prepared: the task, prepared for a model.
+            video_input: True if the model is given films as videos, False if as images; None if it sees nothing.
+        """
         samples, names = prepared.task_samples, prepared.metrics.names
         skipped = [{"question_id": i.question.id, "variant": i.variant, "reason": i.reason} for i in samples.skipped]
+        film = {} if video_input is None or not samples.shows_films else {"film": "video" if video_input else "images"}
         return {
             "config": dict(self.settings),
             "decoding": prepared.decoding.document(),
@@ -86,6 +92,7 @@ class NiehTask:
             "sources": dict(samples.sources),
             "n_samples": len(samples.samples),
             "skipped": skipped,
+            **film,
         }
 
 

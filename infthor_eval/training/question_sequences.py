@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.samples import TaskSamples
@@ -39,7 +40,7 @@ def question_sequences(encoder: Encoder, task: TaskSamples, limit: int) -> Itera
 
 def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) -> TrainingSequence:
     context, text = task.request(sample)
-    parts = [part for part in context if not isinstance(part, Notes)]
+    parts = [part for part in as_images(context) if not isinstance(part, Notes)]  # training has no video input
     if len(parts) < len(context):
         raise UsageError("training has no notes of a model; use another context")
     return encoder.answer(name, [*parts, text], doc_target(sample.question))

@@ -8,10 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.check.clauses import raises, require
-from model_adapters.check.questions import NEW_TOKENS, QUESTION, ask, same_reply, start_conversation
-from model_adapters.protocols import Decoding, Model, Reply
+from model_adapters.check.questions import GREEDY, NEW_TOKENS, QUESTION, ask, same_reply, start_conversation
+from model_adapters.protocols import Decoding, Model, Reply, Video
 
-__all__ = ["check_choices", "check_flight", "check_sampling"]
+__all__ = ["check_choices", "check_flight", "check_sampling", "check_video"]
 
 _MOST_THREADS = 4
 _CHOICES = ("bright", "dark", "dark and bright")  # one is a prefix of another
@@ -43,6 +43,23 @@ def check_choices(model: Model, frame: FrameRef) -> None:
     for choices in (_CHOICES, _CHOICES[1:], _CHOICES[:1]):
         text = talk.reply(Decoding(max_new_tokens=64, choices=choices)).text
         require(text in choices, f"a reply is none of its choices: {text!r}")
+
+
+def check_video(model: Model, black: FrameRef, white: FrameRef) -> None:
+    """Check that videos are taken if the model claims so, and that replies to them do not depend on earlier ones."""
+    videos = [Video((black, white, white, black), fps=1.0), Video((black, white, white, white), fps=1.0)]
+    if not model.capabilities.video_input:
+        refuses = raises(ModelError, start_conversation(model, videos[0], QUESTION).reply, GREEDY)
+        require(refuses, "a video does not raise ModelError though video_input is false; call check_turns first")
+        return
+    talks = [start_conversation(model, video, QUESTION) for video in videos]
+    if model.capabilities.counts_tokens:
+        without, within = start_conversation(model, QUESTION).n_tokens or 0, talks[0].n_tokens or 0
+        require(within > without, "n_tokens does not grow with a video")
+    replies = [talk.reply(GREEDY) for talk in talks]
+    if model.capabilities.deterministic:
+        again = [talk.reply(GREEDY) for talk in reversed(talks)][::-1]
+        require(all(map(same_reply, replies, again)), "a reply to a video depends on the videos before it")
 
 
 def check_flight(model: Model, black: FrameRef, white: FrameRef) -> None:

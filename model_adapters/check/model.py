@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.claims import check_choices, check_flight, check_sampling
+from model_adapters.check.claims import check_choices, check_flight, check_sampling, check_video
 from model_adapters.check.clauses import check_identity, check_members
 from model_adapters.check.conversation import check_counts, check_marks, check_parts, check_turns
 from model_adapters.check.replies import check_continuations, check_frames, check_reply, check_sharing
@@ -28,5 +28,6 @@ def model_checks(model: Model, black: FrameRef, white: FrameRef) -> dict[str, Ca
         "continuations": partial(check_continuations, model, black, white),
         "sampling": partial(check_sampling, model, black),
         "choices": partial(check_choices, model, black),
+        "video": partial(check_video, model, black, white),
         "flight": partial(check_flight, model, black, white),
     }

@@ -82,6 +82,7 @@ class HfModel(CheckpointModel):
         return Capabilities(
             sampling=True,
             choices=True,
+            video_input=self._prompter.takes_videos,
             batch_size=self._batch_size,
             max_tokens=self._context_limit,
             max_tokens_before_extension=None if self._options.rope is None else text_config.max_position_embeddings,

@@ -9,7 +9,7 @@ import torch
 from infthor_eval.errors import ModelError
 from model_adapters.hf.family import Family
 from model_adapters.hf.features import FeatureCache
-from model_adapters.hf.prompt import Frame, Piece
+from model_adapters.hf.prompt import Clip, Frame, Piece
 
 __all__ = ["EmbeddedSpan", "Embedder"]
 
@@ -21,7 +21,7 @@ class EmbeddedSpan:
     Attributes:
         embeds: embeddings, (tokens, hidden), on the embedding layer's device.
         positions: position ids, (1, tokens) or (3, 1, tokens), on the same device.
-        starts: position of the first token of each piece.
+        starts: position behind everything before each piece, which is that of the first token of a text or a frame.
         end: position of the token that follows the span.
     """
 
@@ -32,7 +32,7 @@ class EmbeddedSpan:
 
 
 class Embedder:
-    """Embeds spans of prompts for one model of a family, with a cache of the frames' features."""
+    """Embeds spans of prompts for one model of a family, with a cache of the features of frames and clips."""
 
     def __init__(self, model: Any, family: Family, features: FeatureCache) -> None:
         self._family = family
@@ -41,13 +41,13 @@ class Embedder:
 
     @torch.inference_mode()
     def __call__(self, pieces: Sequence[Piece], start: int) -> EmbeddedSpan:
-        """Embed pieces whose first token has the position `start`.
+        """Embed pieces that begin at the position `start`, behind everything before them.
 
         Raises:
             DataError: a frame cannot be read.
             ModelError: processor and model disagree on the number of a frame's tokens.
         """
-        frames = [piece for piece in pieces if isinstance(piece, Frame)]
+        visuals = [piece for piece in pieces if not isinstance(piece, int)]
         flat: list[int] = []
         slots: list[int] = []
         firsts: list[int] = []
@@ -56,27 +56,29 @@ class Embedder:
             if isinstance(piece, int):
                 flat.append(piece)
             else:
-                slots.extend(len(flat) + at for at, token in enumerate(piece.ids) if token == self._family.slot_id)
+                # All tokens of a clip are slots; a frame can have tokens of text among them.
+                is_slot = [isinstance(piece, Clip) or token == self._family.slot_id for token in piece.ids]
+                slots.extend(len(flat) + at for at, slot in enumerate(is_slot) if slot)
                 flat.extend(piece.ids)
         # Features first: reading and scaling of frames on the CPU overlaps with the device's previous chunk.
-        features = self._slot_features(frames, len(slots)) if frames else None
+        features = self._slot_features(visuals, len(slots)) if visuals else None
         device = self._embeddings.weight.device
         # Positions are computed on the CPU, because reading them below would otherwise wait for the device.
         ids = torch.tensor(flat)
-        positions = self._family.positions(ids, [frame.size for frame in frames], start)
+        positions = self._family.positions(ids, [piece.shape for piece in visuals], start)
         embeds = self._embeddings(ids.to(device))
         if features is not None:
             embeds[slots] = features.to(embeds)
-        # A piece's first token has the same position on every axis; the next piece starts behind the largest one.
-        axes = positions.reshape(-1, len(flat))
-        first = axes[0].tolist()
-        return EmbeddedSpan(embeds, positions.to(device), tuple(first[at] for at in firsts), int(axes.max()) + 1)
+        # A piece starts behind the largest position before it, on any axis.
+        largest = positions.reshape(-1, len(flat)).amax(dim=0).cummax(dim=0).values
+        behind = [start, *(largest + 1).tolist()]
+        return EmbeddedSpan(embeds, positions.to(device), tuple(behind[at] for at in firsts), behind[-1])
 
-    def _slot_features(self, frames: Sequence[Frame], n_slots: int) -> torch.Tensor:
-        features = torch.cat(self._features.get(frames))
+    def _slot_features(self, visuals: Sequence[Frame | Clip], n_slots: int) -> torch.Tensor:
+        features = torch.cat(self._features.get(visuals))
         if len(features) != n_slots:
             raise ModelError(
-                f"the processor makes {n_slots} image tokens of {len(frames)} frames and the model "
+                f"the processor makes {n_slots} image tokens of {len(visuals)} frames and the model "
                 f"{len(features)} features; they do not belong to one checkpoint"
             )
         return features

@@ -1,14 +1,53 @@
 """Protocol of a model family: everything that differs between families."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import torch
 from PIL import Image
 
-__all__ = ["Family", "MakeFamily", "Size"]
+__all__ = ["ClipShape", "Family", "MakeFamily", "Shape", "Size", "VideoInput"]
 
 Size = tuple[int, int]  # width, height in pixels
+
+
+@dataclass(frozen=True)
+class ClipShape:
+    """All that tokens and positions of a clip depend on: successive frames of a video that are encoded together.
+
+    Attributes:
+        size: width and height of the video's frames, in pixels.
+        number: number of the clip in its video, from 0.
+        n_clips: clips of the video.
+        seconds: time from one clip to the next.
+    """
+
+    size: Size
+    number: int
+    n_clips: int
+    seconds: float
+
+
+Shape = Size | ClipShape  # of a frame, or of a clip
+
+
+class VideoInput(Protocol):
+    """Conversion of videos to tokens and features, clip by clip.
+
+    Attributes:
+        placeholder_id: token id of a video in the tokenised chat template, and of each token that it expands to.
+        clip_frames: frames of a clip; the last one is repeated where a video has too few.
+    """
+
+    placeholder_id: int
+    clip_frames: int
+
+    def n_tokens(self, shape: ClipShape) -> int:
+        """Return the number of tokens of a clip."""
+
+    def features(self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]) -> list[torch.Tensor]:
+        """Return the embeddings for the tokens of each clip, (tokens, hidden), on the embedding layer's device."""
 
 
 class Family(Protocol):
@@ -17,16 +56,18 @@ class Family(Protocol):
     Attributes:
         placeholder_id: token id of a frame in the tokenised chat template.
         slot_id: token id whose embeddings are replaced by the frame's features.
+        video: conversion of videos, or None for a family without a video input.
     """
 
     placeholder_id: int
     slot_id: int
+    video: VideoInput | None
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return the ids that the placeholder of a frame of this size expands to."""
 
-    def template_ids(self) -> tuple[int, ...]:
-        """Return the ids of a frame in a template: the placeholder and, in some families, markers around it."""
+    def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
+        """Return the ids of a frame or a video in a template: its placeholder and, in some families, markers."""
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the embeddings for the slots of each image, (slots, hidden), on the embedding layer's device.
@@ -34,13 +75,13 @@ class Family(Protocol):
         They carry gradients, for training; inference calls this under `torch.inference_mode`.
         """
 
-    def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
-        """Return the position ids of a span of a sequence that cuts no frame.
+    def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
+        """Return the position ids of a span of a sequence that cuts no frame and no clip.
 
         Args:
-            ids: token ids, (tokens,), frames expanded, on the CPU.
-            sizes: sizes of the frames in the span.
-            start: position of the first token.
+            ids: token ids, (tokens,), frames and clips expanded, on the CPU.
+            shapes: shapes of the frames and clips in the span, in order.
+            start: position behind everything before the span.
 
         Returns:
             Positions, (1, tokens), or (3, 1, tokens) for positions with three axes, on the CPU.

@@ -13,7 +13,7 @@ import torch
 from model_adapters.hf.embedding import Embedder
 from model_adapters.hf.family import Family
 from model_adapters.hf.kv_cache import BufferedCache
-from model_adapters.hf.prompt import Frame, Piece, n_tokens, token_ids
+from model_adapters.hf.prompt import Piece, n_tokens, token_ids
 from model_adapters.hf.rope import LengthRope
 
 __all__ = ["Prefix"]
@@ -55,7 +55,7 @@ class Prefix:
         self._cache = BufferedCache(self._storage)
         self._pieces: list[Piece] = []
         self._ends: list[int] = []  # tokens up to the end of each piece
-        self._starts: list[int] = [0]  # position of each piece's first token, and of the next token
+        self._starts: list[int] = [0]  # position behind everything before each piece, and of the next token
 
     @property
     def n_tokens(self) -> int:
@@ -92,8 +92,8 @@ class Prefix:
     def _set_rope(self, rope: LengthRope, pieces: Sequence[Piece]) -> None:
         """Set the rotary frequencies for a prompt; a sequence that was encoded with others is dropped."""
         ids = torch.tensor(list(token_ids(pieces)))
-        sizes = [piece.size for piece in pieces if isinstance(piece, Frame)]
-        n_positions = int(self._family.positions(ids, sizes, 0).max()) + 1
+        shapes = [piece.shape for piece in pieces if not isinstance(piece, int)]
+        n_positions = int(self._family.positions(ids, shapes, 0).max()) + 1
         if rope.key(n_positions) != self._rope_key:
             self.reset()
             rope.set(n_positions)

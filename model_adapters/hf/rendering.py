@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from jinja2 import TemplateError
@@ -12,9 +12,9 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
 from model_adapters.hf.memory_limit import OutOfMemoryError, limit_memory
 from model_adapters.hf.time_limit import OutOfTimeError, limit_time
-from model_adapters.protocols import Turn
+from model_adapters.protocols import Part, Turn, Video
 
-__all__ = ["render", "starts_with_bos"]
+__all__ = ["Marks", "render", "starts_with_bos", "writes_videos"]
 
 # Errors of a template that is broken or does not support the turns: Jinja's, and those of its expressions.
 _REFUSALS = (
@@ -29,18 +29,32 @@ _REFUSALS = (
 _PRINTED = "{'type': 'text'"  # appears where a template that expects a string prints a list
 
 
-def render(tokenizer: Any, template: str, turns: Sequence[Turn], image_token: str) -> str:
+@dataclass(frozen=True)
+class Marks:
+    """Tokens that stand for a frame and for a video in the text of a template; `video` is None if there is none."""
+
+    image: str
+    video: str | None = None
+
+    def of(self, part: Part) -> str:
+        """Return the text that a part has in a template: the token of a frame or a video, a text without its edges."""
+        if isinstance(part, Video):
+            return self.video or ""
+        return self.image if isinstance(part, FrameRef) else part.strip()
+
+
+def render(tokenizer: Any, template: str, turns: Sequence[Turn], marks: Marks) -> str:
     """Render the chat template over all turns, asking for the reply.
 
-    Some templates (LLaVA's) write all images of a turn before its texts. If that would move frames away from between
-    the texts, the turn is passed as one text that contains the image tokens. Some templates (Pixtral's) accept a system
-    turn only as a string instead of a list of texts.
+    Some templates (LLaVA's) write all images of a turn before its texts. If that would move frames or videos away from
+    between the texts, the turn is passed as one text that contains their tokens. Some templates (Pixtral's) accept a
+    system turn only as a string instead of a list of texts.
 
     Raises:
         ModelError: the template refuses the turns, or drops a text.
     """
     trials = [_render_alone(tokenizer, template, turn) for turn in turns]
-    ordered = [_with_frames_in_place(turn, trial, image_token) for turn, trial in zip(turns, trials, strict=True)]
+    ordered = [_with_frames_in_place(turn, trial, marks) for turn, trial in zip(turns, trials, strict=True)]
     if len(turns) == 1 and trials[0] is not None and ordered[0] == replace(turns[0], role="user"):
         return trials[0]  # the trial rendered the whole conversation
     with_lists = [_message(turn) for turn in ordered]
@@ -58,33 +72,45 @@ def starts_with_bos(tokenizer: Any, text: str) -> bool:
     return tokenizer.bos_token is not None and text.startswith(tokenizer.bos_token)
 
 
+def writes_videos(tokenizer: Any, template: str, marks: Marks) -> bool:
+    """Return whether a template writes the token of a video where a turn has one; no video is looked at."""
+    if marks.video is None:
+        return False
+    messages = [{"role": "user", "content": [{"type": "video"}, {"type": "text", "text": "?", "content": "?"}]}]
+    try:
+        return _apply(tokenizer, template, (), messages).count(marks.video) == 1
+    except ModelError:
+        return False
+
+
 def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
-    """Return the text of a turn with frames and texts, as a user's only turn; None for other turns.
+    """Return the text of a turn with texts and more, as a user's only turn; None for other turns.
 
     It is rendered alone because templates may treat a turn differently when another one follows.
     """
-    if len({isinstance(part, FrameRef) for part in turn.parts}) < 2:
+    if len({isinstance(part, str) for part in turn.parts}) < 2:
         return None
     alone = replace(turn, role="user")
     return _apply(tokenizer, template, [alone], [_message(alone)])
 
 
-def _with_frames_in_place(turn: Turn, trial: str | None, image_token: str) -> Turn:
-    """Return the turn as one text with image tokens if the template would change the order of its parts."""
-    parts = [part.strip() if isinstance(part, str) else image_token for part in turn.parts]
-    n_frames = sum(isinstance(part, FrameRef) for part in turn.parts)
-    if trial is None or trial.count(image_token) != n_frames or _in_order(trial, parts):
+def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:
+    """Return the turn as one text with tokens of frames and videos if the template would change its parts' order."""
+    parts = [marks.of(part) for part in turn.parts]
+    tokens = Counter(marks.of(part) for part in turn.parts if not isinstance(part, str))
+    if trial is None or any(trial.count(token) != n for token, n in tokens.items()) or _in_order(trial, parts):
         return turn
-    return replace(turn, parts=("".join(part if isinstance(part, str) else image_token for part in turn.parts),))
+    return replace(turn, parts=("".join(part if isinstance(part, str) else marks.of(part) for part in turn.parts),))
 
 
 def _message(turn: Turn) -> dict[str, Any]:
-    # Most templates read the key "text", a few "content".
-    content = [
-        {"type": "text", "text": part, "content": part} if isinstance(part, str) else {"type": "image"}
-        for part in turn.parts
-    ]
-    return {"role": turn.role, "content": content}
+    return {"role": turn.role, "content": [_item(part) for part in turn.parts]}
+
+
+def _item(part: Part) -> dict[str, str]:
+    if isinstance(part, str):
+        return {"type": "text", "text": part, "content": part}  # most templates read "text", a few "content"
+    return {"type": "video" if isinstance(part, Video) else "image"}
 
 
 def _string_message(turn: Turn) -> dict[str, Any]:

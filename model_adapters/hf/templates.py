@@ -13,7 +13,7 @@ __all__ = ["chat_template", "plain_template"]
 _PLAIN = """\
 {%- for message in messages -%}
 {%- for part in message.content -%}
-{{- IMAGE if part.type == 'image' else part.text -}}
+{{- IMAGE if part.type == 'image' else VIDEO if part.type == 'video' else part.text -}}
 {%- endfor -%}
 {%- endfor -%}
 """
@@ -38,6 +38,13 @@ def chat_template(folder: Path, tokenizer: Any) -> str:
 
 
 def plain_template(tokenizer: Any, family: Family) -> str:
-    """Return a template that concatenates the texts and frames of all turns; the family knows the tokens of a frame."""
-    image = "".join(tokenizer.convert_ids_to_tokens(list(family.template_ids())))
-    return _PLAIN.replace("IMAGE", json.dumps(image, ensure_ascii=False))
+    """Return a template that concatenates the parts of all turns; the family knows the tokens of frames and videos."""
+    placeholders = {
+        "IMAGE": family.placeholder_id,
+        "VIDEO": None if family.video is None else family.video.placeholder_id,
+    }
+    template = _PLAIN
+    for name, placeholder in placeholders.items():
+        ids = [] if placeholder is None else list(family.template_ids(placeholder))
+        template = template.replace(name, json.dumps("".join(tokenizer.convert_ids_to_tokens(ids)), ensure_ascii=False))
+    return template

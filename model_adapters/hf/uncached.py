@@ -5,6 +5,7 @@ over images, or vision features that enter at several layers.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -17,11 +18,11 @@ from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.decoding import ReplyState, extend_replies
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.rendering import render, starts_with_bos
+from model_adapters.hf.rendering import Marks, render, starts_with_bos
 from model_adapters.hf.replies import begin_reply, end_reply
 from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
-from model_adapters.protocols import Decoding, Reply, Turn
+from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
 __all__ = ["UncachedModel", "expand_image_token", "image_token", "process_turns"]
 
@@ -35,7 +36,7 @@ def process_turns(processor: Any, template: str, turns: Sequence[Turn]) -> Any:
         DataError: a frame cannot be read.
         ModelError: the template refuses the turns.
     """
-    text = render(processor.tokenizer, template, turns, image_token(processor))
+    text = render(processor.tokenizer, template, turns, Marks(image_token(processor)))
     images = [part.load() for turn in turns for part in turn.parts if isinstance(part, FrameRef)]
     return processor(
         text=[text],
@@ -97,6 +98,11 @@ class UncachedModel(HfModel):
         """Return the tokens of one frame, as the checkpoint's processor expands it."""
         with wrap_model_errors(self.name):
             return len(expand_image_token(self._processor, frame.load()))
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Those of `HfModel` without a video input: the processor would need torchvision for it."""
+        return replace(super().capabilities, video_input=False)
 
     def close(self) -> None:
         """Free the weights."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.protocols import Part, Turn
+from model_adapters.protocols import Part, Turn, Video
 
 __all__ = ["EncodedFrames", "to_messages"]
 
@@ -76,5 +76,6 @@ def _content(name: str, turn: Turn, frames: EncodedFrames, detail: str | None) -
 def _part(part: Part, frames: EncodedFrames, detail: str | None) -> dict[str, Any]:
     if isinstance(part, str):
         return {"type": "text", "text": part}
+    assert not isinstance(part, Video)  # `check_turns` refuses it
     image = {"url": frames.url(part)} | ({} if detail is None else {"detail": detail})
     return {"type": "image_url", "image_url": image}

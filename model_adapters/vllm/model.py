@@ -144,7 +144,7 @@ class VllmModel(CheckpointModel):
     def _request(self, prompt: Sequence[Piece]) -> EngineRequest:
         placeholder = self._loaded.family.placeholder_id
         digests = [piece.digest for piece in prompt if isinstance(piece, Frame)]
-        ids = [placeholder if isinstance(piece, Frame) else piece for piece in prompt]
+        ids = [piece if isinstance(piece, int) else placeholder for piece in prompt]
         return EngineRequest(ids, [self._images[digest] for digest in digests], digests)
 
     def _reply(self, prompt: Sequence[Piece], output: EngineOutput, decoding: Decoding) -> Reply:

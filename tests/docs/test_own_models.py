@@ -38,7 +38,7 @@ def test_the_pages_adapter_keeps_the_contract(folder, run):
     code, out, err = run("check-adapter", NAME)
     assert (code, err) == (0, "")
     assert out.splitlines()[-1] == f"{NAME}: keeps the contract"
-    assert [line.split()[0] for line in out.splitlines()[:-1]] == ["holds"] * 13
+    assert [line.split()[0] for line in out.splitlines()[:-1]] == ["holds"] * 14
 
 
 def test_it_is_evaluated_and_a_run_of_its_own_when_it_is_edited(folder, run):
@@ -105,7 +105,7 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
     code, out, err = run("check-adapter", NAME)
     assert (code, err) == (1, "")
     clauses = {line.split()[1]: line for line in out.splitlines() if line.startswith(("holds", "broken"))}
-    assert len(clauses) == 13
+    assert len(clauses) == 14
     assert clauses["members"].startswith("holds")
     assert "it raises TypeError in my_adapter.py:" in clauses["reply"]
     assert out.splitlines()[-1].endswith("broken")

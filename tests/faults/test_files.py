@@ -20,7 +20,7 @@ from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
-from infthor_eval.formats.video import frames_per_second
+from infthor_eval.formats.video import read_video
 from infthor_eval.generation.bundle import read_manifest
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.validation import read_decisions
@@ -44,7 +44,7 @@ READERS = {
     "journal": ("journal/worker-0.jsonl", lambda root: read_run(root, RECORDS)),
     "digest of a frame": ("a.png", lambda root: FrameRef(root / "a.png").digest),
     "pixels of a frame": ("a.png", lambda root: FrameRef(root / "a.png").load()),
-    "video": ("a.mp4", lambda root: frames_per_second(root / "a.mp4")),
+    "video": ("a.mp4", lambda root: read_video(root / "a.mp4", 1)),
     "archive": ("a.tar", lambda root: unpack_tar(root / "a.tar", root / "metadata")),
     "checkpoint": ("config.json", lambda root: load("qwen2.5-vl", {"pretrained": str(root)}, 0)),
 }

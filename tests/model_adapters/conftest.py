@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, Turn, load
+from model_adapters import Part, Turn, Video, load
 
 from .checkpoints import FAMILIES, OTHERS, save
 
@@ -31,9 +31,10 @@ from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoPr
 
 def content(processor, model, parts):
     types = [type for type, value in parts]
-    if model.config.model_type == "llava_onevision" and types != sorted(types):
-        # Its template writes images before texts; who wants them in between writes their token into the text.
-        inline = "".join(value if type == "text" else processor.image_token for type, value in parts)
+    if model.config.model_type == "llava_onevision" and types != sorted(types, key=("image", "video", "text").index):
+        # Its template writes images and videos before texts; in between, their token is written into the text.
+        tokens = {"image": processor.image_token, "video": processor.video_token}
+        inline = "".join(tokens.get(type, value) for type, value in parts)
         return [{"type": "text", "text": inline}]
     return [{"type": type, "text": value} if type == "text" else {"type": type} for type, value in parts]
 
@@ -41,9 +42,20 @@ def answer(processor, model, turns, new):
     messages = [{"role": role, "content": content(processor, model, parts)} for role, parts in turns]
     text = processor.apply_chat_template(messages, add_generation_prompt=True)
     images = [Image.open(value) for role, parts in turns for type, value in parts if type == "image"]
+    videos = [value for role, parts in turns for type, value in parts if type == "video"]
+    if videos:
+        # No frame is sampled: the metadata say at which rate those that are given were.
+        settings = {
+            "videos": [[Image.open(path) for path in video["frames"]] for video in videos],
+            "video_metadata": [{"fps": video["fps"], "total_num_frames": len(video["frames"])} for video in videos],
+        }
+    else:
+        settings = {}
     begin = processor.tokenizer.bos_token
     begun = begin is not None and text.startswith(begin)
-    inputs = processor(text=[text], images=images, add_special_tokens=not begun, return_tensors="pt")
+    inputs = processor(
+        text=[text], images=images or None, add_special_tokens=not begun, return_tensors="pt", **settings
+    )
     output = model.generate(**inputs, do_sample=False, max_new_tokens=new)
     ids = inputs["input_ids"][0].tolist()
     return ids, output[0, len(ids):].tolist()
@@ -136,9 +148,11 @@ def answer_plainly() -> Answers:
     return answer
 
 
-def _as_json(turns: Sequence[Turn]) -> list[tuple[str, list[tuple[str, str]]]]:
+def _as_json(turns: Sequence[Turn]) -> list[tuple[str, list[tuple[str, Any]]]]:
     return [(turn.role, [_part_as_json(part) for part in turn.parts]) for turn in turns]
 
 
-def _part_as_json(part: Part) -> tuple[str, str]:
+def _part_as_json(part: Part) -> tuple[str, Any]:
+    if isinstance(part, Video):
+        return "video", {"frames": [str(frame.path) for frame in part.frames], "fps": part.fps}
     return ("text", part) if isinstance(part, str) else ("image", str(part.path))

@@ -60,7 +60,7 @@ class HashConversation(Transcript):
 
     def reply(self, decoding: Decoding) -> Reply:
         check_decoding("hash", self.capabilities, decoding)
-        check_turns("hash", self.turns)
+        check_turns("hash", self.capabilities, self.turns)
         return self.hash_reply(decoding)
 
     def hash_reply(self, decoding: Decoding) -> Reply:

@@ -1,9 +1,11 @@
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from infthor_eval.errors import ModelError
-from model_adapters import Capabilities, Turn, check_decoding, check_turns
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Capabilities, Turn, Video, check_decoding, check_turns
 
 from .asking import up_to, user
 
@@ -38,8 +40,15 @@ def test_what_it_cannot_do_is_refused(able: dict[str, Any], asked: dict[str, Any
 
 
 def test_only_a_users_turn_can_be_replied_to() -> None:
-    check_turns("m", user("What?"))
+    check_turns("m", Capabilities(), user("What?"))
     with pytest.raises(ModelError, match="m has nothing to reply to: the conversation is empty; append a user turn"):
-        check_turns("m", ())
+        check_turns("m", Capabilities(), ())
     with pytest.raises(ModelError, match="nothing to reply to: the last turn is the assistant's; append a user turn"):
-        check_turns("m", (*user("What?"), Turn("assistant", ("This.",))))
+        check_turns("m", Capabilities(), (*user("What?"), Turn("assistant", ("This.",))))
+
+
+def test_a_video_needs_a_video_input(tmp_path: Path) -> None:
+    turns = user(Video((FrameRef(tmp_path / "a.png"),), 1.0), "What?")
+    check_turns("m", Capabilities(video_input=True), turns)
+    with pytest.raises(ModelError, match="m has no video input; give it the video's frames as images"):
+        check_turns("m", Capabilities(), turns)

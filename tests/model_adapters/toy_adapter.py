@@ -18,7 +18,7 @@ class Talk(Transcript):
 
     def reply(self, decoding):
         check_decoding("toy", CAPABILITIES, decoding)
-        check_turns("toy", self.turns)
+        check_turns("toy", CAPABILITIES, self.turns)
         text = digest("\n".join(part if isinstance(part, str) else part.digest for t in self.turns for part in t.parts))
         for stop in decoding.stop:
             text = text.split(stop)[0]

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from infthor_eval.formats.digests import digest
+from infthor_eval.formats.video import Video
 from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import Catalog
@@ -32,7 +33,8 @@ EXPECTED = {
     "nieh_truncate_head_512k": (147, 0, "6198fc625078c68495aa339150f419ab"),
     "nieh_truncate_head_64k": (147, 0, "6198fc625078c68495aa339150f419ab"),
     "nieh_truncate_head_8k": (147, 0, "267bf97366f280ca7e02a21094fdac18"),
-    "nieh_video": (147, 0, "baec637b90540da088ca95eeef83f372"),
+    "nieh_video": (147, 0, "b2763a88bca0665f7a6f4560b2366413"),
+    "nieh_video_2fps": (147, 0, "af83e1c428650e71511044526b25844c"),
     "nieh_full": (147, 0, "6198fc625078c68495aa339150f419ab"),
     "nieh_gt": (147, 0, "1b4f224e3c4ecf3c7daf44c222c1cbbc"),
     "nieh_mini_full": (147, 0, "6198fc625078c68495aa339150f419ab"),
@@ -43,6 +45,8 @@ EXPECTED = {
 def as_text(part):
     if isinstance(part, str):
         return part
+    if isinstance(part, Video):
+        return f"video of {part.fps:.4f} fps {' '.join(map(as_text, part.frames))}"
     if isinstance(part, Notes):
         return f"notes {part.traj_id} {part.settings.window} {part.settings.max_new_tokens} {len(part.frames)}"
     return f"{part.path.parent.parent.name}/{part.path.name}"

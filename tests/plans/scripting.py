@@ -25,7 +25,7 @@ class Talk(Transcript):
         return sum(1 if isinstance(part, FrameRef) else len(part.split()) for part in self.parts)
 
     def reply(self, decoding):
-        check_turns(self._model.name, self.turns)
+        check_turns(self._model.name, self._model.capabilities, self.turns)
         for part in self.parts:
             if isinstance(part, FrameRef):
                 assert part.digest  # it is there, and known when it no longer is

@@ -77,7 +77,7 @@ class Talk(Transcript):
     def reply(self, decoding: Decoding) -> Reply:
         """Answer the last turn from all frames that were shown."""
         check_decoding(self._model.name, _CAPABILITIES, decoding)  # refuses what was not claimed
-        check_turns(self._model.name, self.turns)  # refuses to speak out of turn
+        check_turns(self._model.name, _CAPABILITIES, self.turns)  # refuses to speak out of turn
         frames = [part for turn in self.turns for part in turn.parts if isinstance(part, FrameRef)]
         asked = "".join(part for part in self.turns[-1].parts if isinstance(part, str))
         words = answer(asked, [thumbnail(frame.load(), self._model.side) for frame in frames]).split()

@@ -29,6 +29,13 @@ __all__ = ["command"]
     help="Share of a frame's pixels that an object must fill to count as visible.",
 )
 @click.option("--further", is_flag=True, help="Add question forms that are not in Table 3, with their own types.")
+@click.option(
+    "--words",
+    type=click.Choice(["plain", "published"]),
+    default="plain",
+    show_default=True,
+    help="Plain English, or the published files' words with type names, to extend the published set.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace a file that holds other questions.")
 @worker_options
 @click.pass_context
@@ -40,6 +47,7 @@ def command(
     per_trajectory: int,
     min_share: float,
     further: bool,
+    words: str,
     overwrite: bool,
     **workers: Any,
 ) -> None:
@@ -62,6 +70,7 @@ def command(
         per_trajectory=per_trajectory,
         share=min_share,
         further=further,
+        published_words=words == "published",
         worker_settings=worker_settings,
         say=notes.print,
     )

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import DataError, InfthorError, wrap_errors
+from infthor_eval.errors import DataError, InfthorError, UsageError, wrap_errors
 from infthor_eval.formats.question import ABSENCE, Question
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
@@ -26,6 +26,7 @@ from infthor_eval.generation.questions import (
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
+from infthor_eval.generation.questions.published_words import in_published_words
 from infthor_eval.workers import WorkerSettings, run_jobs
 
 __all__ = ["GeneratedQuestions", "candidates_of", "further_candidates_of", "generate_questions"]
@@ -74,6 +75,7 @@ def generate_questions(
     per_trajectory: int = 25,
     share: float = DEFAULT_SHARE,
     further: bool = False,
+    published_words: bool = False,
     worker_settings: WorkerSettings = _ONE_PROCESS,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedQuestions:
@@ -84,7 +86,8 @@ def generate_questions(
         seed: seed of all random choices.
         per_trajectory: maximum number of questions on one trajectory.
         share: share of the frame's pixels that an object must fill to count as shown.
-        further: True to add our further forms.
+        further: True to add our further forms, which have no published words.
+        published_words: True for the same questions in the words of the published files.
         worker_settings: number and place of the workers; they do not change the questions.
         say: called with messages about the workers.
 
@@ -92,8 +95,11 @@ def generate_questions(
         The questions, and the trajectories whose log cannot be read.
 
     Raises:
+        UsageError: further forms are asked for in the published words.
         DataError: the set has no trajectory, or another format version.
     """
+    if further and published_words:
+        raise UsageError("--further adds forms that have no published words; leave it out, or --words published")
     simulator_of(folder)  # raises for another format version
     result = GeneratedQuestions()
     types: dict[Path, frozenset[str]] = {}
@@ -107,15 +113,18 @@ def generate_questions(
     rule_jobs = [_RuleJob(path, vocabulary, seed, share, further) for path in types]
     candidates_by_path = _share_out(rule_jobs, worker_settings, say, result)
     chooser = _Chooser()
-    check_jobs = []
+    check_jobs, chosen_by_path = [], {}
     # Not shared out: the balance depends on what was chosen on all trajectories before.
     for path in [path for path in types if path in candidates_by_path]:
         candidates, rng = candidates_by_path[path]
-        chosen = chooser.choose(candidates, per_trajectory, rng)
+        chosen = chosen_by_path[path] = chooser.choose(candidates, per_trajectory, rng)
         check_jobs.append(_CheckJob(path, tuple(item.question(path.name) for item in chosen), share))
     soundness = _share_out(check_jobs, worker_settings, say, result)
     for job in check_jobs:
-        for question, is_sound in zip(job.questions, soundness.get(job.path, ()), strict=False):
+        # Checked in our words, which the checker reads.
+        for item, is_sound in zip(chosen_by_path[job.path], soundness.get(job.path, ()), strict=False):
+            name = job.path.name
+            question = in_published_words(item, name) if published_words else item.question(name)
             (result.questions if is_sound else result.unconfirmed).append(question)
     return result
 

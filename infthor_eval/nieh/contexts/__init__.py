@@ -28,6 +28,7 @@ CONTEXTS = {
     "video": Context(
         video.video,
         intro="Answer the question given the video showing the agent's trajectory over time.",
+        parts=video.video_parts,
         frames=video.video_frames,
         positions=video.video_positions,
         sources=video.video_identity,

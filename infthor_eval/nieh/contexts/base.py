@@ -11,6 +11,7 @@ from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.video import FILM_FPS, Video
 from infthor_eval.nieh.notes import Notes, NoteSettings
 from infthor_eval.nieh.options import FRAMES
 from infthor_eval.nieh.prompts import question_text
@@ -19,7 +20,7 @@ __all__ = ["Context", "ContextPart", "ContextSettings", "Sample", "clue_position
 
 _LARGEST = 1e9  # kilo-tokens; more is a typing error
 _COUNT = "a whole number from 1"
-ContextPart = str | FrameRef | Notes
+ContextPart = str | FrameRef | Video | Notes
 
 
 def _is_positive(value: Any) -> bool:
@@ -35,6 +36,7 @@ _VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
     "top_k": (_is_positive, _COUNT),
     "note_window": (_is_positive, _COUNT),
     "note_tokens": (_is_positive, _COUNT),
+    "fps": (lambda value: 0 < value <= FILM_FPS, f"a number of frames per second above 0, at most {FILM_FPS}"),
     "seed": (None, "a whole number"),
     "retriever": (None, "a text"),
     "retriever_revision": (None, "a text"),
@@ -51,6 +53,7 @@ class Sample:
         variant: variant of the context ("depth=0.4"); empty if there is only one.
         n_cut: number of frames that are cut off to keep the context's size.
         notes: settings of the model's notes on the frames, if it is shown notes instead of frames.
+        fps: rate at which the frames are sampled from a film, per second, if they are shown as a video.
     """
 
     question: Question
@@ -58,6 +61,7 @@ class Sample:
     variant: str = ""
     n_cut: int = 0
     notes: NoteSettings | None = None
+    fps: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +78,7 @@ class ContextSettings:
         retriever_revision: branch, tag or commit on the hub; None for the default branch.
         note_window: number of frames that the model reads for one note.
         note_tokens: limit of a note in tokens.
+        fps: frames per second that are sampled from a trajectory's film.
         seed: seed of everything sampled.
         frames: the frames that are shown (`infthor_eval.nieh.frame_ablations`).
     """
@@ -87,6 +92,7 @@ class ContextSettings:
     retriever_revision: str | None = None
     note_window: int = 20
     note_tokens: int = 64
+    fps: float = 1.0
     seed: int = 0
     frames: str = "shown"
 
@@ -129,6 +135,10 @@ def _only_frames(_data: NiehSet, _sample: Sample, frames: Sequence[FrameRef]) ->
     return list(frames)
 
 
+def _all_frames(data: NiehSet, traj_id: str, _fps: float | None) -> Sequence[FrameRef]:
+    return data.frames(traj_id)
+
+
 def _frames_of(_data: NiehSet, sample: Sample) -> Sequence[int]:
     return sample.frames
 
@@ -146,7 +156,7 @@ class Context:
         needs_model: True if the frames depend on the model's tokens per frame.
         intro: the sentence that says what the model sees; the published one where the context is published.
         parts: returns what the model sees before that sentence, given the frames of a sample.
-        frames: returns the frames that the positions of a sample refer to.
+        frames: returns the frames of a trajectory that the positions of a sample refer to, given its `fps`.
         positions: returns where in the trajectory's time order the frames of a sample are.
         sources: returns whatever the frames depend on besides the set's fingerprint and the settings, as JSON values.
     """
@@ -155,7 +165,7 @@ class Context:
     needs_model: bool = False
     intro: str = "Answer the question given the agent's views in time order."
     parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(default=_only_frames)
-    frames: Callable[[NiehSet, str], Sequence[FrameRef]] = field(default=NiehSet.frames)
+    frames: Callable[[NiehSet, str, float | None], Sequence[FrameRef]] = field(default=_all_frames)
     positions: Callable[[NiehSet, Sample], Sequence[int]] = field(default=_frames_of)
     sources: Callable[[NiehSet, ContextSettings], dict[str, Any]] = field(default=_no_sources)
 
@@ -163,7 +173,7 @@ class Context:
         """Return the frames of a sample; none in a set of question files alone."""
         if not data.has_frames:
             return []
-        frames = self.frames(data, sample.question.traj_id)
+        frames = self.frames(data, sample.question.traj_id, sample.fps)
         return [frames[position] for position in sample.frames]
 
     def request(self, data: NiehSet, sample: Sample) -> tuple[list[ContextPart], str]:

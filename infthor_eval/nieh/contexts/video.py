@@ -1,61 +1,80 @@
-"""The trajectory as a video."""
+"""The trajectory as a video: the published film of ten frames per second, sampled."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.contexts.base import ContextSettings, Sample
+from infthor_eval.formats.video import FILM_FPS, Video, sample_positions
+from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
-__all__ = ["video", "video_frames", "video_identity", "video_positions"]
-
-_PER_SECOND = 10  # frames of the trajectory a second of its video
+__all__ = ["as_images", "video", "video_frames", "video_identity", "video_parts", "video_positions"]
 
 
-def video(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """Ask on the trajectory's mp4 at one frame per second, or on every frame if it has none (published: `video`).
+def video(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+    """Ask on the trajectory's film, its mp4, sampled at `fps` frames per second (published: `video`, 1 and 2).
 
-    Models are given the frames as images, also those with an input for videos, so that all of them answer from the same
-    frames. The variant names the source, so that the two are not mixed up in a result.
+    Where there is no mp4, the frames themselves are the film. The variant names the source, so that the two are not
+    mixed up in a result. Models without a video input are given the same frames as images.
     """
+    has_mp4 = data.video(question.traj_id) is not None
+    variant = "source=mp4" if has_mp4 else "source=frames"
     try:
-        frames = video_frames(data, question.traj_id)
+        if has_mp4:
+            positions = tuple(range(len(data.sampled_video(question.traj_id, settings.fps).frames)))
+        else:
+            positions = sample_positions(len(data.frames(question.traj_id)), FILM_FPS, settings.fps)
     except DataError as error:
-        return [SkippedQuestion(question, str(error), "source=mp4")]
-    is_video = data.video(question.traj_id) is not None
-    return [Sample(question, tuple(range(len(frames))), "source=mp4" if is_video else "source=frames")]
+        return [SkippedQuestion(question, str(error), variant)]
+    return [Sample(question, positions, variant, fps=settings.fps)]
 
 
-def video_frames(data: NiehSet, traj_id: str) -> Sequence[FrameRef]:
-    """Return the shown frames.
+def video_frames(data: NiehSet, traj_id: str, fps: float | None) -> Sequence[FrameRef]:
+    """Return the frames that positions refer to: those sampled from the mp4, or all of a trajectory without one.
 
     Raises:
         DataError: the trajectory has a video that cannot be decoded.
     """
-    path = data.video(traj_id)
-    return data.frames(traj_id) if path is None else data.video_frames(traj_id)
+    if fps is None:
+        raise ValueError("a sample of video lacks the rate of its frames")
+    return data.frames(traj_id) if data.video(traj_id) is None else data.sampled_video(traj_id, fps).frames
 
 
 def video_positions(data: NiehSet, sample: Sample) -> Sequence[int]:
-    """Return the frames of the trajectory that the shown ones are, by the video's 10 frames per second."""
-    is_video = data.video(sample.question.traj_id) is not None
-    return [_PER_SECOND * second for second in sample.frames] if is_video else sample.frames
+    """Return the frames of the trajectory that the shown ones are."""
+    traj_id = sample.question.traj_id
+    if sample.fps is None or data.video(traj_id) is None:
+        return sample.frames
+    return sample_positions(len(data.frames(traj_id)), FILM_FPS, sample.fps)
 
 
-def video_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
+def video_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+    """Return the frames as a video, with the rate at which they were really sampled."""
+    traj_id = sample.question.traj_id
+    if sample.fps is not None and data.video(traj_id) is not None:
+        return [Video(tuple(frames), data.sampled_video(traj_id, sample.fps).fps)]
+    return [Video(tuple(frames), len(frames) / len(data.frames(traj_id)) * FILM_FPS)]
+
+
+def as_images(parts: Iterable[ContextPart]) -> list[ContextPart]:
+    """Return parts with the frames of each video in its place, for a model without a video input."""
+    return [item for part in parts for item in (part.frames if isinstance(part, Video) else (part,))]
+
+
+def video_identity(data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
     """Return the hash of the videos and their decoder; the set's own fingerprint does not cover videos."""
     digest = hashlib.blake2b(digest_size=16)
     for traj_id in sorted({question.traj_id for question in data.questions}):
         if data.video(traj_id) is not None:
-            digest.update(f"{traj_id}:{_name(data, traj_id)}\n".encode())
+            digest.update(f"{traj_id}:{_name(data, traj_id, settings.fps)}\n".encode())
     return {"videos": digest.hexdigest()}
 
 
-def _name(data: NiehSet, traj_id: str) -> str:
+def _name(data: NiehSet, traj_id: str, fps: float) -> str:
     try:
-        return data.video_frames(traj_id)[0].path.parent.name
+        return data.sampled_video(traj_id, fps).frames[0].path.parent.name
     except DataError:
         return "broken"  # its questions are skipped, with the reason

@@ -63,12 +63,12 @@ class ProcessorFamily(PlainFamily):
         """Return the ids that the processor expands the placeholder of one image to."""
         return tuple(expand_image_token(self._processor, Image.new("RGB", size, "gray")))
 
-    def template_ids(self) -> tuple[int, ...]:
+    def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
         """Return the placeholder, between the config's markers unless the processor adds them itself."""
         markers = _markers(self._model.config)
         if markers is None or markers[0] in self.frame_ids(_BLANK):
-            return (self.placeholder_id,)
-        return (markers[0], self.placeholder_id, markers[1])
+            return (placeholder_id,)
+        return (markers[0], placeholder_id, markers[1])
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the model's features of each image, (slots, hidden)."""

@@ -1,11 +1,16 @@
-"""LLaVA-OneVision: a frame of 300x300 takes 1485 tokens, an overview and the frame with a break after each row."""
+"""LLaVA-OneVision: a frame of 300x300 takes 1485 tokens, an overview and the frame with a break after each row.
+
+A frame of a video takes 196 tokens (`llava_video`).
+"""
 
 from collections.abc import Sequence
+from typing import Any
 
 import torch
 from PIL import Image
 
 from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.families.llava_video import LlavaVideo
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.options.families import LlavaOnevisionOptions
 
@@ -18,6 +23,10 @@ class LlavaOnevisionFamily(PlainFamily):
     The processor treats a nested list of images as one multi-image sample and halves their tokens (730). Frames are
     passed as a flat list, as in the published results.
     """
+
+    def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
+        super().__init__(model, image_processor, tokenizer)
+        self.video = LlavaVideo(model, image_processor)
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the packed features of overview, patches and row breaks for each image, (tokens, hidden)."""

@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from PIL import Image
 
-from model_adapters.hf.family import Size
+from model_adapters.hf.family import Shape, Size, VideoInput
 
 __all__ = ["PlainFamily"]
 
@@ -23,21 +23,22 @@ class PlainFamily:
         self._image_processor = image_processor
         self.placeholder_id: int = model.config.image_token_id
         self.slot_id = self.placeholder_id
+        self.video: VideoInput | None = None
 
     @torch.inference_mode()
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return one slot for each feature of a frame of this size."""
         return (self.slot_id,) * len(self.features([Image.new("RGB", size)])[0])
 
-    def template_ids(self) -> tuple[int, ...]:
+    def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
         """Return the placeholder alone."""
-        return (self.placeholder_id,)
+        return (placeholder_id,)
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the embeddings for the slots of each image, (slots, hidden)."""
         raise NotImplementedError
 
-    def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
+    def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
         """Return consecutive positions, (1, tokens)."""
         return torch.arange(start, start + len(ids), device=ids.device)[None]
 

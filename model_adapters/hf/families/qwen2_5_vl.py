@@ -1,7 +1,11 @@
-"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between two markers, with three-axis (multimodal) positions."""
+"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between two markers, with three-axis (multimodal) positions.
+
+Two frames of a video take 144 tokens together, all of a video between two markers (`qwen_video`).
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Any
 
 import torch
@@ -9,7 +13,8 @@ from PIL import Image
 
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.families.plain import PlainFamily
-from model_adapters.hf.family import Size
+from model_adapters.hf.families.qwen_video import QwenVideo
+from model_adapters.hf.family import ClipShape, Shape, Size
 from model_adapters.options.families import Qwen25VLOptions
 
 __all__ = ["Qwen25VL", "Qwen25VLFamily"]
@@ -21,15 +26,17 @@ class Qwen25VLFamily(PlainFamily):
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
         super().__init__(model, image_processor, tokenizer)
         self._grids: dict[Size, tuple[int, int, int]] = {}
+        self._clips = QwenVideo(model, image_processor)
+        self.video = self._clips
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return one token for each square of merged patches."""
         return (self.slot_id,) * (math.prod(self._grid(size)) // self._image_processor.merge_size**2)
 
-    def template_ids(self) -> tuple[int, ...]:
+    def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
         """Return the placeholder between the vision markers, which the processor leaves to the template."""
         config = self._model.config
-        return (config.vision_start_token_id, self.placeholder_id, config.vision_end_token_id)
+        return (config.vision_start_token_id, placeholder_id, config.vision_end_token_id)
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the vision tower's merged patches of each image, (tokens, hidden)."""
@@ -37,14 +44,40 @@ class Qwen25VLFamily(PlainFamily):
         output = self._model.get_image_features(inputs["pixel_values"], inputs["image_grid_thw"], return_dict=True)
         return list(output.pooler_output)
 
-    def positions(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
+    def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
         """Return temporal, height and width positions, (3, 1, tokens).
 
         The model's own rule counts from the first token, and all positions shift with it. So a span that cuts no frame
-        is numbered alone and shifted, which makes chunked prefill equal to one pass.
+        is numbered alone and shifted, which makes chunked prefill equal to one pass. Clips are numbered one by one.
         """
+        rows = []
+        for run in self._runs(ids, shapes):
+            row = self._clips.positions(run, start) if isinstance(run, ClipShape) else self._still(*run, start)
+            rows.append(row)
+            start = max(start, int(row.max()) + 1)
+        return torch.cat(rows, dim=-1)
+
+    def _runs(
+        self, ids: torch.Tensor, shapes: Sequence[Shape]
+    ) -> Iterator[ClipShape | tuple[torch.Tensor, list[Size]]]:
+        """Yield each clip of a span, and the ids of what is between clips with the sizes of its frames."""
+        left = list(shapes)
+        for in_video, run in groupby(ids.tolist(), lambda token: token == self._clips.placeholder_id):
+            own, sizes = list(run), list[Size]()
+            while left and own and isinstance(left[0], ClipShape) == in_video:
+                shape = left.pop(0)
+                if isinstance(shape, ClipShape):
+                    yield shape
+                    del own[: self._clips.n_tokens(shape)]
+                else:
+                    sizes.append(shape)
+            if own:  # a model may also write the token of a video, which is a text then
+                yield torch.tensor(own), sizes
+
+    def _still(self, ids: torch.Tensor, sizes: Sequence[Size], start: int) -> torch.Tensor:
+        """Return the positions of texts and frames."""
         if not sizes:
-            return torch.arange(start, start + len(ids), device=ids.device).expand(3, 1, -1)
+            return torch.arange(start, start + len(ids)).expand(3, 1, -1)
         positions, _ = self._model.model.get_rope_index(
             ids[None],
             mm_token_type_ids=(ids == self.slot_id).int()[None],

@@ -50,6 +50,14 @@ def test_what_shows_frames_says_that_there_are_none(alone, tmp_path, run, model,
     assert "Traceback" not in err
 
 
+def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_path, run):
+    words = ("questions", make_nieh_set(size=56), "--out", tmp_path / "a.csv", "--words", "published", "--further")
+    code, out, err = run(*words)
+    assert (code, out) == (2, "")
+    assert "--further adds forms that have no published words; leave it out, or --words published" in err
+    assert not (tmp_path / "a.csv").exists()
+
+
 def test_table4_is_printed_from_the_files_scores(tmp_path, run):
     matches = tuple((f"match{n}", 0.5) for n in range(1, 5))
     for file, name, n_clues in (("single", FILES[0], (1,)), ("multi", FILES[1], (2, 4))):

@@ -113,12 +113,34 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(data, write
     assert "traj_b_10fps.mp4: not a video that OpenCV can decode" in err
     results = json.loads(only(out, "results.json").read_text())["summary"]["tasks"]["nieh_video"]
     assert (results["n"], results["skipped"]["n"], list(results["by_variant"])) == (3, 3, ["source=mp4"])
-    assert [len(doc["frames"]) for doc in docs(out, "nieh_video")] == [3] * 3
+    assert [len(doc["frames"]) for doc in docs(out, "nieh_video")] == [4] * 3
+    assert "; the film is given as a video" in err
     (metadata / "traj_b" / "traj_b_10fps.mp4").unlink()
     assert run(*arguments)[0] == 0
     summaries = [json.loads(path.read_text())["summary"] for path in out.rglob("results.json")]
     variants = [summary["tasks"]["nieh_video"]["by_variant"] for summary in summaries]
     assert sorted(map(sorted, variants)) == [["source=frames", "source=mp4"], ["source=mp4"]]
+
+
+@pytest.mark.parametrize(
+    ("model", "film", "placeholder", "said"),
+    [
+        ("qwen2.5-vl-tiny", "video", "<video>", "the film is given as a video"),
+        ("llava-onevision-tiny", "video", "<video>", "the film is given as a video"),
+        ("pixtral-tiny", "images", "<image>" * 4, "pixtral-tiny has no video input, the film is given as images"),
+    ],
+)
+def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
+    data, tmp_path, run, model, film, placeholder, said
+):
+    out = tmp_path / "out"
+    code, _, err = run("--model", model, "--tasks", "nieh_video", "--data", data, "--output", out, "--limit", 1)
+    assert code == 0, err
+    assert said in err
+    (folder,) = {path.parent for path in out.rglob("results.json")}
+    assert read_header(folder).config["tasks"]["nieh_video"]["film"] == film
+    sample = json.loads(only(out, "samples_nieh_video_*.jsonl").read_text())
+    assert sample["arguments"]["gen_args_0"]["arg_0"].startswith(f"{placeholder}\nAnswer the question given the video")
 
 
 def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_path):

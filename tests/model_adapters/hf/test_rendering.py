@@ -8,7 +8,7 @@ import pytest
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Turn
-from model_adapters.hf.rendering import render
+from model_adapters.hf.rendering import Marks, render
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 from ..asking import user
@@ -41,7 +41,7 @@ def tokenizer() -> Any:
 
 
 def _render(tokenizer: Any, template: str, turns: Sequence[Turn]) -> str:
-    return render(tokenizer, template, turns, "<image>")
+    return render(tokenizer, template, turns, Marks("<image>"))
 
 
 def test_all_turns_are_rendered(tokenizer: Any, frames: list[FrameRef]) -> None:

@@ -1,8 +1,13 @@
+import json
+
 import pytest
 
+from infthor_eval.errors import UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
+from infthor_eval.nieh.docs import doc_of, doc_parts, doc_prompt, sample_of
 from infthor_eval.nieh.samples import find_samples, open_set
 
 QUESTIONS = [Question("a", "Is there a mug?", (1,), ("yes",)), Question("b", "Is there a sink?", (0,), ("no",))]
@@ -17,9 +22,9 @@ def video_of(root, traj_id):
     return root / "metadata" / traj_id / f"{traj_id}_10fps.mp4"
 
 
-def samples_of(root):
+def samples_of(root, **settings):
     open_set.cache_clear()
-    return find_samples({"context": "video", "data": str(root)})
+    return find_samples({"context": "video", "data": str(root), **settings})
 
 
 def test_the_video_is_shown_where_there_is_one_and_else_the_frames(root, write_video):
@@ -30,11 +35,44 @@ def test_the_video_is_shown_where_there_is_one_and_else_the_frames(root, write_v
         "b": "source=frames",
     }
     with_video, without = found.samples
-    frames, text = context.request(found.data, with_video)
-    assert [frame.load().getpixel((9, 9))[0] for frame in frames] == pytest.approx([0, 50, 100, 150, 200], abs=4)
+    (video,), text = context.request(found.data, with_video)
+    # Four of 50 frames, at least: the first, the last and two between them.
+    assert [frame.load().getpixel((9, 9))[0] for frame in video.frames] == pytest.approx([0, 80, 165, 245], abs=4)
+    assert video.fps == pytest.approx(4 / 5)
     assert text.startswith("\nAnswer the question given the video showing the agent's trajectory over time. Do not ")
-    frames, _ = context.request(found.data, without)
-    assert frames == list(found.data.frames("b"))
+    (video,), _ = context.request(found.data, without)
+    assert video == Video(tuple(found.data.frames("b")[at] for at in (0, 1, 3, 4)), 4 / 5 * 10)
+
+
+def test_the_rate_is_a_setting(root, write_video):
+    write_video(video_of(root, "a"), range(80))
+    n_frames = []
+    for fps in (1, 2):
+        found = samples_of(root, fps=fps)
+        (video,), _ = CONTEXTS["video"].request(found.data, found.samples[0])
+        n_frames.append(len(video.frames))
+    assert n_frames == [8, 16]
+    for wrong in (0, 11, "x"):
+        with pytest.raises(UsageError, match=r"fps is .*; it is a number of frames per second above 0, at most 10"):
+            samples_of(root, fps=wrong)
+
+
+def test_frames_of_a_video_can_be_ablated(root):
+    shown, blank = (samples_of(root, frames=frames) for frames in ("shown", "blank"))
+    (video,), _ = shown.request(shown.samples[1])
+    (grey,), _ = blank.request(blank.samples[1])
+    assert (len(grey.frames), grey.fps) == (len(video.frames), video.fps)
+    assert {frame.load().getcolors()[0][1] for frame in grey.frames} == {(128, 128, 128)}
+
+
+def test_docs_of_lm_eval_give_the_same_frames_as_images(root):
+    found = samples_of(root, fps=2)
+    for sample in found.samples:
+        (video,), text = found.request(sample)
+        doc = json.loads(json.dumps(doc_of(found, sample)))
+        assert sample_of(doc).fps == 2
+        assert doc_parts(doc) == [*video.frames, text]
+        assert doc_prompt(doc) == "<image>" * len(video.frames) + text
 
 
 def test_a_broken_video_has_its_questions_skipped_by_name_and_is_looked_at_once(root, monkeypatch):

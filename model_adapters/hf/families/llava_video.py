@@ -1,0 +1,52 @@
+"""The video input of LLaVA-OneVision: a frame takes 196 tokens, and a break follows the last one.
+
+The checkpoint's own video processor needs torchvision, so pixels come from its image processor: the overview of an
+image is the whole frame in the size of the vision tower, which is what a frame of a video is scaled to.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from PIL import Image
+
+from model_adapters.hf.family import ClipShape
+
+__all__ = ["LlavaVideo"]
+
+_POOLED = 2  # patches along a side that are pooled to one token
+
+
+class LlavaVideo:
+    """The video input of LLaVA-OneVision; a clip is a frame."""
+
+    clip_frames = 1
+
+    def __init__(self, model: Any, image_processor: Any) -> None:
+        self._model = model
+        self._image_processor = image_processor
+        self.placeholder_id: int = model.config.video_token_id
+
+    def n_tokens(self, shape: ClipShape) -> int:
+        """Return one token for each square of pooled patches, and one for the break after the last frame."""
+        vision = self._model.config.vision_config
+        side = math.ceil(vision.image_size // vision.patch_size / _POOLED)
+        return side**2 + _is_last(shape)
+
+    def features(self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]) -> list[torch.Tensor]:
+        """Return the pooled patches of each frame, (tokens, hidden), with the break after the last frame of a video."""
+        frames = [image for _, images in clips for image in images]
+        overviews = self._image_processor(images=frames, return_tensors="pt")["pixel_values"][:, 0]
+        weight = self._model.get_input_embeddings().weight
+        output = self._model.get_video_features(overviews.to(weight.device, self._model.dtype)[None], return_dict=True)
+        features = output.pooler_output[0]
+        pooled, line_break = features[:-1].chunk(len(frames)), features[-1:]
+        return [
+            torch.cat([own, line_break]) if _is_last(shape) else own
+            for own, (shape, _) in zip(pooled, clips, strict=True)
+        ]
+
+
+def _is_last(shape: ClipShape) -> bool:
+    return shape.number == shape.n_clips - 1
