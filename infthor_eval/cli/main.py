@@ -33,6 +33,7 @@ _COMMANDS = {
         "watch": "Write a video of an agent or an arm.",
         "import-replies": "Store replies and counts of plans that others made, as runs.",
         "rescore": "Score the replies of a run again, also with your own scorer or a judge.",
+        "audit": "Print what a question set gives away without a frame.",
         "table4": "Compute the paper's Table 4 from the published question files.",
         "table-final": "Compute the paper's table of final tasks from the published plan logs.",
     },

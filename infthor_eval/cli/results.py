@@ -12,13 +12,16 @@ import msgspec
 from infthor_eval.cli.options.show import ShowOptions
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.runs import RunSummary, Suite, Usage
+from infthor_eval.runs import RunSummary, Suite, Usage, read_header
 from infthor_eval.runs.results import results_document
 from infthor_eval.runs.run_labels import label_runs
+from infthor_eval.runs.run_search import read_results
+from infthor_eval.runs.shards import read_shards
+from infthor_eval.suites import find_suite
 from infthor_eval.tables import Table
 from infthor_eval.terminal import print_line
 
-__all__ = ["RunResults", "print_results"]
+__all__ = ["RunResults", "print_results", "read_run_results"]
 
 _SHOWN_BY_TABLES = {"frames"}  # the options that the suites' tables show beside a run's name
 
@@ -40,6 +43,20 @@ class RunResults:
     summary: RunSummary
     usage: Usage
     n_missing: int | None
+
+
+def read_run_results(folder: Path) -> RunResults:
+    """The run in a folder, summed up from its journal.
+
+    Raises:
+        DataError: there is no journal, or one with a bad line, or of another format.
+        UsageError: its suite is not known here.
+    """
+    header = read_header(folder)
+    suite = find_suite(header.suite)
+    log, results = read_shards(folder, suite.records.decoder()), read_results(folder)
+    summary = RunSummary(header, suite.summarise(header, log.records))
+    return RunResults(folder, suite, summary, log.usage, results.n_missing if results else None)
 
 
 def print_results(runs: Sequence[RunResults], options: ShowOptions) -> None:

@@ -14,7 +14,7 @@ It is greedy: a larger part may exist.
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_target
@@ -48,9 +48,10 @@ class Balanced:
 
 
 def balance(questions: Sequence[Question]) -> Balanced:
-    """Return the balanced part of some questions; it may be empty."""
+    """Return the balanced part of some questions; it may be empty. Of questions that are there twice it has one."""
     before = Counter(map(_name, questions))
-    left = _cut_answers(questions)
+    different = {replace(question, published=None).id: question for question in reversed(questions)}
+    left = _cut_answers([question for question in questions if question in different.values()])
     right = _guess(left)
     while surplus := _surplus(left, right):
         left = _cut_answers(_prune(left, right, surplus))

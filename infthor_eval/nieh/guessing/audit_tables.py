@@ -1,0 +1,91 @@
+"""The audit of a set as tables: what guessers get by file, form, type and clues, and what runs get above it."""
+
+from collections.abc import Mapping, Sequence
+
+from infthor_eval.nieh.above_guessing import FormScore
+from infthor_eval.nieh.gains import name_of
+from infthor_eval.nieh.guessing.audit import AuditedQuestion, groups
+from infthor_eval.nieh.guessing.balancing import MARGIN, Balanced
+from infthor_eval.nieh.guessing.guessers import GUESSERS
+from infthor_eval.nieh.summary import NiehSummary, main_metric
+from infthor_eval.runs import RunSummary
+from infthor_eval.tables import Column, Row, Table
+
+__all__ = ["audit_tables", "balanced_table", "guessers_table", "runs_table"]
+
+_HEADS = {
+    "file": "file",
+    "answers": "kind of answer",
+    "clues": "number of clues",
+    "type": "type of question",
+    "form": "form of question",
+}
+
+
+def guessers_table(questions: Sequence[AuditedQuestion]) -> Table:
+    """Return what each guesser gets on each file."""
+    files = groups(questions, "file")
+    rows = [
+        Row((guesser.name, *(f"{100 * group.means()[place]:.2f}" for group in files)))
+        for place, guesser in enumerate(GUESSERS)
+    ]
+    columns = (Column("guesser", False), *(Column(group.name) for group in files))
+    note = "Each question is guessed from questions on other trajectories in its file; nobody sees a frame."
+    return Table("What can be guessed, % by guesser and file (strict scorer)", columns, tuple(rows), (note,))
+
+
+def audit_tables(questions: Sequence[AuditedQuestion]) -> list[Table]:
+    """Return a table for each way to group the questions."""
+    tables = []
+    numbers = ("questions", "answers", "entropy, bits", "yes, %", "best guess, %")
+    for by, head in _HEADS.items():
+        rows = []
+        for group in groups(questions, by):
+            yes, (best, mean) = group.share_yes, group.best()
+            cells = (
+                group.name,
+                str(len(group.questions)),
+                str(len(group.answers)),
+                f"{group.entropy:.2f}",
+                "-" if yes is None else f"{100 * yes:.1f}",
+                f"{100 * mean:.1f}",
+                best,
+            )
+            rows.append(Row(cells))
+        columns = (Column(head, False), *map(Column, numbers), Column("by", False))
+        tables.append(Table(f"By {head}", columns, tuple(rows)))
+    return tables
+
+
+def runs_table(runs: Sequence[RunSummary]) -> Table:
+    """Return the scores of runs by form beside the guess; forms that guessing solves are marked."""
+    rows = []
+    for run in runs:
+        assert isinstance(run.summary, NiehSummary)
+        for name, task in run.summary.tasks.items():
+            above = task.above_guessing.get(main_metric(task))
+            forms: Mapping[str, FormScore] = above.forms if above else {}
+            for number, (form, score) in enumerate(forms.items(), 1):
+                assert above is not None
+                mark = " (solved)" if form in above.solved_forms else ""
+                cells = (f"{100 * score.score:.1f}", f"{100 * score.guess:.1f}{mark}")
+                points = f"{100 * (score.score - score.guess):+.1f}"
+                rows.append(
+                    Row((name_of(run), name, form, str(score.n), *cells, points), ends_section=number == len(forms))
+                )
+    heads = [Column(name, False) for name in ("model", "task", "form of question")]
+    note = "solved: guessing gets nearly all of it, so it is not in the score above guessing."
+    columns = (*heads, *map(Column, ("questions", "score, %", "best guess, %", "points above")))
+    return Table("Runs beside the best guess, by form", columns, tuple(rows), (note,))
+
+
+def balanced_table(balanced: Balanced) -> Table:
+    """Return what a balanced part kept of each form."""
+    rows = [Row((name, str(kept), str(n))) for name, (kept, n) in balanced.kept.items()]
+    rows.append(Row(("all", str(len(balanced.questions)), str(sum(n for _, n in balanced.kept.values())))))
+    note = (
+        f"Best guesser on the part: {balanced.best}, {100 * balanced.best_score:.1f} %; chance "
+        f"{100 * balanced.chance:.1f} %. In no form is a guesser more than {100 * MARGIN:.0f} points above chance."
+    )
+    columns = (Column("form of question", False), Column("kept"), Column("of"))
+    return Table("The balanced part", columns, tuple(rows), (note,))
