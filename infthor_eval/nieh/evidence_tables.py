@@ -37,10 +37,10 @@ def short_name(file: str) -> str:
 
 
 def above_guessing_cell(above: AboveGuessing | None) -> TableCell:
-    """Return the score above guessing in percent, with its interval and questions; `-` if there is none."""
+    """Return the score above guessing in percent, with its interval; `-` if there is none."""
     if above is None or above.mean is None:
-        return _score_cell(None, None, None, 0)
-    return _score_cell(above.mean, above.low, above.high, above.n)
+        return _score_cell(None, None, None)
+    return _score_cell(above.mean, above.low, above.high)
 
 
 def above_guessing_notes(runs: Sequence[RunSummary]) -> list[str]:
@@ -53,7 +53,7 @@ def above_guessing_notes(runs: Sequence[RunSummary]) -> list[str]:
     left_out = f" Not counted, as guessing solves their forms (above {SOLVED:.0%}): {counts}." if solved else ""
     return [
         "above guessing: % of what cannot be guessed that was got, 0 for the best guesser and 100 for all right, with "
-        f"its interval over resampled trajectories and its questions.{left_out}"
+        f"its interval over resampled trajectories.{left_out}"
     ]
 
 
@@ -98,19 +98,21 @@ def _rows(
 
 def _cell(cell: Cell | None, metric: str) -> TableCell:
     if cell is None:
-        return _score_cell(None, None, None, 0)
+        return _score_cell(None, None, None)
     score = cell.scores[metric]
     return _score_cell(score.mean, score.low, score.high, cell.n)
 
 
-def _score_cell(mean: float | None, low: float | None, high: float | None, n: int) -> TableCell:
-    """Return a share in percent with its interval and its questions, as far as there are any."""
+def _score_cell(mean: float | None, low: float | None, high: float | None, n: int | None = None) -> TableCell:
+    """Return a share in percent with its interval and, if given, its questions, as far as there are any."""
     if mean is None:
-        return TableCell("-", {"": "", "low": "", "high": "", "questions": ""})
+        return TableCell("-", {"": "", "low": "", "high": ""})
     ends = ["" if end is None else f"{100 * end:.1f}" for end in (low, high)]
     interval = f" [{ends[0]}, {ends[1]}]" if all(ends) else ""
-    numbers = {"": f"{100 * mean:.1f}", "low": ends[0], "high": ends[1], "questions": str(n)}
-    return TableCell(f"{numbers['']}{interval} ({n})", numbers)
+    numbers = {"": f"{100 * mean:.1f}", "low": ends[0], "high": ends[1]}
+    if n is None:
+        return TableCell(f"{numbers['']}{interval}", numbers)
+    return TableCell(f"{numbers['']}{interval} ({n})", numbers | {"questions": str(n)})
 
 
 def _table(title: str, names: Sequence[str], rows: Sequence[Row]) -> Table:

@@ -13,7 +13,7 @@ from infthor_eval.terminal import console, printable
 __all__ = ["print_table", "table_console"]
 
 _LINE = 100  # letters in a line of a note
-_WIDTH = 180  # on a narrower terminal lines wrap, which is better than numbers that are cut off
+_WIDTH = 200  # on a narrower terminal lines wrap, which is better than numbers that are cut off
 
 
 def table_console() -> Console:

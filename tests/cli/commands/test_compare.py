@@ -53,7 +53,7 @@ def test_rewards_are_points_and_shares_are_percent(tmp_path, run):
     """Mean rewards of 4.4 and 2.2, of which every plan or none is a success."""
     steps = (StepRecord(),)
     records = [plan(name, index, (index, index + 1), 4.4) for name in "ab" for index in range(2)]
-    better = [replace(it, payload=replace(it.payload, steps=steps)) for it in records]
+    better = [replace(it, payload=replace(it.payload, steps=steps, max_reward=4.4)) for it in records]
     worse = [replace(it, payload=replace(it.payload, reward=2.2, ended="step limit")) for it in better]
     folders = [write_run(made_run(label, of_run), tmp_path) for label, of_run in (("w", worse), ("b", better))]
     code, out, err = run("compare", *folders)

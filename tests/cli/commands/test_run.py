@@ -26,7 +26,7 @@ def only(folder, pattern):
 # also where all is right: Wilson's interval on 2 questions. A bootstrap of equal scores tells nothing.
 FULL_MARKS = [
     *("100.00", "(3)", "100.00", "(1)", "100.00", "(1)", "100.00", "34.2–100.0", "-"),
-    *("100.00", "(2)", "-", "5", "0", "0"),
+    *("100.00", "(2)", "-", "100.0", "5", "0", "0"),
 ]
 
 
@@ -190,7 +190,7 @@ BAD = [
     (["--model", "oracle", "--taks", "nieh"], "unknown option --taks; did you mean --tasks?"),
     (["--zzz", "oracle"], "unknown option --zzz; see `infthor-eval run --help`"),
     (["compair", "a", "b"], "unknown command 'compair'; did you mean 'compare'?"),
-    (["xyz"], "unknown command 'xyz'; there are bundle, "),
+    (["xyz"], "unknown command 'xyz'; there are audit, "),
     (["ls", "modles"], "Did you mean 'models'?"),
 ]
 

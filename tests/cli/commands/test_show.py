@@ -76,7 +76,7 @@ def test_csv_is_a_table_with_one_number_a_cell(ran):
 
 def test_all_tables_of_csv_have_numbers_in_their_columns_of_numbers(ran):
     _, printed = ran("--format", "csv", "--full")
-    texts = ("model", "task", "scorer", "not in the form asked for")
+    texts = ("model", "task", "file", "scorer", "not in the form asked for")
     for block in filter(str.strip, printed.split("\n\n")):
         heading, *rows = csv.reader(line for line in block.splitlines() if not line.startswith("#"))
         for name, *cells in zip(heading, *rows, strict=True):
