@@ -1,15 +1,17 @@
-"""Charts of NIEH results: accuracy by clues, type of question and depth, and the gain over blank frames."""
+"""Charts of NIEH results: accuracy by clues, type, evidence shown and depth, and gains over frames and guessing."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.above_guessing import AboveGuessing
+from infthor_eval.nieh.evidence_tables import short_name
 from infthor_eval.nieh.gains import find_gains, name_of
-from infthor_eval.nieh.summary import CLUE_COLUMNS, Cell, Score, TaskSummary, main_metric
+from infthor_eval.nieh.summary import CLUE_COLUMNS, DISTANCES, SHOWN_CLUES, Cell, Score, TaskSummary, main_metric
 from infthor_eval.report.figures.style import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
@@ -48,29 +50,63 @@ def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
             if task in run.summary.summary.tasks and run.summary.summary.tasks[task].n
         ]
         if lines:
-            charts += [_by_clues(task, lines), _by_type(task, lines)]
-    by_frames = _gains_chart(runs)
-    heat_maps = (chart for run in runs if (chart := _heat_map(run)) is not None)
-    return [*charts, *([by_frames] if by_frames else []), *heat_maps]
+            charts += [_by_clues(task, lines), _by_type(task, lines), *_by_evidence(task, lines)]
+    summaries = [_gains_chart(runs), _above_guessing_chart(runs)]
+    heat_maps = [_heat_map(run) for run in runs]
+    return [*charts, *(chart for chart in (*summaries, *heat_maps) if chart is not None)]
 
 
 def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:
+    title = f"{task}: accuracy by number of clues"
+    return _by_columns(title, lines, _COLUMNS, lambda line: line.task.by_clues, "clues (questions)")
+
+
+def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
+    """Draw accuracy by the share of the clue frames that were shown, and by distance of the last clue; by file."""
+    for file in lines[0].task.evidence:
+        of_file = f"{task}, {short_name(file)}" if len(lines[0].task.evidence) > 1 else task
+
+        def shown(line: _Line, file: str = file) -> Mapping[str, Cell]:
+            return line.task.evidence[file].by_shown_clues if file in line.task.evidence else {}
+
+        def far(line: _Line, file: str = file) -> Mapping[str, Cell]:
+            return line.task.evidence[file].by_distance if file in line.task.evidence else {}
+
+        if any(shown(line).keys() - {"all"} for line in lines):
+            title = f"{of_file}: accuracy by clue frames shown"
+            yield _by_columns(title, lines, SHOWN_CLUES, shown, "of the clue frames were shown (questions)")
+        distances = [name for name in DISTANCES if any(name in far(line) for line in lines)]
+        if len(distances) > 1 and any(line.task.context != "clues" for line in lines):
+            title = f"{of_file}: accuracy by distance of the last clue from the end"
+            yield _by_columns(title, lines, distances, far, "frames after the last clue (questions)")
+
+
+def _by_columns(
+    title: str,
+    lines: Sequence[_Line],
+    names: Sequence[str],
+    cells_of: Callable[[_Line], Mapping[str, Cell]],
+    label: str,
+) -> Chart:
+    """Draw a column per name, with the dots of all lines; the counts are those of the first line."""
+
     def draw() -> Figure:
         figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
         axes = figure.subplots()
         for number, line in enumerate(lines):
-            _dots(axes, [line.task.by_clues[name] for name in _COLUMNS], line, _offset(number, len(lines)))
-        counts = [lines[0].task.by_clues[name].n for name in _COLUMNS]
-        names = [f"{name}\n({n})" for name, n in zip(_COLUMNS, counts, strict=True)]
-        axes.set_xticks(range(len(_COLUMNS)), names)
+            cells = cells_of(line)
+            _dots(axes, [cells.get(name) for name in names], line, _offset(number, len(lines)))
+        first = cells_of(lines[0])
+        counts = [first[name].n if name in first else 0 for name in names]
+        axes.set_xticks(range(len(names)), [f"{name}\n({n})" for name, n in zip(names, counts, strict=True)])
         axes.set_ylim(-3, 103)
         axes.set_ylabel(f"{lines[0].metric} (%)")
-        axes.set_xlabel("clues (questions)")
+        axes.set_xlabel(label)
         axes.grid(axis="x", visible=False)
         add_legend(axes, [(line.label, line.look) for line in lines])
         return figure
 
-    return Chart(f"{task}: accuracy by number of clues", inline_svg(draw), _describe(lines))
+    return Chart(title, inline_svg(draw), _describe(lines))
 
 
 def _by_type(task: str, lines: Sequence[_Line]) -> Chart:
@@ -104,8 +140,8 @@ def _dots(axes: Axes, cells: Sequence[Cell | None], line: _Line, offset: float, 
             _dot(axes, cell.scores[line.metric], at + offset, line.look.colour, is_flat=is_flat)
 
 
-def _dot(axes: Axes, score: Score | MeanEstimate, where: float, colour: str, *, is_flat: bool) -> None:
-    mean = 100 * score.mean
+def _dot(axes: Axes, score: Score | MeanEstimate | AboveGuessing, where: float, colour: str, *, is_flat: bool) -> None:
+    mean = 100 * (score.mean or 0)
     axes.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=colour, zorder=3)
     if score.low is not None and score.high is not None:
         span = axes.hlines if is_flat else axes.vlines
@@ -125,6 +161,22 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
         for gain in find_gains([run.summary for run in runs])
         if gain.metric == main_metric(gain.seeing) and (total := gain.total()) is not None
     ]
+    return _by_rows("Gain over blank frames", rows, "gain, in points, and its 95 % interval")
+
+
+def _above_guessing_chart(runs: Sequence[ReportRun]) -> Chart | None:
+    """Draw the score above guessing of each run, a row per task; None if no guess is known."""
+    rows = [
+        (f"{run.label}, {name}", above)
+        for run in runs
+        for name, task in run.summary.summary.tasks.items()
+        if (above := task.above_guessing.get(main_metric(task))) is not None and above.mean is not None
+    ]
+    return _by_rows("Above guessing", rows, "% of what cannot be guessed, and its 95 % interval")
+
+
+def _by_rows(title: str, rows: Sequence[tuple[str, MeanEstimate | AboveGuessing]], label: str) -> Chart | None:
+    """Draw a row with a dot for each value, around a line at 0; None without rows."""
     if not rows:
         return None
 
@@ -132,18 +184,18 @@ def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
         figure = Figure(figsize=(_PANEL[0] + LEGEND, max(_PANEL[1], 0.8 + _ROW * len(rows))), layout="constrained")
         axes = figure.subplots()
         axes.axvline(0, color="#444444", lw=0.8)
-        for height, (_, total) in enumerate(reversed(rows)):
-            _dot(axes, total, height, _GAIN, is_flat=True)
+        for height, (_, value) in enumerate(reversed(rows)):
+            _dot(axes, value, height, _GAIN, is_flat=True)
         axes.set_yticks(range(len(rows)), [printable(name)[:60] for name, _ in reversed(rows)])
         axes.set_ylim(-0.6, len(rows) - 0.4)
         low, high = axes.get_xlim()
-        axes.set_xlim(min(low, -5), max(high, 5))  # a gain of nothing would be drawn on a scale of hundredths
-        axes.set_xlabel("gain, in points, and its 95 % interval")
+        axes.set_xlim(min(low, -5), max(high, 5))  # nothing at all would be drawn on a scale of hundredths
+        axes.set_xlabel(label)
         axes.grid(axis="y", visible=False)
         return figure
 
-    description = "; ".join(f"{name} {100 * total.mean:+.1f} points" for name, total in rows)
-    return Chart("Gain over blank frames", inline_svg(draw), description)
+    description = "; ".join(f"{name} {100 * (value.mean or 0):+.1f}" for name, value in rows)
+    return Chart(title, inline_svg(draw), description)
 
 
 def _heat_map(run: ReportRun) -> Chart | None:
