@@ -45,8 +45,12 @@ class Blind(BaselineSubject):
     _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Guesser`."""
-        return Guesser(samples, self._chains).guess
+        """See `Guesser`; each file of a set is learned alone, as the published scripts ask one at a time."""
+        by_file: dict[str, list[Sample]] = defaultdict(list)
+        for sample in samples:
+            by_file[sample.question.file].append(sample)
+        guessers = {file: Guesser(of_file, self._chains) for file, of_file in by_file.items()}
+        return lambda sample: guessers[sample.question.file].guess(sample)
 
 
 class BlindCount(Blind):

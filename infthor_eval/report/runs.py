@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["ReportRun", "choose_evenly", "label_report_runs", "read_report_runs", "records_by_unit"]
 
 T = TypeVar("T")
+_LONGEST_TASKS = 60  # characters of the tasks in a label
 
 
 @dataclass(frozen=True)
@@ -125,11 +126,14 @@ def label_report_runs(folders: Sequence[Path], headers: Sequence[RunHeader]) -> 
 def _distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
     """Return a name per run; the frames are not part of it, since tables add them to the name."""
     names = label_runs(list(zip(folders, headers, strict=True)), ignore={"frames"})
+    tasks = ["+".join(sorted(header.config.get("tasks", {})))[:_LONGEST_TASKS] for header in headers]
     keys = [(name, header.suite, header.config.get("frames")) for name, header in zip(names, headers, strict=True)]
-    return [
-        f"{name} ({folder.name})" if keys.count(key) > 1 else name
-        for name, key, folder in zip(names, keys, folders, strict=True)
-    ]
+    with_tasks = list(zip(keys, tasks, strict=True))
+    for place, key in enumerate(keys):
+        if keys.count(key) > 1:
+            is_told_by_tasks = with_tasks.count(with_tasks[place]) == 1
+            names[place] += f" ({tasks[place] if is_told_by_tasks else folders[place].name})"
+    return names
 
 
 def _with_frames(name: str, header: RunHeader) -> str:

@@ -18,6 +18,8 @@ __all__ = ["CONTENT", "FURTHER", "SLICING", "at_opening", "at_pickup", "at_slici
 CONTENT = "container_content"
 FURTHER = further_type(CONTENT)
 SLICING = "slicing"
+# They take objects of one type alone (AI2-THOR's list of what fits where), so their contents need no look.
+_OF_ONE_TYPE = {"CoffeeMachine", "HandTowelHolder", "PaintingHanger", "Toaster", "ToiletPaperHanger", "TowelHolder"}
 FormAndNames = tuple[str, tuple[str, ...]]
 
 
@@ -50,13 +52,18 @@ def at_slicing(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def contents(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on receptacles whose contents never change and that are the only ones of their types."""
+    """Yield the questions on receptacles whose contents never change and that are the only ones of their types.
+
+    A receptacle that takes one type of object alone is left out: its contents can be told without a frame.
+    """
     last = len(history) - 1
     places = {parent for key in history.states(last) if (parent := history.parent(last, key)) is not None}
     for place in sorted(places):
         frames = _unchanged_frames(history, 0, place)
-        if len(frames) == len(history) and history.is_only_one(last, place) and is_plain(history, last, place):
-            asked = "What objects were {}?", (in_or_on(history.states(last)[place].type),)
+        place_type = history.states(last)[place].type
+        is_constant = len(frames) == len(history) and place_type not in _OF_ONE_TYPE
+        if is_constant and history.is_only_one(last, place) and is_plain(history, last, place):
+            asked = "What objects were {}?", (in_or_on(place_type),)
             yield from _contents_question(history, CONTENT, asked, frames, place, history.contents(last, place))
 
 

@@ -172,7 +172,7 @@ def _above_guessing_chart(runs: Sequence[ReportRun]) -> Chart | None:
         for name, task in run.summary.summary.tasks.items()
         if (above := task.above_guessing.get(main_metric(task))) is not None and above.mean is not None
     ]
-    return _by_rows("Above guessing", rows, "% of what cannot be guessed, and its 95 % interval")
+    return _by_rows("Above guessing", rows, "% above guessing, and 95 % interval")
 
 
 def _by_rows(title: str, rows: Sequence[tuple[str, MeanEstimate | AboveGuessing]], label: str) -> Chart | None:
