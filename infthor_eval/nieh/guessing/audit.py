@@ -11,8 +11,8 @@ from infthor_eval.formats.question_forms import type_of
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.forms import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
-from infthor_eval.nieh.guessing.guesses import questions_by_file, sample_on_clues
-from infthor_eval.nieh.scoring import Scorer, score
+from infthor_eval.nieh.guessing.guesses import questions_by_file, score_guesses
+from infthor_eval.nieh.scoring import Scorer
 
 __all__ = ["BY", "AuditedQuestion", "Group", "audit", "groups", "sentences"]
 
@@ -73,14 +73,11 @@ class Group:
 
 def audit(data: NiehSet, scorer: Scorer = "strict") -> list[AuditedQuestion]:
     """Return the questions of a set that can be asked, with the guessers' scores; a file is guessed at a time."""
-    audited: list[AuditedQuestion] = []
-    for questions in questions_by_file(data).values():
-        samples = [sample_on_clues(question) for question in questions]
-        by_guesser = [guesser.guess(samples) for guesser in GUESSERS]
-        for question, guesses in zip(questions, zip(*by_guesser, strict=True), strict=True):
-            scores = tuple(score(guess, question.answers, scorer) for guess in guesses)
-            audited.append(AuditedQuestion(question, scores))
-    return audited
+    return [
+        AuditedQuestion(question, scores)
+        for questions in questions_by_file(data).values()
+        for question, scores in zip(questions, score_guesses(questions, scorer), strict=True)
+    ]
 
 
 def _yes_no(question: Question) -> str:

@@ -20,8 +20,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.guessing.forms import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS
-from infthor_eval.nieh.guessing.guesses import sample_on_clues
-from infthor_eval.nieh.scoring import score
+from infthor_eval.nieh.guessing.guesses import score_guesses
 
 __all__ = ["MARGIN", "Balanced", "balance"]
 
@@ -113,14 +112,8 @@ def _best_cut(sizes: Sequence[int]) -> tuple[int, int]:
 
 def _guess(questions: Sequence[Question]) -> dict[str, tuple[float, ...]]:
     """Return each question's scores by guesser."""
-    if not questions:
-        return {}
-    samples = [sample_on_clues(question) for question in questions]
-    guesses = zip(*(guesser.guess(samples) for guesser in GUESSERS), strict=True)
-    return {
-        question.id: tuple(score(guess, question.answers, "strict") for guess in of_question)
-        for question, of_question in zip(questions, guesses, strict=True)
-    }
+    ids = [question.id for question in questions]
+    return dict(zip(ids, score_guesses(questions) if questions else [], strict=True))
 
 
 def _surplus(questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]) -> dict[str, int]:

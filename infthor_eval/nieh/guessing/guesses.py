@@ -9,9 +9,9 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.forms import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
 from infthor_eval.nieh.records import Guess
-from infthor_eval.nieh.scoring import SCORERS, scores
+from infthor_eval.nieh.scoring import SCORERS, Scorer, score, scores
 
-__all__ = ["find_guesses", "questions_by_file", "sample_on_clues", "visible_knowledge"]
+__all__ = ["find_guesses", "questions_by_file", "sample_on_clues", "score_guesses", "visible_knowledge"]
 
 _Scores = Sequence[Mapping[str, float]]  # by scorer, of each question
 
@@ -49,6 +49,16 @@ def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
     for question in data.questions:
         by_file.setdefault(question.file, []).append(question)
     return by_file
+
+
+def score_guesses(questions: Sequence[Question], scorer: Scorer = "strict") -> list[tuple[float, ...]]:
+    """Return for each question of a file the scores of all guessers, in their order."""
+    samples = [sample_on_clues(question) for question in questions]
+    by_guesser = [guesser.guess(samples) for guesser in GUESSERS]
+    return [
+        tuple(score(guess, question.answers, scorer) for guess in guesses)
+        for question, guesses in zip(questions, zip(*by_guesser, strict=True), strict=True)
+    ]
 
 
 def sample_on_clues(question: Question) -> Sample:

@@ -34,6 +34,7 @@ def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -
     from sklearn.feature_extraction import DictVectorizer  # a second to import
     from sklearn.linear_model import LogisticRegression
     from sklearn.model_selection import GroupKFold
+    from threadpoolctl import threadpool_limits
 
     groups = list(map(held_out(samples), samples))
     n_groups = len(set(groups))
@@ -42,10 +43,12 @@ def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -
     features = DictVectorizer().fit_transform([_features(sample, number, place) for sample in samples])
     answers = np.array([doc_target(sample.question) for sample in samples], dtype=object)
     guesses = np.empty(len(samples), dtype=object)
-    for known, asked in GroupKFold(min(_FOLDS, n_groups)).split(features, answers, groups):
-        if len(set(answers[known])) == 1:
-            guesses[asked] = answers[known][0]
-        else:
+    # These products are small: on a busy machine threads that wait for each other take ten times as long as one.
+    with threadpool_limits(limits=1):
+        for known, asked in GroupKFold(min(_FOLDS, n_groups)).split(features, answers, groups):
+            if len(set(answers[known])) == 1:
+                guesses[asked] = answers[known][0]
+                continue
             model = LogisticRegression(C=_INVERSE_PENALTY, tol=_TOLERANCE, max_iter=_ITERATIONS)
             guesses[asked] = model.fit(features[known], answers[known]).predict(features[asked])
     return list(guesses)
