@@ -49,8 +49,10 @@ class Balanced:
 def balance(questions: Sequence[Question]) -> Balanced:
     """Return the balanced part of some questions; it may be empty. Of questions that are there twice it has one."""
     before = Counter(map(_name, questions))
-    different = {replace(question, published=None).id: question for question in reversed(questions)}
-    left = _cut_answers([question for question in questions if question in different.values()])
+    different: dict[str, Question] = {}
+    for question in questions:
+        different.setdefault(replace(question, published=None).id, question)
+    left = _cut_answers(list(different.values()))
     right = _guess(left)
     while surplus := _surplus(left, right):
         left = _cut_answers(_prune(left, right, surplus))

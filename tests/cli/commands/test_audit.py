@@ -1,0 +1,39 @@
+"""`audit`: what a set gives away, from the command line."""
+
+from infthor_eval.formats.qa_csv import read_questions
+from infthor_eval.formats.question import Question
+from tests.faults.told import said_in_one_line
+
+
+def leaking(n=40):
+    """All mugs are there, and no book; and as many questions that nothing gives away."""
+    asked = [(f"t{k}", *(("mug", "yes"), ("book", "no"))[k % 2]) for k in range(n)]
+    questions = [Question(t, f"Is there any {item} in this room?", (1,), (said,)) for t, item, said in asked]
+    fair = [(f"t{k % 8}", f"Have you seen a thing{k}?", ("yes", "no")[k // 2 % 2]) for k in range(n)]
+    return [*questions, *(Question(t, text, (1,), (said,)) for t, text, said in fair)]
+
+
+def test_a_set_is_audited_beside_a_run_and_its_balanced_part_written(make_nieh_set, tmp_path, run):
+    data, part = make_nieh_set(leaking(), size=8), tmp_path / "qa_set_part.csv"
+    assert run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")[0] == 0
+    (folder,) = (tmp_path / "out" / "oracle").iterdir()
+    code, out, err = run("audit", data, folder, "--balanced", part)
+    assert code == 0
+    text = " ".join(out.split())
+    assert "Is there any {} in this room? (40 questions): words (blind) gets 100.0 % without a frame." in text
+    assert "100.0 (solved)" in text
+    kept = read_questions(part)
+    assert f"{part}: {len(kept)} of" in err
+    assert sum("thing" in question.text for question in kept) > sum("any" in question.text for question in kept)
+
+
+def test_what_cannot_be_audited_is_one_line(make_nieh_set, tmp_path, run, scripted_run):
+    data = make_nieh_set(size=8)
+    said_in_one_line(run("audit", tmp_path / "none"), "no such folder")
+    said_in_one_line(run("audit", data, scripted_run), "only runs of nieh can stand beside guesses")
+    yes = make_nieh_set(
+        [Question(f"t{n}", "Have you seen a mug?", (1,), ("yes",)) for n in range(4)], size=8, name="yes"
+    )
+    code, _, err = run("audit", yes, "--balanced", tmp_path / "part.csv")
+    assert (code, "has a balanced part; nothing is written" in err) == (2, True)
+    assert not (tmp_path / "part.csv").exists()
