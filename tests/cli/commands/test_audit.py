@@ -13,15 +13,21 @@ def leaking(n=40):
     return [*questions, *(Question(t, text, (1,), (said,)) for t, text, said in fair)]
 
 
-def test_a_set_is_audited_beside_a_run_and_its_balanced_part_written(make_nieh_set, tmp_path, run):
-    data, part = make_nieh_set(leaking(), size=8), tmp_path / "qa_set_part.csv"
+def test_a_set_is_audited_beside_a_run(make_nieh_set, tmp_path, run):
+    data = make_nieh_set(leaking(24), size=8)
     assert run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")[0] == 0
     (folder,) = (tmp_path / "out" / "oracle").iterdir()
-    code, out, err = run("audit", data, folder, "--balanced", part)
+    code, out, _ = run("audit", data, folder)
     assert code == 0
     text = " ".join(out.split())
-    assert "Is there any {} in this room? (40 questions): words (blind) gets 100.0 % without a frame." in text
+    assert "Is there any {} in this room? (24 questions): words (blind) gets 100.0 % without a frame." in text
     assert "100.0 (solved)" in text
+
+
+def test_the_balanced_part_is_written(make_nieh_set, tmp_path, run):
+    data, part = make_nieh_set(leaking(), size=8), tmp_path / "qa_set_part.csv"
+    code, _, err = run("audit", data, "--balanced", part)
+    assert code == 0
     kept = read_questions(part)
     assert f"{part}: {len(kept)} of" in err
     assert sum("thing" in question.text for question in kept) > sum("any" in question.text for question in kept)
