@@ -33,11 +33,11 @@ def test_further_scores_are_those_above_guessing_where_guessing_does_not_solve_t
 
 
 def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
-    # Questions 0 to 3 count, of one form with a guess of 0.5 each; 4 is solved by guessing, 5 has no guess.
-    replies = (("cup", "cup", "mug", "mug", "mug", "mug"), ("mug", "mug", "mug", "cup", "cup", "mug"))
+    # Question 0 has no guess and 1 is solved by guessing; the others count, of one form with a guess of 0.5 each.
+    replies = (("mug", "mug", "cup", "cup", "mug", "mug"), ("mug", "cup", "mug", "mug", "mug", "cup"))
     runs = [
-        [*(asked(i, of_run[i]) for i in range(4)), asked(4, of_run[4], 1.0, 1.0), record(5, of_run[5])]
-        for of_run in replies
+        [record(0, first), asked(1, second, 1.0, 1.0), *map(asked, (2, 3, 6, 7), counted)]
+        for first, second, *counted in replies
     ]
     found = compared(*runs)
     assert list(found) == ["reference", "strict", ABOVE]
@@ -45,7 +45,7 @@ def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
     assert (plain.first, plain.second, plain.difference.estimate.n) == (4 / 6, 4 / 6, 6)
     # From 2 of 4 right to 3 of 4: (0.5 - 0.5) / 0.5 = 0 and (0.75 - 0.5) / 0.5 = 0.5.
     assert (above.first, above.second, above.difference.estimate.n) == (0.0, 0.5, 4)
-    assert above.difference.estimate.mean == pytest.approx(0.5)
+    assert (above.difference.estimate.mean, above.difference.estimate.n_clusters) == (pytest.approx(0.5), 2)
     assert above.is_share
     row = comparison_table(found.values(), "a", "b").rows[-1].cells
     assert row[:6] == ("nieh_gt", ABOVE, "%", "0.00", "50.00", "+50.00")
