@@ -14,7 +14,7 @@ def shown(*runs):
 
 
 def lines(table):
-    console = Console(width=180, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
+    console = Console(width=240, record=True, file=open("/dev/null", "w"))  # noqa: SIM115, PTH123
     print_table(table, console)
     return [line.split() for line in console.export_text().splitlines()]
 
