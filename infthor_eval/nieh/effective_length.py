@@ -5,6 +5,7 @@ applied to windows of growing size around the evidence (`nieh_haystack`), to the
 to whole trajectories by their length (`nieh_full`); to plain scores and to those above guessing.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -75,10 +76,14 @@ def effective_length(base: float | None, scores: Mapping[str, float | None]) -> 
     kept = ""
     for length in lengths:
         score = scores[length]
-        if score is None or score < KEPT * base:
+        if score is None or _is_lost(score, base):
             return f"{kept}K" if kept else f"below {length}K"
         kept = length
     return f"{kept}K, all that were asked" if kept else "-"
+
+
+def _is_lost(score: float, base: float) -> bool:
+    return score < KEPT * base and not math.isclose(score, KEPT * base)  # means of questions are rounded
 
 
 def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
@@ -96,7 +101,7 @@ def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
         run, on_clues = base
         for context, tasks in _lengths(items).items():
             for scorer in on_clues.metrics:
-                points = [point for task in tasks for point in _points(task, scorer)]
+                points = [point for sized in tasks if scorer in sized[1].metrics for point in _points(sized, scorer)]
                 if points:
                     yield Series(name_of(run), context, scorer, _point("", on_clues, scorer), points)
 

@@ -236,7 +236,8 @@ def _shown_clues(question: Question, reply: LoggedReply, n_frames: int | None) -
     if question.absence or (reply.frames is None and not is_whole):
         return None
     n_shown = len(clues if reply.frames is None else clues.intersection(reply.frames))
-    n_after = None if n_frames is None else n_frames - 1 - max(clues)
+    # A log of a model that takes only some frames counts these alone, and a clue can lie beyond.
+    n_after = None if n_frames is None or n_frames <= max(clues) else n_frames - 1 - max(clues)
     return ShownClues(n_shown=n_shown, n_clues=len(clues), n_after=n_after)
 
 

@@ -1,7 +1,11 @@
+from itertools import pairwise
+
 import msgspec
 import pytest
 
-from infthor_eval.nieh.summary import NiehSummary, summarise
+from infthor_eval.nieh.records import Guess, ShownClues
+from infthor_eval.nieh.summary import DISTANCES, LENGTHS, NiehSummary, summarise
+from infthor_eval.runs import Tokens
 
 from .made import identity, record
 
@@ -102,3 +106,78 @@ def test_replies_that_are_not_of_the_form_asked_for_are_counted_by_reason(shuffl
         "neither yes nor no": 1,
         "no number": 1,
     }
+
+
+# -- by file, evidence and length
+
+
+def task_of(records):
+    return summarise(identity(), records).tasks["nieh_gt"]
+
+
+def shown(n_shown, n_clues=2, n_after=None):
+    return ShownClues(n_shown=n_shown, n_clues=n_clues, n_after=n_after)
+
+
+def means(cells):
+    return {name: (cell.n, cell.scores["strict"].mean) for name, cell in cells.items()}
+
+
+def test_files_are_apart_in_a_set_of_several():
+    records = [record(0, "mug", file="b"), record(1, "cup", file="b"), record(2, "mug", file="a")]
+    assert list(means(task_of(records).by_file).items()) == [("a", (1, 1.0)), ("b", (2, 0.5))]
+    alone = task_of([record(0, "mug")])
+    assert (alone.by_file, list(alone.evidence)) == ({}, ["total"])
+
+
+def test_samples_are_apart_by_the_share_of_their_clues_that_was_shown():
+    states = ((0, "a"), (2, "a"), (1, "b"), (0, "b"), (1, "a"))
+    records = [record(i, "mug" if i else "cup", file=file, shown_clues=shown(n)) for i, (n, file) in enumerate(states)]
+    evidence = task_of([*records, record(9, "mug", file="a")]).evidence  # of the last it is not known
+    assert {name: list(means(cells.by_shown_clues).items()) for name, cells in evidence.items()} == {
+        "total": [("all", (1, 1.0)), ("some", (2, 1.0)), ("none", (2, 0.5))],
+        "a": [("all", (1, 1.0)), ("some", (1, 1.0)), ("none", (1, 0.0))],
+        "b": [("some", (1, 1.0)), ("none", (1, 1.0))],
+    }
+    assert all(cells.by_distance == {} for cells in evidence.values())
+
+
+@pytest.mark.parametrize(
+    ("n_after", "name"),
+    [(0, "0-49"), (49, "0-49"), (50, "50-99"), (1599, "800-1599"), (1600, "1600-3199"), (3200, ">=3200")],
+)
+def test_samples_are_apart_by_the_distance_of_their_last_clue(n_after, name):
+    evidence = task_of([record(0, "mug", shown_clues=shown(2, n_after=n_after)), record(1, "cup")]).evidence["total"]
+    assert means(evidence.by_distance) == {name: (1, 1.0)}
+
+
+@pytest.mark.parametrize(
+    ("tokens", "name"),
+    [(0, "0-1"), (999, "0-1"), (1000, "1-2"), (32_768, "32-64"), (1_023_999, "512-1024"), (1_024_000, ">=1024")],
+)
+def test_samples_are_apart_by_the_length_of_their_context(tokens, name):
+    found = task_of([record(0, "mug", tokens=Tokens(context=tokens)), record(1, "cup")]).by_length
+    assert means({length: at.cell for length, at in found.items()}) == {name: (1, 1.0)}
+
+
+def test_lengths_have_their_own_scores_above_guessing():
+    guess = Guess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
+    lengths = (("mug", 500), ("cup", 500), ("mug", 70_000), ("mug", 3000))
+    records = [record(i, reply, tokens=Tokens(context=n), guess=guess) for i, (reply, n) in enumerate(lengths[:3])]
+    found = task_of([*records, record(3, "mug", tokens=Tokens(context=3000))])
+    assert {name: at.above_guessing["strict"] for name, at in found.by_length.items()} == {
+        "0-1": 0.0,
+        "2-4": None,  # its guess is not known
+        "64-128": 1.0,
+    }
+    assert list(found.by_length) == ["0-1", "2-4", "64-128"]
+    assert found.above_guessing["strict"].mean == pytest.approx(1 / 3)
+    assert found.above_guessing["strict"].n_unknown == 1
+
+
+@pytest.mark.parametrize("names", [DISTANCES, LENGTHS])
+def test_bins_follow_each_other_without_a_gap(names):
+    ends = [tuple(map(int, name.split("-"))) for name in names[:-1]]
+    step = 1 if names is DISTANCES else 0  # the last frame of a bin is in its name, the last token is not
+    assert all(before[1] + step == after[0] for before, after in pairwise(ends))
+    assert (ends[0][0], names[-1]) == (0, f">={ends[-1][1] + step}")

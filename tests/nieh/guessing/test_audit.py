@@ -1,0 +1,103 @@
+"""The audit of a set, by hand and on the published files."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.nieh.guessing.audit import BY, AuditedQuestion, Group, audit, groups, sentences
+from infthor_eval.nieh.guessing.guessers import GUESSERS
+
+from .made import asked
+
+PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
+SINGLE, MULTI = "qa_set_nieh_single_clue", "qa_set_nsieh_multi_clue"
+NAMES = [guesser.name for guesser in GUESSERS]
+PRESENCE, OPEN = "Is Mug on the Bed?", "Where is Mug now?"
+
+
+def audited(text, answer, *scores, file="", clues=(1,), number=0):
+    """A question with the scores of the first guessers; the others get 0."""
+    right = (*scores, *[0.0] * (len(GUESSERS) - len(scores)))
+    return AuditedQuestion(asked(f"t{number}", text, answer, clues, file), right)
+
+
+def test_a_group_tells_its_answers_and_its_best_guesser():
+    answers = ("Yes", "yes", "no", "Bed")
+    group = Group("file", "all", [audited(PRESENCE, answer, i < 1, i < 3, i < 3) for i, answer in enumerate(answers)])
+    assert group.answers == {"yes": 2, "no": 1, "bed": 1}
+    assert group.entropy == pytest.approx(0.5 * 1 + 2 * 0.25 * 2)  # in bits: log2 of 2 and of 4
+    assert group.share_yes == pytest.approx(2 / 3)
+    assert group.means()[:4] == (0.25, 0.75, 0.75, 0.0)
+    assert group.best() == (NAMES[1], 0.75)  # the simpler of two equals
+
+
+def test_one_answer_has_no_entropy_and_open_questions_no_share_of_yes():
+    group = Group("file", "all", [audited(OPEN, "Bed")] * 3)
+    assert (group.entropy, math.copysign(1, group.entropy), group.share_yes) == (0, 1, None)
+
+
+def test_groups_are_split_by_file_unless_they_are_files():
+    items = [
+        audited(PRESENCE, "yes", file="a"),
+        audited(OPEN, "Bed", file="a", clues=(1, 2)),
+        audited(PRESENCE, "no", file="b"),
+    ]
+    found = {by: {group.name: len(group.questions) for group in groups(items, by)} for by in BY}
+    assert found == {
+        "file": {"a": 2, "b": 1},
+        "answers": {"a: open-ended": 1, "a: yes/no": 1, "b: yes/no": 1},
+        "clues": {"a: 1": 1, "a: 2": 1, "b: 1": 1},
+        "type": {"a: final_state": 1, "a: location_tracing": 1, "b: final_state": 1},
+        "form": {"a: Is {} in/on {}?": 1, "a: Where is {} now?": 1, "b: Is {} in/on {}?": 1},
+    }
+    (alone,) = groups([audited("Why?", "x")], "file")
+    (untyped,) = groups([audited("Why?", "x")], "type")
+    assert (alone.name, untyped.name) == ("all", "untyped")
+
+
+def test_sentences_tell_what_is_striking():
+    yes = [audited(PRESENCE, "yes", 1.0, number=i) for i in range(20)]
+    places = [audited(OPEN, ("Bed", "Shelf")[i % 2], 0.0, i > 0, number=i) for i in range(20)]
+    assert list(sentences([*yes, *places])) == [
+        "All 20 yes/no questions of this set are yes.",
+        "Is {} in/on {}? (20 questions): the answer is always yes.",
+        f"Where is {{}} now? (20 questions): {NAMES[1]} gets 95.0 % without a frame.",
+        f"all: 50.00 % can be had without a frame ({NAMES[0]}).",
+    ]
+    # One question fewer is too few, and 90 % is not striking.
+    assert len(list(sentences(yes[:19]))) == 1
+    assert len(list(sentences([*places[:19], audited(OPEN, "Bed")]))) == 1
+    both = [*yes[:19], audited(PRESENCE, "no")]
+    assert not [sentence for sentence in sentences(both) if sentence.startswith("All")]
+
+
+def test_a_set_is_audited_question_by_question(tmp_path):
+    questions = [asked(f"t{i}", PRESENCE, "yes" if i else "no") for i in range(4)]
+    write_questions(tmp_path / "qa_set_test.csv", questions)
+    found = audit(NiehSet(tmp_path))
+    assert [item.question for item in found] == questions
+    assert [item.scores for item in found] == [(float(i > 0),) * len(GUESSERS) for i in range(4)]
+
+
+@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data")
+def test_what_the_published_files_give_without_a_frame():
+    found = audit(NiehSet(PUBLISHED))
+    single, multi = groups(found, "file")
+    assert [(group.name, len(group.questions)) for group in (single, multi)] == [(SINGLE, 829), (MULTI, 474)]
+    constant, blind, learner = map(
+        NAMES.index, ("one answer a file", "words (blind)", "learner: words, number of frames")
+    )
+    for group, of_constant, of_blind in ((single, 63.33, 76.47), (multi, 44.94, 67.33)):
+        means = [round(100 * mean, 2) for mean in group.means()]
+        assert (means[constant], means[blind]) == (of_constant, of_blind)
+        assert means[learner] >= of_blind
+        assert group.best()[1] == max(group.means()) >= group.means()[learner]
+    said = list(sentences(found))
+    assert said[:2] == [
+        f"All 525 yes/no questions of {SINGLE} are yes.",
+        f"All 213 yes/no questions of {MULTI} are no.",
+    ]
+    assert f"{MULTI}: Is {{}} in/on {{}}? (213 questions): the answer is always no." in said

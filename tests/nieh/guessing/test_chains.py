@@ -1,0 +1,89 @@
+"""The guesser by chains of words, by hand."""
+
+import pytest
+
+from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.guessing.chains import (
+    Guesser,
+    chains_of_words,
+    chains_of_words_and_count,
+    chains_of_words_and_place,
+    held_out,
+    words_of,
+)
+
+from .made import asked, on_clues
+
+QUESTION = asked("t", "Is Mug on-the Bed?", "yes", (250, 310))
+LEADING = [("leading", *words) for words in (["is"], ["is", "mug"], ["is", "mug", "on"])]
+
+
+def test_words_are_in_lower_case_without_marks():
+    assert words_of(QUESTION) == ["is", "mug", "on", "the", "bed"]
+
+
+def test_chains_go_from_the_general_to_the_particular():
+    (sample,) = on_clues(QUESTION)
+    leading, *later = chains_of_words(sample)
+    assert leading[:3] == LEADING
+    assert leading[3:] == [(*LEADING[2], "the"), (*LEADING[2], "the", "bed")]
+    assert later == [[("word", word), ("word", "is", "mug", word)] for word in ("bed", "on", "the")]
+
+
+def test_number_and_place_follow_the_stem():
+    (sample,) = on_clues(QUESTION)
+    stem = ("stem", "is", "mug", "on")
+    assert chains_of_words_and_count(sample) == [*chains_of_words(sample), [stem, ("count", *stem[1:], 2)]]
+    # The last clue is in the fourth hundred; they span 60 frames, a number of six bits.
+    place = [[stem, ("place", *stem[1:], 3)], [stem, ("span", *stem[1:], 6)]]
+    assert chains_of_words_and_place(sample) == [*chains_of_words(sample), *place]
+
+
+def test_a_question_is_left_out_with_its_trajectory_or_alone_if_there_is_one():
+    several = on_clues(asked("t", "A?", "x"), asked("t", "B?", "x"), asked("u", "C?", "x"))
+    assert list(map(held_out(several), several)) == ["t", "t", "u"]
+    alone = several[:2]
+    assert list(map(held_out(alone), alone)) == [sample.question.id for sample in alone]
+
+
+def chain_of(*contexts):
+    """Chains that are the same for every sample: one of these contexts."""
+    return lambda sample: [[context(sample) for context in contexts]]
+
+
+@pytest.mark.parametrize(("n_y", "guess"), [(2, "x"), (3, "y")])
+def test_a_context_counts_less_the_more_different_answers_it_has(n_y, guess):
+    """Witten and Bell's interpolation by hand.
+
+    Of 20 answers 18 are x. After the word "a" there are 1 x and 2 y, two different answers: x has (1 + 2 * 18 / 20) /
+    (3 + 2) = 0.56. With a third y it has (1 + 2 * 18 / 21) / (4 + 2) = 0.45.
+    """
+    key = [("a", "x"), *[("a", "y")] * n_y, *[("c", "x")] * 17]
+    samples = on_clues(*(asked(f"t{number}", text, answer) for number, (text, answer) in enumerate(key)))
+    guesser = Guesser(samples, chain_of(lambda sample: sample.question.text))
+    assert [guesser.guess(sample) for sample in on_clues(asked("new", "a", "?"), asked("new", "e", "?"))] == [
+        guess,
+        "x",
+    ]
+
+
+def test_own_answers_are_taken_away_before_counting():
+    """On trajectory t the answer after "a" is always x; the others give y after it, and x elsewhere."""
+    key = [("t", "a", "x")] * 5 + [("u", "a", "y"), ("u", "b", "x"), ("v", "b", "x")]
+    samples = [Sample(asked(traj, text, answer, (number,)), (1,)) for number, (traj, text, answer) in enumerate(key)]
+    guesser = Guesser(samples, chain_of(lambda sample: sample.question.text))
+    # After "a": (0 + 1 * 2/3) / 2 = 1/3 for x and (1 + 1/3) / 2 = 2/3 for y.
+    assert guesser.guess(samples[0]) == "y"
+    assert guesser.guess(samples[5]) == "x"
+
+
+def test_of_equally_likely_answers_the_first_in_the_alphabet_is_guessed():
+    samples = on_clues(*(asked(f"t{i}", "Why?", answer) for i, answer in enumerate(("pear", "fig", "pear", "fig"))))
+    guesser = Guesser(samples, chains_of_words)
+    assert guesser.guess(on_clues(asked("new", "Why?", "?"))[0]) == "fig"
+
+
+@pytest.mark.parametrize("chains", [chains_of_words, chains_of_words_and_count, chains_of_words_and_place])
+def test_of_one_question_nothing_is_learned(chains):
+    (sample,) = on_clues(asked("t", "Why?", "x"))
+    assert Guesser([sample], chains).guess(sample) == ""

@@ -1,0 +1,85 @@
+"""The best guess at each question of a set."""
+
+import pytest
+
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.nieh.above_guessing import above_guessing
+from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
+from infthor_eval.nieh.guessing.guesses import find_guesses, questions_by_file, sample_on_clues, visible_knowledge
+
+from ..made import record
+from .made import asked, on_clues
+
+PRESENCE, OPEN = "Is Mug on the Bed?", "Was Box open?"
+
+
+@pytest.fixture
+def make_set(tmp_path):
+    def make(**files):
+        for name, questions in files.items():
+            write_questions(tmp_path / f"qa_set_{name}.csv", questions)
+        return NiehSet(tmp_path)
+
+    return make
+
+
+def constant(text, answers, clues=(1,)):
+    return [asked(f"t{i}", text, answer, clues) for i, answer in enumerate(answers)]
+
+
+def test_on_the_clue_frames_their_number_is_told_and_elsewhere_the_words_alone():
+    assert visible_knowledge("clues") == Knowledge.WORDS | Knowledge.NUMBER
+    assert {visible_knowledge(name) for name in ("trajectory", "haystack", "imported")} == {Knowledge.WORDS}
+
+
+def test_a_form_has_the_score_of_its_best_guesser(make_set):
+    # Held out, the majority of four yes and a no is always yes; "no" is right for a single other question alone.
+    data = make_set(test=[*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))])
+    guesses = find_guesses(data, Knowledge.WORDS)
+    by_question = [guesses[question.id] for question in data.questions]
+    assert [guess.form for guess in by_question] == ["Is {} in/on {}?"] * 5 + ["Was {} open?"] * 2
+    assert [guess.scores["strict"] for guess in by_question] == [1, 1, 1, 1, 0, 1, 1]
+    assert [guess.form_scores["strict"] for guess in by_question] == [pytest.approx(0.8)] * 5 + [1] * 2
+    assert find_guesses(data, Knowledge.WORDS) is guesses
+
+
+def test_a_file_is_guessed_from_itself_alone(make_set):
+    data = make_set(a=constant(PRESENCE, ("yes",) * 3, (1,)), b=constant(PRESENCE, ("no",) * 3, (2,)))
+    guesses = find_guesses(data, Knowledge.WORDS)
+    assert {guess.scores["strict"] for guess in guesses.values()} == {1.0}
+    assert {name: len(questions) for name, questions in questions_by_file(data).items()} == {
+        "qa_set_a": 3,
+        "qa_set_b": 3,
+    }
+
+
+def test_what_a_guesser_may_not_know_does_not_help(make_set):
+    key = [(f"t{i}", ("yes", "no")[j], ((1,), (1, 2))[j]) for i in range(6) for j in range(2)]
+    data = make_set(test=[asked(traj, PRESENCE, answer, clues) for traj, answer, clues in key])
+    told, untold = (find_guesses(data, knowledge) for knowledge in map(visible_knowledge, ("clues", "trajectory")))
+    assert {guess.form_scores["strict"] for guess in told.values()} == {1.0}
+    assert {guess.form_scores["strict"] for guess in untold.values()} == {0.5}
+
+
+def test_no_guesser_is_above_guessing_and_the_best_is_there(make_set):
+    answers = ("yes", "yes", "no", "yes", "no", "no", "yes", "no", "yes")
+    questions = [
+        asked(f"t{i % 5}", f"Is {('Mug', 'Box', 'Pan')[i % 3]} on the Bed?", answer, (i, i + 9)[: 1 + i % 2])
+        for i, answer in enumerate(answers)
+    ]
+    data = make_set(test=questions)
+    guesses = find_guesses(data, ~Knowledge.FILE)
+    scores = []
+    for guesser in GUESSERS:
+        replies = zip(questions, guesser.guess(on_clues(*questions)), strict=True)
+        records = [
+            record(i, reply, question.answers, guess=guesses[question.id])
+            for i, (question, reply) in enumerate(replies)
+        ]
+        scores.append(above_guessing(records, "strict").mean)
+    assert max(scores) == pytest.approx(0)
+
+
+def test_a_question_on_its_clue_frames_has_them_in_order():
+    assert sample_on_clues(asked("t", PRESENCE, "yes", (5, 2))).frames == (2, 5)
