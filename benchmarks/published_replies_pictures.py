@@ -85,7 +85,7 @@ def draw_guessing(data: NiehSet, tasks: Mapping[str, TaskSummary]) -> Figure:
             if "README" in (row.source or "README")
         ]
         at = len(rows) + len(tasks)
-        for name, look, value in rows:
+        for _, look, value in rows:
             at -= 1
             axes.plot(value, at, "o", ms=5, color=look.colour)
             axes.annotate(f"{value:.1f}", (value, at), (7, 0), textcoords="offset points", va="center", fontsize=8)

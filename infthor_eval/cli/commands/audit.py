@@ -62,8 +62,9 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
 def _read_summary(folder: Path) -> "RunSummary":
     from infthor_eval.cli.results import read_run_results
     from infthor_eval.errors import UsageError
+    from infthor_eval.nieh.summary import NiehSummary
 
     run = read_run_results(folder).summary
-    if run.header.suite != "nieh":
+    if not isinstance(run.summary, NiehSummary):
         raise UsageError(f"{folder}: a run of {run.header.suite}; only runs of nieh can stand beside guesses")
     return run
