@@ -97,22 +97,23 @@ def _rows(
 
 
 def _cell(cell: Cell | None, metric: str) -> TableCell:
+    """Return a mean with its interval and its questions."""
     if cell is None:
-        return _score_cell(None, None, None)
+        missing = _score_cell(None, None, None)
+        return TableCell(missing, {**missing.numbers, "questions": ""})
     score = cell.scores[metric]
-    return _score_cell(score.mean, score.low, score.high, cell.n)
+    known = _score_cell(score.mean, score.low, score.high)
+    return TableCell(f"{known} ({cell.n})", {**known.numbers, "questions": str(cell.n)})
 
 
-def _score_cell(mean: float | None, low: float | None, high: float | None, n: int | None = None) -> TableCell:
-    """Return a share in percent with its interval and, if given, its questions, as far as there are any."""
+def _score_cell(mean: float | None, low: float | None, high: float | None) -> TableCell:
+    """Return a share in percent with its interval, as far as there are any."""
     if mean is None:
         return TableCell("-", {"": "", "low": "", "high": ""})
     ends = ["" if end is None else f"{100 * end:.1f}" for end in (low, high)]
     interval = f" [{ends[0]}, {ends[1]}]" if all(ends) else ""
     numbers = {"": f"{100 * mean:.1f}", "low": ends[0], "high": ends[1]}
-    if n is None:
-        return TableCell(f"{numbers['']}{interval}", numbers)
-    return TableCell(f"{numbers['']}{interval} ({n})", numbers | {"questions": str(n)})
+    return TableCell(f"{numbers['']}{interval}", numbers)
 
 
 def _table(title: str, names: Sequence[str], rows: Sequence[Row]) -> Table:

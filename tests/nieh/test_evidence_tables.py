@@ -58,11 +58,11 @@ def guessed(number, reply, score, mean=0.5, form="f"):
     return record(number, reply, guess=Guess(form=form, scores={"strict": score}, form_scores={"strict": mean}))
 
 
-def test_a_cell_has_the_score_above_guessing_with_its_interval_and_questions():
+def test_a_cell_has_the_score_above_guessing_with_its_interval():
     records = [guessed(i, "mug" if i % 2 else "cup", 0.25, 0.25) for i in range(8)]
     cell = above_guessing_cell(above_guessing(records, "strict"))
-    assert (cell.numbers[""], cell.numbers["questions"]) == ("33.3", "8")  # (0.5 - 0.25) / 0.75
-    assert cell == f"33.3 [{cell.numbers['low']}, {cell.numbers['high']}] (8)"
+    assert cell.numbers[""] == "33.3"  # (0.5 - 0.25) / 0.75
+    assert cell == f"33.3 [{cell.numbers['low']}, {cell.numbers['high']}]"
     assert [above_guessing_cell(none) for none in (None, above_guessing([], "strict"))] == ["-", "-"]
 
 
