@@ -136,6 +136,7 @@ class PlannerAction(_Fields):
     location: str | None = None
     object_id: str | None = msgspec.field(name="objectId", default=None)
     receptacle_id: str | None = msgspec.field(name="receptacleObjectId", default=None)
+    clean_id: str | None = msgspec.field(name="cleanObjectId", default=None)
     value: int | None = None
 
 

@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.manipulation.environment import arm_of
 from infthor_eval.manipulation.geometry import Point, middle_of, point_of, size_of
 from infthor_eval.manipulation.replay_frames import ArmObservation, NearbyObject, Place, Reach
-from infthor_eval.thor.actions import object_type_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["ArmObserver"]

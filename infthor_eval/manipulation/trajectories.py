@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import digest
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.manipulation.kinds import ManipulationKind
-from infthor_eval.thor.actions import object_type_of
 
 __all__ = ["EXPERT_ACTIONS", "ArmEpisode", "ArmTrajectory", "arm_episodes", "read_arm_trajectory"]
 

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.manipulation.records import ArmStep
-from infthor_eval.thor.actions import object_type_of
 
 __all__ = ["describe_call", "describe_request"]
 

@@ -24,7 +24,7 @@ def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> Actor
     """Return the factory of a model, or of a baseline, which is fitted to all trajectories; TypeError for others."""
     if isinstance(subject, PlanBaseline):
         subject.fit(trajectories)
-        return ActorFactory(False, lambda _, trajectory: subject.actor(trajectory))
+        return ActorFactory(False, lambda task, trajectory: subject.actor(trajectory, task.words))
     if isinstance(subject, Model):
         return ActorFactory(True, lambda task, _: ModelActor(subject, task.agent_config()))
     raise TypeError(f"{subject.name} is neither a model nor a baseline of plans")

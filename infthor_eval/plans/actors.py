@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.plans.environment import Observation, PlanEnvironment, StepOutcome
 from infthor_eval.plans.plan import Plan
@@ -60,5 +61,5 @@ class PlanBaseline(Subject, Protocol):
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
         """Take all trajectories of the run; called once, before the first plan."""
 
-    def actor(self, trajectory: Trajectory) -> PlanActor:
-        """Create the actor of a trajectory."""
+    def actor(self, trajectory: Trajectory, words: Words) -> PlanActor:
+        """Create the actor of a trajectory, whose plans are in these words."""

@@ -4,6 +4,7 @@ import random
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.plans.actors import Act, PlanActor, PlanBaseline, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
@@ -25,7 +26,7 @@ class _PlanBaseline(BaselineSubject):
     def fit(self, trajectories: Sequence[Trajectory]) -> None:
         """See `PlanBaseline`; there is nothing to learn."""
 
-    def actor(self, trajectory: Trajectory) -> PlanActor:
+    def actor(self, trajectory: Trajectory, words: Words) -> PlanActor:
         """See `PlanBaseline`."""
         return self._actor()
 
@@ -101,10 +102,11 @@ class HabitualAgent(_PlanBaseline):
         """See `PlanBaseline`."""
         self._trajectories = trajectories
 
-    def actor(self, trajectory: Trajectory) -> _HabitualActor:
+    def actor(self, trajectory: Trajectory, words: Words) -> _HabitualActor:
         """See `PlanBaseline`; it learns from other scenes than the trajectory's."""
         scene = trajectory.scene.floor_plan
-        return _HabitualActor(Habits(item for item in self._trajectories if item.scene.floor_plan != scene))
+        elsewhere = (item for item in self._trajectories if item.scene.floor_plan != scene)
+        return _HabitualActor(Habits(elsewhere, words))
 
 
 BASELINES: Mapping[str, Callable[[int], PlanBaseline]] = {

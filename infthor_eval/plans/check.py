@@ -11,10 +11,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.plans.environment import Ended, Observation, StepOutcome
 from infthor_eval.plans.expert import ExpertAction, ExpertRefusedError
 from infthor_eval.plans.plan import Plan
-from infthor_eval.thor.actions import object_type_of
 from model_adapters import ContractError
 
 __all__ = ["Environment", "check_env"]

@@ -8,23 +8,21 @@ from enum import StrEnum
 from typing import Any, NamedTuple
 
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.navigation import Grid
 from infthor_eval.household.scout import HORIZON_STEP, grid_pose_of, reachable_grid
+from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.expert import Expert, ExpertAction
 from infthor_eval.plans.memory import Past
 from infthor_eval.plans.plan import Plan, PlanKind, plans_of, tasks_of
-from infthor_eval.plans.rewards import (
-    PlanReward,
-    RewardRules,
-    StepReward,
-    count_actions_to_goal,
-    max_reward,
-    reward_rules,
-)
+from infthor_eval.plans.published_script import PublishedReward, PublishedScript
+from infthor_eval.plans.reward_rules import RewardRules, reward_rules
+from infthor_eval.plans.rewards import PlanReward, StepReward, count_actions_to_goal, max_reward
 from infthor_eval.plans.targets import PlanTarget, target_of
 from infthor_eval.thor.actions import UngroundedError, ground, parse_action, text_of_call
 from infthor_eval.thor.frames import FrameKeeper, NoFrames
+from infthor_eval.thor.published_actions import current_call
 from infthor_eval.thor.recorded import degrees_of
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, SimulatorView
@@ -43,7 +41,6 @@ class Ended(StrEnum):
     UNKNOWN_OBJECT = "unknown object"
     NOT_IN_VIEW = "not in view"
     NOT_POSSIBLE = "not possible"
-    WRONG = "wrong outcome"
     LIMIT = "step limit"
 
 
@@ -107,6 +104,7 @@ class PlanEnvironment:
         simulator: Simulator,
         *,
         rules: RewardRules | None = None,
+        words: Words = Words.PUBLISHED,
         max_steps: int = MAX_STEPS,
         frames: FrameKeeper | None = None,
         in_words: bool = False,
@@ -117,6 +115,7 @@ class PlanEnvironment:
             trajectory: trajectory whose expert defines the true states.
             simulator: simulator; it should keep a copy of its state for each plan (`max_copies`).
             rules: reward rules; None for the default ones.
+            words: the words of plans and actions.
             max_steps: number of steps after which a plan is truncated.
             frames: keeps the frames; None keeps none.
             in_words: whether the past is also described in words; the simulator must then send instance masks.
@@ -125,28 +124,35 @@ class PlanEnvironment:
             DataError: the trajectory has a task without a goal, or an unknown kind of plan.
             SimulatorError: the simulator has no such scene or fails.
         """
-        self.plans: Sequence[Plan] = plans_of(trajectory)
+        self.plans: Sequence[Plan] = plans_of(trajectory, words)
         self.tasks = tasks_of(trajectory)
         self._simulator = simulator
-        self._rules = rules or reward_rules("default")
+        self._rules, self._words = rules or reward_rules("default"), words
         self._max_steps = max_steps
         self._frames = frames or NoFrames()
         self.look_degrees = _look_degrees(trajectory)
-        self._expert = Expert(trajectory, self.plans, self.tasks, simulator, self._frames, in_words)
+        self._expert = Expert(trajectory, self.plans, self.tasks, simulator, self._frames, words, in_words)
+        self._script: PublishedScript | None = None
+        if self._rules.scoring == "published":
+            self._script = PublishedScript(self._rules, trajectory, self.plans, self.tasks, simulator)
+            self._expert.watched_by(self._script.pass_plan)
         self._plan: Plan | None = None
+        self._reward: PlanReward | PublishedReward
+        self._preferred: set[str] = set()
         self._n_steps = 0
 
     def reset(self, plan: int = 0) -> tuple[Observation, Mapping[str, Any]]:
         """Bring the world to the true state before a plan.
 
         Returns:
-            The observation, and information: `max_reward`, the highest possible reward from here, and `n_expert`, the
-            number of the expert's actions.
+            The observation, and information: `max_reward`, the highest possible reward from here (under the published
+            rules the planner's, as there is no highest), `n_expert`, the number of the expert's actions, and
+            `expert_reward`, what the published loop adds to the expert's total (None under other rules).
 
         Raises:
             IndexError: there is no such plan.
             ExpertRefusedError: this simulator refuses an action of the expert before the plan's end.
-            InfeasibleError: the scene lacks an object of the plan.
+            InfeasibleError: the scene lacks an object of the plan, or the published rewards fail in it.
             SimulatorError: the simulator fails.
         """
         if not 0 <= plan < len(self.plans):
@@ -157,16 +163,26 @@ class PlanEnvironment:
         expert_actions = self._expert.actions(plan)
         start, end = self._expert.start(plan), self._expert.start(plan + 1)
         view = self._simulator.rewind(start.mark, exactly=True)
-        task = self.tasks[present.task].task
-        grid = self._grid(present, expert_actions, view)
-        target = self._target(present, view, end.mark.view.agent, grid)
-        self._reward = PlanReward(self._rules, target, task, view, start.treatments, grid)
-        self._preferred = _preferred_objects(target, view)
         self._plan, self._n_steps = present, 0
-        n_actions = count_actions_to_goal(self._rules, target, [action.pose for action in expert_actions], grid)
-        completes = any(action.completes for action in expert_actions[:n_actions])
-        most = max_reward(self._rules, target, view, grid, task if completes else None)
-        return Observation(view, start.frame), {"max_reward": most, "n_expert": len(expert_actions)}
+        info: dict[str, Any] = {"n_expert": len(expert_actions), "expert_reward": None}
+        if self._script is not None:
+            scripted = self._script.plan(plan)
+            self._reward = PublishedReward(scripted.task.copy(), scripted.sub_goal)
+            info |= {"max_reward": scripted.planner_reward, "expert_reward": scripted.expert_reward}
+        else:
+            info["max_reward"] = self._begin_default(present, view, start.treatments, end.mark.view.agent)
+        return Observation(view, start.frame), info
+
+    def _begin_default(self, plan: Plan, view: SimulatorView, treatments: Treatments, end: AgentPose) -> float:
+        """Begin a plan under the default rules, and return its highest possible reward."""
+        task, actions = self.tasks[plan.task].task, self._expert.actions(plan.index)
+        grid = self._grid(plan, actions, view)
+        target = self._target(plan, view, end, grid)
+        self._preferred = _preferred_objects(target, view)
+        self._reward = PlanReward(self._rules, target, task, view, treatments, grid)
+        n_actions = count_actions_to_goal(self._rules, target, [action.pose for action in actions], grid)
+        completes = any(action.completes for action in actions[:n_actions])
+        return max_reward(self._rules, target, view, grid, task if completes else None)
 
     def step(self, action: str | Mapping[str, Any]) -> StepOutcome:
         """Execute one action of the present plan.
@@ -209,16 +225,20 @@ class PlanEnvironment:
         return [key for key in ids if key is not None]
 
     def _ground(self, action: str | Mapping[str, Any], view: SimulatorView) -> tuple[str, Mapping[str, Any]]:
+        force = {"forceAction": True} if self._rules.force_action else {}
         if not isinstance(action, str):
-            return str(text_of_call(action, view)), action
+            return str(text_of_call(action, view, self._words)), {**action, **force}
+        if self._rules.grounding == "published":
+            return action, {**current_call(action, view), **force}
         text = parse_action(action)
-        return str(text), ground(text, view, self.look_degrees, self._preferred)
+        call = ground(text, view, self.look_degrees, self._preferred, self._words)
+        return str(text), {**call, **force}
 
     def _execute(self, text: str, call: Mapping[str, Any], before: SimulatorView) -> StepOutcome:
         after = self._simulator.step(**call)
         self._n_steps += 1
         earned = self._reward.after(call, before, after)
-        ended = _ending(earned, after)
+        ended = _ending(earned)
         truncated = ended is None and self._n_steps >= self._max_steps
         if ended is not None or truncated:
             self._plan = None
@@ -243,12 +263,10 @@ class PlanEnvironment:
         return reachable_grid(self._simulator).with_positions((pose.position.x, pose.position.z) for pose in walked)
 
 
-def _ending(earned: StepReward, after: SimulatorView) -> Ended | None:
+def _ending(earned: StepReward) -> Ended | None:
     if earned.done:
         return Ended.DONE
-    if not earned.failed:
-        return None
-    return Ended.WRONG if after.success else Ended.REFUSED
+    return Ended.REFUSED if earned.failed else None
 
 
 def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:

@@ -1,19 +1,20 @@
 """The expert's actions of one trajectory, replayed as far as they are needed: the true history."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.goals import goal_holds
+from infthor_eval.household.sequence_text import action_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.memory import Past
 from infthor_eval.plans.plan import Plan, TrajectoryTask
 from infthor_eval.plans.segments import PlanSegment
-from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.frames import FrameKeeper
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
@@ -22,7 +23,7 @@ from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator, SimulatorMark
 from infthor_eval.thor.view import AgentPose, SimulatorView
 
-__all__ = ["Expert", "ExpertAction", "ExpertRefusedError", "PlanStart"]
+__all__ = ["Expert", "ExpertAction", "ExpertRefusedError", "PlanStart", "Replayed"]
 
 
 class ExpertRefusedError(InfeasibleError):
@@ -58,7 +59,9 @@ class PlanStart:
     treatments: Treatments
 
 
-class _Step(NamedTuple):
+class Replayed(NamedTuple):
+    """An action of the expert that was replayed, and the world after it."""
+
     action: ExpertAction
     view: SimulatorView
     frame: FrameRef | None
@@ -75,10 +78,15 @@ class Expert:
         tasks: Sequence[TrajectoryTask],
         simulator: Simulator,
         frames: FrameKeeper,
+        words: Words,
         in_words: bool = False,
     ) -> None:
-        """Restore the scene; raises SimulatorError if the simulator has no such scene or fails."""
-        self._trajectory, self._plans, self._tasks = trajectory, plans, tasks
+        """Restore the scene; raises SimulatorError if the simulator has no such scene or fails.
+
+        `words` are those of actions; with `in_words` the past is also described in words.
+        """
+        self._trajectory, self._plans, self._tasks, self._words = trajectory, plans, tasks, words
+        self._watch: Callable[[Plan, Sequence[Replayed]], None] = lambda _, __: None
         self._simulator, self._frames = simulator, frames
         restore(simulator, trajectory.scene)
         self.grounding = Grounding(simulator.view)
@@ -89,6 +97,10 @@ class Expert:
         self._log = Recorder() if in_words else None
         if self._log is not None:
             self._log.record(simulator.view)
+
+    def watched_by(self, watch: "Callable[[Plan, Sequence[Replayed]], None]") -> None:
+        """Have a function called with each plan when it has been replayed, and with its actions."""
+        self._watch = watch
 
     def start(self, plan: int) -> PlanStart:
         """Return the true state before a plan; the plans before it are replayed the first time.
@@ -121,7 +133,8 @@ class Expert:
         begins_task = plan == 0 or self._plans[plan - 1].task != present.task
         frame = self.start(plan).frame
         assert frame is not None
-        return PlanSegment(present.text, self._tasks[present.task].text if begins_task else None, frame)
+        goal = self._tasks[present.task].text if begins_task else None
+        return PlanSegment(present.text, goal, frame, in_task=present.in_task)
 
     def _state(self, n_actions: int) -> str:
         """Return the state after a number of actions, in words."""
@@ -140,13 +153,14 @@ class Expert:
         if start.frame is not None:
             segment = self._open_segment(plan.index)
             after = tuple((step.action.text, step.frame) for step in steps if step.frame is not None)
-            self._segments.append(PlanSegment(segment.plan, segment.goal, segment.before, after))
+            self._segments.append(replace(segment, steps=after))
         self._actions.append([step.action for step in steps])
+        self._watch(plan, steps)
         following = self._plans[plan.index + 1 : plan.index + 2]
         task_goes_on = any(item.task == plan.task for item in following)
         self._starts.append(PlanStart(mark, last.frame, last.treatments if task_goes_on else Treatments()))
 
-    def _steps(self, plan: Plan, start: PlanStart) -> Iterator[_Step]:
+    def _steps(self, plan: Plan, start: PlanStart) -> Iterator[Replayed]:
         view, treatments = self._simulator.rewind(start.mark, exactly=True), start.treatments
         task = self._tasks[plan.task].task
         task_open = not goal_holds(task, view, treatments)
@@ -158,7 +172,7 @@ class Expert:
             treatments = treatments.after(call["action"], call.get("objectId"), view)
             completes = task_open and goal_holds(task, view, treatments)
             action = ExpertAction(call, self._text(number), view.agent, completes)
-            yield _Step(action, view, self._frames.keep(view), treatments)
+            yield Replayed(action, view, self._frames.keep(view), treatments)
 
     def _call(self, plan: Plan, number: int, view: SimulatorView) -> dict[str, Any]:
         try:
@@ -168,7 +182,7 @@ class Expert:
 
     def _text(self, number: int) -> str:
         api = self._trajectory.plan.low_actions[number].api_action
-        return str(text_of(api.action, api.object_id, api.receptacle_id))
+        return action_text(api, self._words)
 
     def _refusal(self, plan: Plan, number: int, why: str) -> ExpertRefusedError:
         self._refused = ExpertRefusedError(

@@ -3,10 +3,11 @@
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.sequence_text import action_text
 from infthor_eval.plans.plan import Plan, plans_of
 from infthor_eval.plans.script import read_plan
-from infthor_eval.thor.actions import text_of
 
 __all__ = ["Habits", "expert_texts", "fill_action", "open_action"]
 
@@ -21,12 +22,12 @@ class Habits:
     of it is compared (`_situations`). Actions are learned with placeholders for the plan's own objects.
     """
 
-    def __init__(self, trajectories: Iterable[Trajectory]) -> None:
-        """Count what experts did."""
+    def __init__(self, trajectories: Iterable[Trajectory], words: Words) -> None:
+        """Count what experts did, in the words of the plans that it will be asked about."""
         self._seen: dict[_Key, Counter[str]] = defaultdict(Counter)
         for trajectory in trajectories:
-            for plan in plans_of(trajectory):
-                self._learn(plan.text, expert_texts(trajectory, plan))
+            for plan in plans_of(trajectory, words):
+                self._learn(plan.text, expert_texts(trajectory, plan, words))
 
     def next_action(self, plan: str, done: Sequence[str]) -> str:
         """Return the next action in a plan, after the actions done so far."""
@@ -42,10 +43,9 @@ class Habits:
                 self._seen[key][open_action(action, plan)] += 1
 
 
-def expert_texts(trajectory: Trajectory, plan: Plan) -> list[str]:
+def expert_texts(trajectory: Trajectory, plan: Plan, words: Words) -> list[str]:
     """Return the expert's actions of a plan, in words."""
-    calls = [trajectory.plan.low_actions[number].api_action for number in range(*plan.low)]
-    return [str(text_of(call.action, call.object_id, call.receptacle_id)) for call in calls]
+    return [action_text(trajectory.plan.low_actions[number].api_action, words) for number in range(*plan.low)]
 
 
 def _situations(plan: str, done: Sequence[str]) -> Iterator[_Key]:

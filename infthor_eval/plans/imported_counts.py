@@ -74,6 +74,7 @@ def _header(name: str, log: PlanLog, without: list[str], refused: tuple[UnreadRo
         "sources": {"logs": {log.path.name: log.digest}},
         "trajectories": {},
         "broken": skipped,
+        "words": None,
         "after_failure": None,
         "rewards": None,
     }

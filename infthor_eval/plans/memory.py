@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.household.sequence_text import goal_part, plan_part
+from infthor_eval.household.sequence_text import ACT, action_part, goal_part, plan_part
 from infthor_eval.plans.segments import Part, PlanSegment, goal_of_last, restart_at, segment_parts
 
 __all__ = ["FullHistory", "LastTokens", "Memory", "Past", "StateInWords", "TopFrames", "memory_named"]
@@ -71,6 +71,28 @@ class FullHistory:
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `Memory`."""
         return segment_parts(past.all)
+
+
+class PublishedHistory:
+    """The whole history as the published loop writes it.
+
+    Three things differ from `FullHistory`: the first action of each past plan stands behind two marks, as the plan's
+    own is there already; behind every goal is the first frame of the scene, which the loop keeps from its last set-up;
+    plans that belong to no task are left out.
+    """
+
+    needs_state: ClassVar[bool] = False
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `Memory`."""
+        parts: list[Part] = []
+        for segment in past.all:
+            if segment.goal is not None:
+                parts += goal_part(segment.goal), past.all[0].before
+            if segment.in_task:
+                parts += plan_part(segment.plan), *((ACT,) if segment.steps else ())
+                parts += (part for action, frame in segment.steps for part in (action_part(action), frame))
+        return parts
 
 
 class LastTokens:
@@ -156,7 +178,7 @@ def memory_named(text: str, retriever: str | None = None) -> Memory:
     """Return the memory of a value of `--history`; `retriever` is a CLIP model, None the published one.
 
     Args:
-        text: "full", "last:N" (N tokens), "text", or "frames:K" (K frames).
+        text: "full", "published", "last:N" (N tokens), "text", or "frames:K" (K frames).
 
     Raises:
         UsageError: there is no such memory, or a retriever is given that it does not use.
@@ -169,8 +191,10 @@ def memory_named(text: str, retriever: str | None = None) -> Memory:
         raise UsageError(f"--retriever: --history {text} retrieves no frames; leave it out, or use --history frames:K")
     if text == "full":
         return FullHistory()
+    if text == "published":
+        return PublishedHistory()
     if text == "text":
         return StateInWords()
     if kind == "last" and size:
         return LastTokens(size)
-    raise UsageError(f"--history {text}: there are full, last:TOKENS, text and frames:K")
+    raise UsageError(f"--history {text}: there are full, published, last:TOKENS, text and frames:K")

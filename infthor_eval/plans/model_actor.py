@@ -7,6 +7,7 @@ from infthor_eval.errors import ModelError
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.digests import seed_of
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.actors import Act, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
@@ -26,6 +27,7 @@ class AgentConfig:
 
     Attributes:
         memory: the part of the history that it is given.
+        words: words of actions.
         preamble: text before everything else; empty as published.
         constrained: whether its replies are restricted to the actions that are possible in view.
         blank: whether it is shown grey frames instead of the actual ones.
@@ -33,6 +35,7 @@ class AgentConfig:
 
     decoding: Decoding
     memory: Memory
+    words: Words
     preamble: str = ""
     constrained: bool = False
     blank: bool = False
@@ -61,7 +64,7 @@ class ModelActor:
         """See `PlanActor`."""
         decoding = replace(self._config.decoding, seed=seed_of(f"{self._seed}/{self._n_acts}"))
         if self._config.constrained:
-            possible = tuple(str(text) for text in applicable_actions(self._observation.view))
+            possible = tuple(str(text) for text in applicable_actions(self._observation.view, self._config.words))
             max_new_tokens = max(decoding.max_new_tokens, _MAX_ACTION_TOKENS)
             decoding = replace(decoding, choices=possible, max_new_tokens=max_new_tokens)
         self._n_acts += 1

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from infthor_eval.episodes.options import SimulatorOptions
+from infthor_eval.formats.object_ids import Words
 
 __all__ = ["PlansOptions"]
 
@@ -13,11 +14,25 @@ class PlansOptions(SimulatorOptions):
 
     rewards: str | None = field(
         default=None,
-        metadata={"choices": ("default", "published-compat"), "help": "Rules of rewards; the task's own if not given."},
+        metadata={"choices": ("default", "published"), "help": "Rules of rewards; the task's own if not given."},
+    )
+    words: str | None = field(
+        default=None,
+        metadata={
+            "choices": tuple(map(str, Words)),
+            "help": "Words of plans and actions: the published ones, or plain English; the task's own if not given.",
+        },
+    )
+    force_action: bool = field(
+        default=False,
+        metadata={"help": "Call the simulator with forceAction, as the published script does (--rewards published)."},
     )
     history: str | None = field(
         default=None,
-        metadata={"help": "What a model is given of the past: full, last:TOKENS, text, frames:K.", "metavar": "HOW"},
+        metadata={
+            "help": "What a model is given of the past: full, published, last:TOKENS, text, frames:K.",
+            "metavar": "HOW",
+        },
     )
     after_failure: str | None = field(
         default=None,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import HighAction, SubTask, TaskInfo, Trajectory
 from infthor_eval.household.sequence_text import goal_text, plan_text
 from infthor_eval.household.tasks import Task, task_of
@@ -29,12 +30,17 @@ class PlanKind(StrEnum):
 
 @dataclass(frozen=True)
 class TrajectoryTask:
-    """One task of a trajectory: its goal in words and as a condition, and its sub-goals [first_high, end_high)."""
+    """One task of a trajectory: its goal in words, as recorded and as a condition; its sub-goals [first, end)."""
 
     text: str
+    info: TaskInfo
     task: Task
     first_high: int
     end_high: int
+
+    def holds(self, high: int) -> bool:
+        """Return whether a sub-goal belongs to the task."""
+        return self.first_high <= high < self.end_high
 
 
 @dataclass(frozen=True)
@@ -43,8 +49,10 @@ class Plan:
 
     Attributes:
         index: place among the trajectory's plans.
+        high: place of its sub-goal in the trajectory.
         text: the plan in words ("pick up the mug").
         task: index of the task that it belongs to; the earlier one if it is between two tasks.
+        in_task: whether it belongs to a task, and not to the way from one to the next, as putting away what is held.
         low: indices of the expert's low-level actions, [first, end).
         object_id: recorded id of its object; None if the recording names none.
         receptacle_id: recorded id of its receptacle; None if the recording names none.
@@ -53,9 +61,11 @@ class Plan:
     """
 
     index: int
+    high: int
     kind: PlanKind
     text: str
     task: int
+    in_task: bool
     low: tuple[int, int]
     object_id: str | None = None
     receptacle_id: str | None = None
@@ -71,43 +81,48 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
     """
     n_high = len(trajectory.plan.high_pddl)
     if not trajectory.sub_trajs:
-        return [TrajectoryTask(goal_text(trajectory, None), _task(trajectory, 0, _single_task(trajectory)), 0, n_high)]
+        single = _single_task(trajectory)
+        task = _task(trajectory, 0, single)
+        return [TrajectoryTask(goal_text(trajectory, None), single.task_info, task, 0, n_high)]
     tasks = []
     for sub_task, span in zip(_sub_tasks(trajectory), trajectory.sub_trajs, strict=True):
         first, end = span.high_pddl_idx
         if not 0 <= first <= end <= n_high:
             raise _error(trajectory, f"task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}")
         task = _task(trajectory, span.sub_traj_idx, sub_task)
-        tasks.append(TrajectoryTask(goal_text(trajectory, sub_task), task, first, end))
+        tasks.append(TrajectoryTask(goal_text(trajectory, sub_task), sub_task.task_info, task, first, end))
     return tasks
 
 
-def plans_of(trajectory: Trajectory) -> list[Plan]:
+def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
     """Return the plans of a trajectory, in time order; sub-goals without an action (ALFRED's last one) are left out.
 
     Raises:
-        DataError: a task has no goal, a sub-goal is of an unknown kind, or actions belong to no sub-goal.
+        DataError: a task has no goal, a sub-goal is of an unknown kind or cannot be said in these words, or actions
+            belong to no sub-goal.
     """
     tasks = tasks_of(trajectory)
     spans = _spans(trajectory)
     final = len(tasks) - 1 if trajectory.long_horizon_task is not None else None
     plans: list[Plan] = []
-    for high in trajectory.plan.high_pddl:
+    for place, high in enumerate(trajectory.plan.high_pddl):
         low = spans.get(high.high_idx)
         if low is None:
             continue
-        task = max((number for number, item in enumerate(tasks) if item.first_high <= high.high_idx), default=0)
+        task = max((number for number, item in enumerate(tasks) if item.first_high <= place), default=0)
         plans.append(
             Plan(
                 index=len(plans),
+                high=place,
                 kind=_kind(trajectory, high),
-                text=plan_text(high),
+                text=_text(trajectory, high, words),
                 task=task,
+                in_task=tasks[task].holds(place),
                 low=low,
                 object_id=high.planner_action.object_id,
                 receptacle_id=high.planner_action.receptacle_id,
                 location=high.planner_action.location,
-                is_final=task == final,
+                is_final=task == final and tasks[task].holds(place),
             )
         )
     return plans
@@ -164,6 +179,13 @@ def _kind(trajectory: Trajectory, high: HighAction) -> PlanKind:
     except ValueError as error:
         problem = f"sub-goal {high.high_idx} is {kind!r:.60}; there are {', '.join(PlanKind)}"
         raise _error(trajectory, problem) from error
+
+
+def _text(trajectory: Trajectory, high: HighAction, words: Words) -> str:
+    try:
+        return plan_text(high, words)
+    except DataError as error:
+        raise _error(trajectory, str(error)) from error
 
 
 def _error(trajectory: Trajectory, problem: str) -> DataError:

@@ -7,6 +7,7 @@ from typing import Any
 from infthor_eval.episodes.recorded_runs import RecordedRun, RunConfig, TaskConfig
 from infthor_eval.episodes.shared_units import SharedUnits, difference_notes, shared_tasks, shared_units
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.records import RECORDS, PlanRecord
 
 __all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
@@ -15,10 +16,11 @@ __all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
 class PlanTaskConfig(TaskConfig, frozen=True, kw_only=True):
     """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules` decodes it.
 
-    Both are None for imported counts.
+    All of these are None for imported counts.
     """
 
     rewards: Any
+    words: Words | None
     after_failure: str | None
 
 

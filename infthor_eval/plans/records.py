@@ -39,6 +39,7 @@ class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, t
         first_step: index of the expert's first low-level action of it.
         n_expert_steps: number of the expert's actions.
         is_final: whether its task is the final long-horizon task.
+        expert_reward: what the published loop adds to the expert's total with this plan; None under other rules.
         goal_reached: whether the task's goal was reached in it.
     """
 
@@ -48,6 +49,7 @@ class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, t
     first_step: int
     n_expert_steps: int
     is_final: bool = False
+    expert_reward: float | None = None
     steps: tuple[StepRecord, ...] = ()
     goal_reached: bool = False
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -15,10 +16,11 @@ from infthor_eval.episodes.replaying import (
 )
 from infthor_eval.episodes.shared_units import only_name
 from infthor_eval.errors import DataError, UsageError, wrap_errors
+from infthor_eval.formats.object_ids import Words, object_type_of
 from infthor_eval.household.scout import reachable_grid
 from infthor_eval.plans.environment import MAX_STEPS, PlanEnvironment, StepOutcome
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.recorded_runs import PlansRun
+from infthor_eval.plans.recorded_runs import PlansRun, PlanTaskConfig
 from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.plans.replay_frames import (
     FloorPose,
@@ -30,10 +32,10 @@ from infthor_eval.plans.replay_frames import (
     Point,
     RoomMap,
 )
-from infthor_eval.plans.rewards import RewardRules
+from infthor_eval.plans.reward_rules import RewardRules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import UnitRecord
-from infthor_eval.thor.actions import object_type_of, text_of
+from infthor_eval.thor.actions import text_of
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import AgentPose, ThorObject
 
@@ -72,7 +74,9 @@ def recorded_plans(run: PlansRun, task: str | None, trajectory: str | None) -> R
 @contextmanager
 def replay_plans(recorded: RecordedPlans, data: Path | None, scenes: Path | None) -> Iterator["PlanReplay"]:
     """Open a session; see `restore_trajectory`."""
-    with restore_trajectory(recorded, read_plan_trajectory, data, scenes) as (trajectory, start_simulator):
+    words = _words(recorded.run.config.tasks[recorded.records[0].task])
+    read = partial(read_plan_trajectory, words=words)
+    with restore_trajectory(recorded, read, data, scenes) as (trajectory, start_simulator):
         yield PlanReplay(recorded, trajectory, start_simulator)
 
 
@@ -103,7 +107,8 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
             rules = msgspec.convert(config.rewards, RewardRules)
             max_steps = msgspec.convert(config.settings.get("max_steps", MAX_STEPS), int)
         simulator = self._start_simulator()
-        return PlanEnvironment(self._trajectory.data, simulator, rules=rules, max_steps=max_steps), simulator
+        data, words = self._trajectory.data, _words(config)
+        return PlanEnvironment(data, simulator, rules=rules, words=words, max_steps=max_steps), simulator
 
     def _place(self, record: Record, number: int) -> str:
         return f"plan {record.payload.index + 1}, action {number}"
@@ -195,6 +200,11 @@ class _PlanInReplay:
         x, z, half_x, half_z = box.center.x, box.center.z, box.size.x / 2, box.size.z / 2
         is_named = item.object_id in self._named
         return MapObject(item.object_type, (x - half_x, z - half_z), (x + half_x, z + half_z), is_named)
+
+
+def _words(config: PlanTaskConfig) -> Words:
+    assert config.words is not None  # only imported counts have none, and they are refused before
+    return config.words
 
 
 def _difference(step: StepRecord, outcome: StepOutcome, is_over: bool, is_last: bool) -> str:

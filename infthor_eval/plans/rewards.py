@@ -1,4 +1,4 @@
-"""Rewards of an agent for a plan, action by action (docs/plan-rewards.md).
+"""Rewards of an agent for a plan by the default rules, action by action (docs/plan-rewards.md).
 
 An action is rewarded by the plan's kind. A refused action ends the plan and earns nothing. An action that is not valid
 for the kind earns nothing and ends nothing. The reward of the whole task is added once, with the first valid action
@@ -8,62 +8,25 @@ after which the task's goal holds.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from infthor_eval.episodes.errors import InfeasibleError
-from infthor_eval.errors import unknown_name
-from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.household.containment import contents_of, is_in
-from infthor_eval.household.goals import APPLIANCE, goal_holds
+from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.navigation import Grid, GridPose
 from infthor_eval.household.scout import grid_pose_of
 from infthor_eval.household.tasks import Task
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.plan import PlanKind
+from infthor_eval.plans.reward_rules import RewardRules
 from infthor_eval.plans.targets import TREATMENTS, PlanTarget, in_hand, subject_of
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject
 
-__all__ = ["PlanReward", "RewardRules", "StepReward", "count_actions_to_goal", "max_reward", "reward_rules"]
+__all__ = ["PlanReward", "StepReward", "count_actions_to_goal", "max_reward"]
 
-_FILE = Path(__file__).with_name("rewards.yaml")
 _SMALL_LOOK = 0.01  # share of a look below which the camera's angle is right: simulators report rounded angles
 _COOLING_STAGES = 3  # cooled, opened again, picked up again
 _NOTHING = Treatments()
-
-
-class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A set of rules, as in `rewards.yaml`.
-
-    Attributes:
-        task_done: reward, once, when the goal of the plan's task is reached.
-        per_step: reward of GotoLocation per step of the shortest path gained.
-        nearer_than: number of remaining steps below which GotoLocation is done.
-        look_degrees: angle of one LookUp or LookDown.
-        rewards: reward per success, by kind.
-        valid_actions: actions that are valid for a kind, by AI2-THOR's names.
-        steps_count_once: whether a step that was gained, lost and gained again is rewarded once. The published rule
-            rewards it each time, so that walking to and fro earns without end.
-        treatments_unnoticed: published fault: nothing ever counts as washed, heated or cooled.
-        puts_fail: published fault: every PutObject counts as refused.
-    """
-
-    task_done: float
-    per_step: float
-    nearer_than: int
-    look_degrees: float
-    rewards: dict[PlanKind, float]
-    valid_actions: dict[PlanKind, frozenset[str]]
-    steps_count_once: bool
-    treatments_unnoticed: bool
-    puts_fail: bool
-
-    def document(self) -> dict[str, Any]:
-        """Return the rules as JSON values, for run configs."""
-        document: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self, order="sorted"))
-        return document
 
 
 @dataclass(frozen=True)
@@ -75,19 +38,11 @@ class StepReward:
     failed: bool = False
 
 
-def reward_rules(name: str) -> RewardRules:
-    """Return the rules "default", or "published-compat" with the published faults; UsageError for other names."""
-    by_name = read_yaml(_FILE, "install the package again")
-    if name not in by_name:
-        raise unknown_name("reward rules", name, by_name)
-    return msgspec.convert(by_name[name], RewardRules)
-
-
 class PlanReward:
     """The rewards of one plan, from its start on.
 
     Attributes:
-        treatments: what was washed, heated and cooled in the task so far; nothing if the rules do not notice it.
+        treatments: what was washed, heated and cooled in the task so far.
         goal_reached: whether the task's goal has been reached in this plan.
     """
 
@@ -113,7 +68,7 @@ class PlanReward:
         """
         _require_feasible(target, start)
         self._rules, self._target, self._task, self._start = rules, target, task, start
-        self.treatments = Treatments() if rules.treatments_unnoticed else treatments
+        self.treatments = treatments
         # The plan's own treatments are apart: an object that was washed before is to be washed again by this plan.
         self._in_plan = Treatments()
         self._subject = subject_of(target, start)
@@ -130,10 +85,9 @@ class PlanReward:
         action, object_id = call["action"], call.get("objectId")
         rules, kind = self._rules, self._target.kind
         # Before validity is looked at: an action that is not valid can treat an object nevertheless.
-        if not rules.treatments_unnoticed:
-            self.treatments = self.treatments.after(action, object_id, after)
-            self._in_plan = self._in_plan.after(action, object_id, after)
-        if not after.success or (rules.puts_fail and action == "PutObject"):
+        self.treatments = self.treatments.after(action, object_id, after)
+        self._in_plan = self._in_plan.after(action, object_id, after)
+        if not after.success:
             step = StepReward(failed=True)
         elif action not in rules.valid_actions[kind]:
             step = StepReward()
@@ -150,28 +104,28 @@ class PlanReward:
         self._task_open, self.goal_reached = False, True
         return StepReward(step.reward + self._rules.task_done, step.done, step.failed)
 
-    # -- the kinds; what each rewards follows the published functions, the rules' departures are in `rewards.yaml`
+    # -- the kinds; where they depart from the published functions is said in docs/plan-rewards.md
 
     def _goto(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         assert self._paths is not None  # as checked when the plan began
         left = self._paths.remaining(after.agent)
-        reference = self._closest if self._rules.steps_count_once else self._paths.remaining(before.agent)
+        # A step that was gained, lost and gained again is rewarded once. From where there is no path nothing is gained:
+        # infinity less a finite distance would be.
+        gained = max(0.0, self._closest - left) if math.isfinite(self._closest) else 0.0
         self._closest = min(self._closest, left)
-        # From where there is no path nothing is gained: infinity less a finite distance would be.
-        gained = max(0.0, reference - left) if math.isfinite(reference) else 0.0
         arrived = left < self._rules.nearer_than
         return StepReward(gained * self._rules.per_step + arrived * self._per_success, done=arrived)
 
     def _pickup(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         if action != "PickupObject":
             return StepReward()
-        return self._success() if in_hand(self._object_id, after) else StepReward(failed=True)
+        return self._success() if in_hand(self._object_id, after) else StepReward()
 
     def _put_down(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         receptacle = self._target.receptacle_id or ""
         is_there = is_in(self._object_id, receptacle, after)
         if action == "PutObject" and not is_there:
-            return StepReward(failed=True)
+            return StepReward()
         # A receptacle that was closed is to be opened and closed around the put, each with a reward of its own.
         was_closed = _is_closed(self._start.objects[receptacle])
         if action == "PutObject":
@@ -243,29 +197,21 @@ def max_reward(
 ) -> float:
     """Return the highest possible reward of a plan from its start.
 
-    Under rules where steps do not count once, GotoLocation's reward is unbounded, as walking to and fro earns without
-    end. Then too the reward of the shortest path is returned.
-
     Args:
         grid: reachable cells; GotoLocation needs it.
         completes: the task if its goal can be reached in the plan; None if it cannot, or holds already.
     """
     kind, per_success = target.kind, rules.rewards[target.kind]
-    puts, most = kind == PlanKind.PUT, per_success
+    most = per_success
     if kind == PlanKind.GOTO:
         most = _max_path_reward(rules, target, start, grid)
     elif kind in TREATMENTS:
         stages = _COOLING_STAGES if kind == PlanKind.COOL else 1
-        # An object is put into the appliance, which ends the plan if every put fails.
-        most = 0.0 if rules.treatments_unnoticed or rules.puts_fail else per_success * stages
-    elif puts:
-        # Opening counts before the put fails; the put itself and closing do not any more.
+        most = per_success * stages
+    elif kind == PlanKind.PUT:
         closed = _is_closed(start.objects[target.receptacle_id or ""])
-        most = per_success * (closed + (0 if rules.puts_fail else 1 + closed))
-    if completes is None or (rules.puts_fail and puts):
-        return most
-    unnoticed = rules.treatments_unnoticed and completes.task_type in APPLIANCE
-    return most if unnoticed else most + rules.task_done
+        most = per_success * (3 if closed else 1)
+    return most + rules.task_done * (completes is not None)
 
 
 def count_actions_to_goal(

@@ -59,6 +59,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
                 trajectory.data,
                 simulator,
                 rules=task.rules,
+                words=task.words,
                 max_steps=task.settings.max_steps,
                 frames=frames,
                 in_words=factory.sees and task.memory.needs_state,
@@ -81,7 +82,12 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         environment = self.environment
         observation, info = environment.reset(plan.index)
         record = plan_record(self._trajectory, plan)
-        self.begun = msgspec.structs.replace(record, max_reward=round(info["max_reward"], _DIGITS))
+        of_expert = info["expert_reward"]
+        self.begun = msgspec.structs.replace(
+            record,
+            max_reward=round(info["max_reward"], _DIGITS),
+            expert_reward=None if of_expert is None else round(of_expert, _DIGITS),
+        )
         self._actor.begin(PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation))
         acts: list[tuple[Act, StepOutcome]] = []
         while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):

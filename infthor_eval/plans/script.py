@@ -16,13 +16,17 @@ _PLAN = re.compile(rf"({'|'.join(_VERBS)}) (?:the )?(\S+)(?: in the (\S+))?")
 
 
 def read_plan(plan: str) -> tuple[str, tuple[str, ...]]:
-    """Return the verb of a plan and the object types that it names; a word that is no known type stays as it is.
+    """Return the verb of a plan and the objects that it names.
+
+    Natural words in lower case become object types; the published names are in capitals and stay as they are, as any
+    other word does.
 
     Args:
-        plan: text of the plan ("put the mug in the fridge").
+        plan: text of the plan ("put the mug in the sink", or "put the Mug in the Sink").
 
     Returns:
-        ("put", ("Mug", "Fridge")); the whole text and no types if it is not of the usual form.
+        ("put", ("Mug", "SinkBasin")), or ("put", ("Mug", "Sink")); the whole text and no objects if it is not of the
+        usual form.
     """
     match = _PLAN.fullmatch(plan)
     if match is None:
@@ -32,12 +36,12 @@ def read_plan(plan: str) -> tuple[str, tuple[str, ...]]:
 
 
 def replace_objects(plan: str, types: Sequence[str]) -> str:
-    """Return a plan of the usual form with other object types, in the order in which it names them."""
+    """Return a plan of the usual form with other objects, in the order in which it names them."""
     match = _PLAN.fullmatch(plan)
     assert match is not None
     for group, name in reversed([*enumerate(types, start=2)]):  # from the end, so that earlier spans stay valid
         start, end = match.span(group)
-        plan = plan[:start] + compact_name(name) + plan[end:]
+        plan = plan[:start] + (compact_name(name) if match.group(group).islower() else name) + plan[end:]
     return plan
 
 

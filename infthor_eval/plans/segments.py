@@ -20,12 +20,14 @@ class PlanSegment:
         goal: goal of the task that begins with it; None if the task before goes on.
         before: frame that it begins with.
         steps: actions, each with the frame after it; empty if the plan is still to be done.
+        in_task: whether the plan belongs to a task.
     """
 
     plan: str
     goal: str | None
     before: FrameRef
     steps: tuple[tuple[str, FrameRef], ...] = ()
+    in_task: bool = True
 
     def opening(self) -> Iterator[Part]:
         """Yield the parts before its first action."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.navigation import GridPose
 from infthor_eval.plans.plan import Plan, PlanKind
 from infthor_eval.thor.grounding import Grounding
@@ -54,13 +55,8 @@ def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
 
 
 def in_hand(wanted: str, view: SimulatorView) -> bool:
-    """Return whether an object is held, or another slice of it: an agent's words cannot tell slices apart."""
-    return any(held == wanted or _are_slices_of_one(held, wanted) for held in view.inventory)
-
-
-def _are_slices_of_one(one: str, other: str) -> bool:
-    parts = [key.rpartition("|") for key in (one, other)]
-    return parts[0][0] == parts[1][0] and all("Sliced" in part for _, _, part in parts)
+    """Return whether an object of this name is held, whole or sliced: an agent's words cannot tell which one it is."""
+    return any(Words.PUBLISHED.name_of(held) == Words.PUBLISHED.name_of(wanted) for held in view.inventory)
 
 
 def _here(recorded: str | None, grounding: Grounding, view: SimulatorView) -> str | None:

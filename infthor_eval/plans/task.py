@@ -2,17 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from infthor_eval.episodes.task_settings import task_settings
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.environment import MAX_STEPS
 from infthor_eval.plans.memory import memory_named
 from infthor_eval.plans.model_actor import AgentConfig
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
-from infthor_eval.plans.rewards import reward_rules
+from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
@@ -20,7 +22,7 @@ from infthor_eval.runs.limiting import limit_items
 
 __all__ = ["PlanTaskSettings", "PlansTask"]
 
-_CHOICES = {"plans": ("all", "final"), "after_failure": ("continue", "stop")}
+_CHOICES = {"plans": ("all", "final"), "after_failure": ("continue", "stop"), "words": tuple(map(str, Words))}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +33,7 @@ class PlanTaskSettings:
         plans: "all" plans, or those of the "final" long-horizon task.
         bundled: name of a set of trajectories in the package.
         rewards: name of the reward rules.
+        words: the words of plans and actions, see `Words`.
         history: how much of the history a model is given.
         after_failure: whether to "continue" from the true state after a failed plan, or to "stop".
         max_steps: maximum number of steps of one plan.
@@ -40,6 +43,7 @@ class PlanTaskSettings:
     plans: str = "all"
     bundled: str | None = None
     rewards: str = "default"
+    words: str = Words.PUBLISHED
     history: str = "full"
     after_failure: str = "continue"
     max_steps: int = MAX_STEPS
@@ -50,6 +54,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
     """A task file that was read, with its trajectories.
 
     Attributes:
+        rules: the rules of rewards.
+        words: the words of plans and actions.
         memory: the part of the history that a model is given.
         evaluated_trajectories: trajectories that are evaluated.
     """
@@ -63,15 +69,17 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         """
         file.require("dataset_kwargs", "generation_kwargs")
         self._options = request.options
-        given = {name: getattr(self._options, name) for name in ("rewards", "history", "after_failure")}
+        given = {name: getattr(self._options, name) for name in ("rewards", "words", "history", "after_failure")}
         settings = task_settings(file, PlanTaskSettings, given, _CHOICES)
-        self.rules = reward_rules(settings.rewards)
+        rules = reward_rules(settings.rewards)
+        self.rules = rules.forcing() if self._options.force_action else rules
+        self.words = Words(settings.words)
         kwargs = file.settings["generation_kwargs"]
         if self._options.greedy and isinstance(kwargs, Mapping):
             kwargs = {**kwargs, "do_sample": False, "temperature": 0.0}
         self.decoding = decoding_of(kwargs, request.seed, file.name)
         self.memory = memory_named(settings.history, self._options.retriever)
-        super().__init__(file, request, settings, read_plan_trajectory)
+        super().__init__(file, request, settings, partial(read_plan_trajectory, words=self.words))
         having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
         self.evaluated_trajectories = limit_items(having_plans, lambda item: item.traj_id, request.seed, request.limit)
         if not self.evaluated_trajectories:
@@ -79,13 +87,15 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
 
     def plans(self, trajectory: PlanTrajectory) -> list[Plan]:
         """Return the plans of a trajectory that are evaluated."""
-        return [plan for plan in trajectory.plans if plan.is_final or self.settings.plans == "all"]
+        wanted = [plan for plan in trajectory.plans if plan.is_final or self.settings.plans == "all"]
+        return [plan for plan in wanted if plan.in_task]
 
     def agent_config(self) -> AgentConfig:
         """Return how a model is prompted."""
         return AgentConfig(
             decoding=self.decoding,
             memory=self.memory,
+            words=self.words,
             preamble=self.settings.preamble,
             constrained=self._options.constrained,
             blank=self._options.frames == "blank",
@@ -95,6 +105,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         """See `EpisodeTask`."""
         return self._config(
             self.evaluated_trajectories,
+            words=self.settings.words,
             history=self.settings.history,
             after_failure=self.settings.after_failure,
             rewards=self.rules.document(),

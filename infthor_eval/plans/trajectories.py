@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import digest
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import TrajectorySource
 from infthor_eval.plans.plan import Plan, TrajectoryTask, plans_of, tasks_of
 
@@ -20,10 +21,10 @@ class PlanTrajectory(TaskTrajectory):
     tasks: Sequence[TrajectoryTask]
 
 
-def read_plan_trajectory(source: TrajectorySource) -> PlanTrajectory:
-    """Read a trajectory and its plans; raises DataError if it cannot be used."""
+def read_plan_trajectory(source: TrajectorySource, words: Words) -> PlanTrajectory:
+    """Read a trajectory and its plans in words of these; raises DataError if it cannot be used."""
     trajectory = source.read()
-    plans = plans_of(trajectory)
+    plans = plans_of(trajectory, words)
     if not plans:
         raise DataError(f"{source.place}: no plan with an action; leave it out")
     return PlanTrajectory(trajectory, digest(source.raw.strip()), plans, tasks_of(trajectory))

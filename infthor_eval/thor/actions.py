@@ -1,14 +1,16 @@
 """Conversion between action texts and calls of AI2-THOR's 5.x API.
 
-Models read and write texts: `MoveAhead`, `PickupObject Mug`, `PutObject Mug Fridge`. Their arguments are object types,
-whereas calls have object ids. A text is grounded to the nearest visible object of the type to which the action applies.
+Models read and write texts: `MoveAhead`, `PickupObject Mug`, `PutObject Mug Fridge`. Their arguments are names of
+objects (`Words`), whereas calls have object ids. A text is grounded to the nearest visible object of the name to which
+the action applies; how the published scripts ground it is in `published_actions`.
 """
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = [
@@ -18,7 +20,6 @@ __all__ = [
     "applicable_actions",
     "applicable_calls",
     "ground",
-    "object_type_of",
     "parse_action",
     "text_of",
     "text_of_call",
@@ -56,53 +57,60 @@ class UngroundedError(ValueError):
 
 @dataclass(frozen=True)
 class ActionText:
-    """A low-level action in words: its name and its object types."""
+    """A low-level action in words: its name and its objects' names."""
 
     action: str
-    types: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        return " ".join((self.action, *self.types))
+        return " ".join((self.action, *self.names))
 
 
 def parse_action(text: str) -> ActionText:
     """Parse an action text; names are case-sensitive, and any white space separates them.
 
     Raises:
-        UngroundedError: the action is unknown, or has a wrong number of object types.
+        UngroundedError: the action is unknown, or has a wrong number of objects.
     """
     words = text.split()
     if not words:
         raise UngroundedError(Misuse.NO_ACTION, "empty action")
-    action, *types = words
+    action, *names = words
     if action not in _APPLIES and action not in _PLAIN:
         raise UngroundedError(Misuse.NO_ACTION, f"unknown action '{action}'")
-    n_types = 0 if action in _PLAIN else 2 if action == "PutObject" else 1
-    if len(types) != n_types:
-        raise UngroundedError(Misuse.NO_ACTION, f"{action} takes {n_types} object types, got {len(types)}")
-    return ActionText(action, tuple(types))
+    n_names = 0 if action in _PLAIN else 2 if action == "PutObject" else 1
+    if len(names) != n_names:
+        raise UngroundedError(Misuse.NO_ACTION, f"{action} takes {n_names} object types, got {len(names)}")
+    return ActionText(action, tuple(names))
 
 
-def text_of(action: str, object_id: str | None = None, receptacle_id: str | None = None) -> ActionText:
+def text_of(
+    action: str, object_id: str | None = None, receptacle_id: str | None = None, words: Words = Words.NATURAL
+) -> ActionText:
     """Return the text of a call; the object of PutObject is the one that is put into the receptacle."""
     ids = [item for item in (object_id, receptacle_id) if item is not None]
-    return ActionText(action, tuple(object_type_of(item) for item in ids))
+    return ActionText(action, tuple(words.name_of(item) for item in ids))
 
 
 def ground(
-    text: ActionText, view: SimulatorView, degrees: float = _LOOK_DEGREES, preferred: Container[str] = ()
+    text: ActionText,
+    view: SimulatorView,
+    degrees: float = _LOOK_DEGREES,
+    preferred: Container[str] = (),
+    words: Words = Words.NATURAL,
 ) -> dict[str, Any]:
     """Turn an action text into a call.
 
     Args:
         degrees: angle by which LookUp and LookDown turn the camera.
-        preferred: ids of objects that take precedence over nearer ones of their type.
+        preferred: ids of objects that take precedence over nearer ones of their name.
+        words: words that the text may use; object types are understood in any case.
 
     Returns:
         `{"action": ..., arguments}` for `Simulator.step(**call)`.
 
     Raises:
-        UngroundedError: there is no visible object of the type to which the action applies.
+        UngroundedError: there is no visible object of the name to which the action applies.
     """
     if text.action == "NoOp":
         return {"action": "Pass"}
@@ -110,18 +118,20 @@ def ground(
         return {"action": text.action, "degrees": degrees}
     if text.action in _PLAIN:
         return {"action": text.action}
-    known = {item.object_type for item in view.objects.values()}
-    for name in text.types:
+    named = {key: _names_of(item, words) for key, item in view.objects.items()}
+    known = set[str]().union(*named.values())
+    for name in text.names:
         if name not in known:
             raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
-    if text.action == "PutObject" and text.types[0] not in map(object_type_of, view.inventory):
-        raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: no {text.types[0]} in the hand")
-    return {"action": text.action, "objectId": _choose_object(text, view, preferred).object_id}
+    if text.action == "PutObject" and not any(text.names[0] in named.get(key, ()) for key in view.inventory):
+        raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: no {text.names[0]} in the hand")
+    meant = [item for key, item in view.objects.items() if text.names[-1] in named[key]]
+    return {"action": text.action, "objectId": _choose_object(text, meant, preferred).object_id}
 
 
-def applicable_actions(view: SimulatorView) -> list[ActionText]:
+def applicable_actions(view: SimulatorView, words: Words = Words.NATURAL) -> list[ActionText]:
     """Return all action texts that can be grounded now, in a fixed order."""
-    return list(dict.fromkeys(text_of_call(call, view) for call in applicable_calls(view)))
+    return list(dict.fromkeys(text_of_call(call, view, words) for call in applicable_calls(view)))
 
 
 def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
@@ -136,32 +146,28 @@ def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> lis
     return calls
 
 
-def text_of_call(call: Mapping[str, Any], view: SimulatorView) -> ActionText:
+def text_of_call(call: Mapping[str, Any], view: SimulatorView, words: Words = Words.NATURAL) -> ActionText:
     """Return the text of a call in a state; the object of PutObject is the held one."""
     if call["action"] == "Pass":
         return ActionText("NoOp")
     key = call.get("objectId")
     if call["action"] == "PutObject" and view.inventory:
-        return text_of("PutObject", view.inventory[0], key)
-    return text_of(call["action"], key)
+        return text_of("PutObject", view.inventory[0], key, words)
+    return text_of(call["action"], key, words=words)
 
 
-def object_type_of(object_id: str) -> str:
-    """Return the object type in an object id.
-
-    Ids are "Type|x|y|z". Parts have the type of the part at the end ("Sink|...|SinkBasin"), slices also a number after
-    an underscore ("Apple|...|AppleSliced_2").
-    """
-    parts = object_id.split("|")
-    return parts[4].split("_")[0] if len(parts) > 4 else parts[0]
+def _names_of(item: ThorObject, words: Words) -> set[str]:
+    """Return the names by which an agent may call an object: its name in these words, and its type."""
+    return {words.name_of(item.object_id), item.object_type}
 
 
-def _choose_object(text: ActionText, view: SimulatorView, preferred: Container[str]) -> ThorObject:
-    object_type, applies = text.types[-1], _APPLIES[text.action]
-    visible = [item for item in view.objects.values() if item.object_type == object_type and item.visible]
+def _choose_object(text: ActionText, meant: Sequence[ThorObject], preferred: Container[str]) -> ThorObject:
+    """Return the object of a text among those that its last name can mean."""
+    name, applies = text.names[-1], _APPLIES[text.action]
+    visible = [item for item in meant if item.visible]
     possible = [item for item in visible if applies(item)]
     if not visible:
-        raise UngroundedError(Misuse.NOT_IN_VIEW, f"{text}: {object_type}: none in sight")
+        raise UngroundedError(Misuse.NOT_IN_VIEW, f"{text}: {name}: none in sight")
     if not possible:
-        raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: {object_type}: none of those in sight allows it")
+        raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: {name}: none of those in sight allows it")
     return min(possible, key=lambda item: (item.object_id not in preferred, item.distance, item.object_id))

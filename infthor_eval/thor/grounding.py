@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import astuple
 
-from infthor_eval.thor.actions import object_type_of
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["Grounding", "id_position"]

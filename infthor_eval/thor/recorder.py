@@ -5,8 +5,8 @@ from pathlib import Path
 from PIL import Image
 
 from infthor_eval.errors import SimulatorError
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.step_log import LoggedPose, ObjectInFrame, ObjectLog, ObjectState, Step
-from infthor_eval.thor.actions import object_type_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["Recorder", "object_log", "state_of"]

@@ -8,8 +8,10 @@ from collections.abc import Iterator, Sequence
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.plans.habits import expert_texts
 from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.plans.segments import PlanSegment, restart_at, segment_parts
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
@@ -18,25 +20,29 @@ from model_adapters.hf.prompt import n_tokens
 __all__ = ["recorded_segments", "single_plans", "windows"]
 
 
-def recorded_segments(trajectory: Trajectory, steps: Sequence[Step], frames: Sequence[FrameRef]) -> list[PlanSegment]:
+def recorded_segments(
+    trajectory: Trajectory, steps: Sequence[Step], frames: Sequence[FrameRef], words: Words
+) -> list[PlanSegment]:
     """Return a trajectory's true history from its replay, one entry per plan.
 
     Args:
         trajectory: trajectory with goals and plans.
         steps: steps of the replayed log in time order; of several frames of one action the last is used.
         frames: frame of each step.
+        words: words of plans and actions.
 
     Raises:
-        DataError: a task has no goal, a plan is of an unknown kind, or an action has no frame.
+        DataError: a task has no goal, a plan is of an unknown kind or cannot be said in these words, or an action has
+            no frame.
     """
-    plans, tasks = plans_of(trajectory), tasks_of(trajectory)
+    plans, tasks = plans_of(trajectory, words), tasks_of(trajectory)
     before: FrameRef | None = None
-    after: dict[int, tuple[str, FrameRef]] = {}
+    after: dict[int, FrameRef] = {}
     for step, frame in zip(steps, frames, strict=True):
         if step.action is None:
             before = before or frame
         else:
-            after[step.step] = (step.action, frame)
+            after[step.step] = frame
     if before is None:
         raise DataError(f"trajectory {trajectory.traj_id}: no frame before the first action; replay it again")
     segments: list[PlanSegment] = []
@@ -46,7 +52,8 @@ def recorded_segments(trajectory: Trajectory, steps: Sequence[Step], frames: Seq
             raise DataError(f"trajectory {trajectory.traj_id}: no frame of action {missing}; replay it again")
         begins = not segments or plans[plan.index - 1].task != plan.task
         goal = tasks[plan.task].text if begins else None
-        segments.append(PlanSegment(plan.text, goal, before, tuple(after[number] for number in range(*plan.low))))
+        texts, shown = expert_texts(trajectory, plan, words), [after[number] for number in range(*plan.low)]
+        segments.append(PlanSegment(plan.text, goal, before, tuple(zip(texts, shown, strict=True)), plan.in_task))
         before = segments[-1].steps[-1][1]
     return segments
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.nieh.samples import find_samples
@@ -72,7 +73,7 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
 def _read_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[TrainingSequence | SkippedItem]:
     if recipe.actions is not None:
         yield from _sample_share(
-            action_sequences(NiehSet(folder, needs_questions=False), encoder, recipe.max_tokens),
+            action_sequences(NiehSet(folder, needs_questions=False), encoder, recipe.max_tokens, recipe.words),
             recipe.actions.share,
             recipe.seed,
         )
@@ -84,14 +85,16 @@ def _read_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[Traini
             yield from _sample_share(items, recipe.questions.share, recipe.seed)
 
 
-def action_sequences(data: NiehSet, encoder: Encoder, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
+def action_sequences(
+    data: NiehSet, encoder: Encoder, limit: int, words: Words
+) -> Iterator[TrainingSequence | SkippedItem]:
     """Yield the windows of every trajectory of a set, and the items that could not become a sequence.
 
     The set has to contain the trajectories; `limit` is the most tokens of a sequence, frames expanded.
     """
     for name in trajectory_names(data):
         try:
-            yield from windows(encoder, name, read_history(data, name)[1], limit)
+            yield from windows(encoder, name, read_history(data, name, words)[1], limit)
         except DataError as error:
             yield SkippedItem(name, str(error))
 
@@ -101,8 +104,8 @@ def trajectory_names(data: NiehSet) -> list[str]:
     return sorted(path.name for path in (data.root / "metadata").iterdir() if path.is_dir())
 
 
-def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[PlanSegment]]:
-    """Return a trajectory of a set and its true history.
+def read_history(data: NiehSet, name: str, words: Words) -> tuple[Trajectory, list[PlanSegment]]:
+    """Return a trajectory of a set and its true history in these words.
 
     Raises:
         DataError: the trajectory is not in the set, or does not match its replay.
@@ -112,7 +115,7 @@ def read_history(data: NiehSet, name: str) -> tuple[Trajectory, list[PlanSegment
         raise DataError("its trajectory is not in the set")
     trajectory = next(iter(iter_trajectories(path)))
     steps = sorted(read_steps(data.folder(name)), key=lambda step: step.img_idx)
-    return trajectory, recorded_segments(trajectory, steps, data.frames(name))
+    return trajectory, recorded_segments(trajectory, steps, data.frames(name), words)
 
 
 def _sample_share(

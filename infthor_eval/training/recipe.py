@@ -7,6 +7,7 @@ from typing import Any, Literal
 import msgspec
 
 from infthor_eval.errors import UsageError, unknown_name, wrap_errors
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.training.nano.settings import NanoRecipe
@@ -98,6 +99,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             actions are always plain.
         max_tokens: most tokens of a sequence.
         actions: sequences of trajectories, or None.
+        words: words of their plans and actions.
         questions: sequences of questions, or None.
         freeze: parts that are not trained: vision, embeddings, decoder, head.
         optimizer: settings of the optimizer.
@@ -118,6 +120,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     prompt: Literal["plain", "chat"] = "plain"
     max_tokens: int
     actions: ActionData | None = None
+    words: Words = Words.PUBLISHED
     questions: QuestionData | None = None
     freeze: tuple[Literal["vision", "embeddings", "decoder", "head"], ...] = ("vision", "embeddings")
     optimizer: Optimizer = Optimizer()

@@ -1,12 +1,12 @@
 import pytest
 
+from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.thor.actions import (
     ActionText,
     UngroundedError,
     applicable_actions,
     applicable_calls,
     ground,
-    object_type_of,
     parse_action,
     text_of,
     text_of_call,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.question import Question
 from infthor_eval.household.sequence_text import MARKS
 from infthor_eval.household.wording import noun, with_article
@@ -59,6 +60,7 @@ class SequenceSampler:
         folders: folders of replayed sets with questions.
         dataset: all frames of the sets.
         window_tokens: most tokens of a history.
+        words: words of plans and actions.
         seed: seed of the samples.
 
     Attributes:
@@ -69,11 +71,18 @@ class SequenceSampler:
     """
 
     def __init__(
-        self, encoder: Encoder, folders: Sequence[Path], dataset: FrameDataset, *, window_tokens: int, seed: int
+        self,
+        encoder: Encoder,
+        folders: Sequence[Path],
+        dataset: FrameDataset,
+        *,
+        window_tokens: int,
+        words: Words,
+        seed: int,
     ) -> None:
         self._encoder = encoder
         self._dataset = dataset
-        self._limit = window_tokens
+        self._limit, self._words = window_tokens, words
         self._rng = random.Random(seed)
         self._questions: list[TrainingSequence] = []
         self._windows: list[TrainingSequence] = []
@@ -97,7 +106,7 @@ class SequenceSampler:
         """Read the histories of a set, skipping those that cannot be read."""
         for name in trajectory_names(data):
             try:
-                _, segments = read_history(data, name)
+                _, segments = read_history(data, name, self._words)
                 history_windows = [*windows(self._encoder, name, segments, self._limit)]
                 plans = [*single_plans(self._encoder, name, segments)]
             except DataError as error:

@@ -2,6 +2,8 @@
 
 import msgspec
 
+from infthor_eval.formats.object_ids import Words
+
 __all__ = ["NanoRecipe", "SceneSettings"]
 
 _COUNTS = (
@@ -65,6 +67,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         lr: highest learning rate.
         weight_decay: weight decay of AdamW.
         vision_weight: weight of the first stage's loss in the other stages.
+        words: words of plans and actions.
         threads: torch threads; another number rounds differently.
         seed: seed of everything that is random.
     """
@@ -90,6 +93,7 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     lr: float = 1.5e-3
     weight_decay: float = 0.05
     vision_weight: float = 0.1
+    words: Words = Words.PUBLISHED
     threads: int = 2
     seed: int = 0
 

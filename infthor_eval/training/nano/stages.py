@@ -71,7 +71,9 @@ def train_small_model(
     dataset = read_frame_dataset(folders, image_processor())
     loaded = build_untrained(recipe, corpus_texts(folders, dataset.types), [question_intro()])
     network = NanoNetwork(loaded, dataset)
-    sampler = SequenceSampler(Encoder(loaded), folders, dataset, window_tokens=recipe.window_tokens, seed=recipe.seed)
+    sampler = SequenceSampler(
+        Encoder(loaded), folders, dataset, window_tokens=recipe.window_tokens, words=recipe.words, seed=recipe.seed
+    )
     for _, reason, n in count_reasons(("", item.reason) for item in sampler.skipped):
         print_note(f"{n} skipped: {reason}")
     trainer = _StageTrainer(recipe, network, sampler, on_step)

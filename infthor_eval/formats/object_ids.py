@@ -1,0 +1,30 @@
+"""Object ids: what they say about an object, and the names that they give it.
+
+Ids are "Type|x|y|z". Parts have the type of the part at the end ("Sink|...|SinkBasin"), slices also a number after an
+underscore ("Apple|...|AppleSliced_2").
+"""
+
+from enum import StrEnum
+
+__all__ = ["Words", "object_type_of"]
+
+
+def object_type_of(object_id: str) -> str:
+    """Return the object type in an object id."""
+    parts = object_id.split("|")
+    return parts[4].split("_")[0] if len(parts) > 4 else parts[0]
+
+
+class Words(StrEnum):
+    """The words in which plans and actions name objects.
+
+    `PUBLISHED` are those of the published scripts: the first part of an object's id, so that a slice of bread is
+    "Bread" and the basin of a sink is "Sink". `NATURAL` are the objects' own types: "BreadSliced", "SinkBasin".
+    """
+
+    PUBLISHED = "published"
+    NATURAL = "natural"
+
+    def name_of(self, object_id: str) -> str:
+        """Return the name of an object."""
+        return object_id.split("|", maxsplit=1)[0] if self is Words.PUBLISHED else object_type_of(object_id)
