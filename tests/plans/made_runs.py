@@ -25,6 +25,7 @@ def identity(
     about = {
         "trajectories": {name: f"digest of {name}" for name in trajectories},
         "rewards": dict(rewards or RULES),
+        "words": "published",
         "after_failure": after_failure,
         "broken": [],
     }

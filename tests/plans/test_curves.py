@@ -146,7 +146,7 @@ def test_runs_differ_in_simulator_and_course_in_a_note():
 REFUSED = {
     "another task": (made_run("n", [plan("a", 0, (0, 10), task="other")], task="other"), "share no task"),
     "another trajectory": (made_run("n", [plan("z", 0, (0, 10))]), "share no trajectory"),
-    "other rules": (made_run("n", PLANS, rewards={"name": "published-compat"}), "different reward rules"),
+    "other rules": (made_run("n", PLANS, rewards={"name": "published"}), "different reward rules"),
 }
 
 

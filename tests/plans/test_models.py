@@ -7,6 +7,7 @@ import pytest
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.plans.habits import expert_texts
 from infthor_eval.plans.memory import LastTokens, memory_named
@@ -57,10 +58,10 @@ def as_expert(folder):
     known = {}
     for trajectory in iter_trajectories(folder):
         tasks = tasks_of(trajectory)
-        for plan in plans_of(trajectory):
+        for plan in plans_of(trajectory, Words.PUBLISHED):
             key = tasks[plan.task].text, plan.text
             assert key not in known
-            known[key] = expert_texts(trajectory, plan)
+            known[key] = expert_texts(trajectory, plan, Words.PUBLISHED)
 
     def say(parts, decoding):
         return known[goal_asked(parts), plan_asked(parts)][len(done_so_far(parts))]
@@ -91,13 +92,13 @@ def test_the_experts_own_words_carry_every_plan_out(acting, tmp_path):
 def test_a_model_reads_the_sequence_that_it_was_trained_on(acting, data):
     outcome, model = acting(as_expert(data))
     (trajectory,) = iter_trajectories(data)
-    plans = plans_of(trajectory)
+    plans = plans_of(trajectory, Words.PUBLISHED)
     beginnings = [parts for parts, _ in model.asked if not done_so_far(parts)]
     whole = FIRST + "<image>"
     for plan, parts in zip(plans, beginnings, strict=True):
         assert text(parts) == f"{whole}<|plan|>Plan: {plan.text}<|plan|><|act|>"
         whole += f"<|plan|>Plan: {plan.text}<|plan|>"
-        whole += "".join(f"<|act|>{action}<|act|><image>" for action in expert_texts(trajectory, plan))
+        whole += "".join(f"<|act|>{action}<|act|><image>" for action in expert_texts(trajectory, plan, Words.PUBLISHED))
     for (before, _), (after, _) in pairwise(model.asked):
         if done_so_far(after):  # within a plan it grows by the action and what is seen then
             action = done_so_far(after)[-1]
@@ -161,7 +162,7 @@ def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_hist
 
 def test_a_model_that_fails_fails_its_plan_alone(acting):
     def say(parts, _):
-        if plan_asked(parts) == "pick up the fork":
+        if plan_asked(parts) == "pick up the Fork":
             raise ZeroDivisionError("of its own")
         return "RotateLeft" if not done_so_far(parts) else ""
 
@@ -274,15 +275,15 @@ def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(acting, d
 
 
 HISTORIES = {
-    "last:0": "there are full, last:TOKENS, text and frames:K",
-    "last:": "there are full, last:TOKENS, text and frames:K",
-    "last:-5": "there are full, last:TOKENS, text and frames:K",
-    "last:many": "there are full, last:TOKENS, text and frames:K",
-    "last:²": "there are full, last:TOKENS, text and frames:K",
-    "frames:0": "there are full, last:TOKENS, text and frames:K",
-    "all": "there are full, last:TOKENS, text and frames:K",
-    "full:3": "there are full, last:TOKENS, text and frames:K",
-    "text:3": "there are full, last:TOKENS, text and frames:K",
+    "last:0": "there are full, published, last:TOKENS, text and frames:K",
+    "last:": "there are full, published, last:TOKENS, text and frames:K",
+    "last:-5": "there are full, published, last:TOKENS, text and frames:K",
+    "last:many": "there are full, published, last:TOKENS, text and frames:K",
+    "last:²": "there are full, published, last:TOKENS, text and frames:K",
+    "frames:0": "there are full, published, last:TOKENS, text and frames:K",
+    "all": "there are full, published, last:TOKENS, text and frames:K",
+    "full:3": "there are full, published, last:TOKENS, text and frames:K",
+    "text:3": "there are full, published, last:TOKENS, text and frames:K",
 }
 
 
@@ -357,7 +358,7 @@ def test_replies_that_are_held_to_possible_actions_can_be_tried(prepared, short,
     steps = [step for record in outcome.records for step in record.payload.steps]
     assert all(step.action == step.reply for step in steps)
     assert all(step.call for step in steps)
-    assert set(endings(outcome)) <= {"done", "refused by the simulator", "wrong outcome", "step limit"}
+    assert set(endings(outcome)) <= {"done", "refused by the simulator", "step limit"}
 
 
 @pytest.mark.parametrize("model", [QWEN, LLAVA])

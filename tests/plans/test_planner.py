@@ -2,12 +2,14 @@
 
 import pytest
 
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.navigation import GRID, GridPose
 from infthor_eval.household.scout import reachable_grid
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
-from infthor_eval.plans.rewards import PlanReward, max_reward, reward_rules
+from infthor_eval.plans.reward_rules import reward_rules
+from infthor_eval.plans.rewards import PlanReward, max_reward
 from infthor_eval.plans.targets import PlanTarget, target_of
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.launch import embedded_launch
@@ -37,7 +39,7 @@ def test_every_plan_is_carried_out(simulator, name):
     trajectory, rules = ours(name), reward_rules("default")
     restored = restore(simulator, trajectory.scene)
     assert not restored.refused and not restored.dropped
-    grounding, tasks, plans = Grounding(simulator.view), tasks_of(trajectory), plans_of(trajectory)
+    grounding, tasks, plans = Grounding(simulator.view), tasks_of(trajectory), plans_of(trajectory, Words.PUBLISHED)
     treatments = Treatments()
     for plan in plans:
         begins = plan.index == 0 or plans[plan.index - 1].task != plan.task

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_trajectories
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
@@ -36,7 +37,7 @@ def alfred(number):
 
 def test_our_plans():
     trajectory = ours()
-    plans = plans_of(trajectory)
+    plans = plans_of(trajectory, Words.NATURAL)
     assert [task.task for task in tasks_of(trajectory)] == [
         Task(TaskType.CLEAN, "Apple", "Fridge"),
         Task(TaskType.COOL, "Bowl", "SinkBasin"),
@@ -58,7 +59,7 @@ def test_our_plans():
 
 
 def test_what_stands_between_two_tasks_belongs_to_the_one_before():
-    plans = plans_of(ours("bedroom-2-seed7"))
+    plans = plans_of(ours("bedroom-2-seed7"), Words.NATURAL)
     assert [plan.task for plan in plans[12:16]] == [2, 2, 2, 3]
 
 
@@ -66,7 +67,7 @@ def test_published_plans():
     check(published("floorplan28_train.json"))
     trajectory = published("floorplan28_test.json")
     check(trajectory)
-    tasks, plans = tasks_of(trajectory), plans_of(trajectory)
+    tasks, plans = tasks_of(trajectory), plans_of(trajectory, Words.NATURAL)
     assert tasks[-1].task == Task(TaskType.COOL, "Apple", "Microwave")
     assert {plan.task for plan in plans if plan.is_final} == {len(tasks) - 1}
 
@@ -74,7 +75,7 @@ def test_published_plans():
 def test_alfred_plans():
     for trajectory in alfred(60):
         check(trajectory)
-        plans, tasks = plans_of(trajectory), tasks_of(trajectory)
+        plans, tasks = plans_of(trajectory, Words.NATURAL), tasks_of(trajectory)
         assert len(tasks) == 1 and tasks[0].task.task_type == trajectory.task_type
         assert tasks[0].text == trajectory.turk_annotations["anns"][0]["task_desc"]
         assert not any(plan.is_final for plan in plans)  # the sub-goal without an action is none of them
@@ -83,7 +84,7 @@ def test_alfred_plans():
 
 def check(trajectory):
     """Whether the plans cover the actions, one after the other."""
-    plans = plans_of(trajectory)
+    plans = plans_of(trajectory, Words.NATURAL)
     assert [plan.index for plan in plans] == list(range(len(plans)))
     assert [plan.low[0] for plan in plans] == [0, *(plan.low[1] for plan in plans[:-1])]
     assert plans[-1].low[1] == len(trajectory.plan.low_actions)
@@ -112,4 +113,4 @@ FAULTS = [
 @pytest.mark.parametrize(("change", "words"), FAULTS, ids=[words for _, words in FAULTS])
 def test_what_is_wrong_is_named(change, words):
     with pytest.raises(DataError, match=f"^trajectory kitchen-1-seed7.*{words}"):
-        plans_of(changed(ours(), change))
+        plans_of(changed(ours(), change), Words.NATURAL)

@@ -8,7 +8,8 @@ from infthor_eval.household.navigation import GridPose
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.rewards import PlanReward, StepReward, count_actions_to_goal, max_reward, reward_rules
+from infthor_eval.plans.reward_rules import reward_rules
+from infthor_eval.plans.rewards import PlanReward, StepReward, count_actions_to_goal, max_reward
 from infthor_eval.plans.targets import PlanTarget
 
 from .building import (
@@ -30,7 +31,7 @@ from .building import (
     kitchen,
 )
 
-DEFAULT, COMPAT = reward_rules("default"), reward_rules("published-compat")
+DEFAULT = reward_rules("default")
 ELSEWHERE = Task(TaskType.PLACE, "Mug", "Desk")  # there is no desk: never done
 GOES_ON, DONE, FAILED = "goes on", "done", "failed"
 
@@ -65,10 +66,9 @@ def test_goto_pays_steps_and_arrival():
     assert given == [(pytest.approx(0.2), GOES_ON)] * 6 + [(pytest.approx(4.2), DONE)]
 
 
-@pytest.mark.parametrize("rules", [DEFAULT, COMPAT])
-def test_a_way_of_exactly_three_is_not_there(rules):
-    assert walk(rules, [6], [AHEAD], start=(0, 5)) == [(pytest.approx(0.2), GOES_ON)]
-    assert walk(rules, [7], [AHEAD], start=(0, 6)) == [(pytest.approx(4.2), DONE)]
+def test_a_way_of_exactly_three_is_not_there():
+    assert walk(DEFAULT, [6], [AHEAD], start=(0, 5)) == [(pytest.approx(0.2), GOES_ON)]
+    assert walk(DEFAULT, [7], [AHEAD], start=(0, 6)) == [(pytest.approx(4.2), DONE)]
 
 
 def test_to_and_fro_is_paid_once():
@@ -79,16 +79,9 @@ def test_to_and_fro_is_paid_once():
         (0.0, GOES_ON),
         (pytest.approx(0.2), GOES_ON),
     ]
-    assert walk(COMPAT, [1, 0, 1, 2], actions) == [
-        (pytest.approx(0.2), GOES_ON),
-        (0.0, GOES_ON),
-        (pytest.approx(0.2), GOES_ON),
-        (pytest.approx(0.2), GOES_ON),
-    ]
 
 
-@pytest.mark.parametrize("rules", [DEFAULT, COMPAT])
-def test_looks_and_turns_are_steps(rules):
+def test_looks_and_turns_are_steps():
     target = PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 2), 90), goal_horizon=60.0)
     start = kitchen(at=(0, 0), horizon=-30.0)  # two ahead, one turn, three looks: six left
     events = [
@@ -100,15 +93,14 @@ def test_looks_and_turns_are_steps(rules):
         ("RotateRight", None, kitchen(at=(0, 1), facing=90, horizon=30.0)),  # one ahead is lost behind turns
         ("LookDown", None, kitchen(at=(0, 1), facing=0, horizon=60.0)),
     ]
-    again = 0.0 if rules is DEFAULT else 0.2
-    assert run(rules, target, start, events, grid=CORRIDOR) == [
+    assert run(DEFAULT, target, start, events, grid=CORRIDOR) == [
         (pytest.approx(0.2), GOES_ON),
         (0.0, GOES_ON),
-        (pytest.approx(again), GOES_ON),
+        (pytest.approx(0.0), GOES_ON),
         (pytest.approx(0.2), GOES_ON),
         (pytest.approx(0.2), GOES_ON),
         (0.0, GOES_ON),
-        (pytest.approx(4.2 if rules is DEFAULT else 4.4), DONE),
+        (pytest.approx(4.2), DONE),
     ]
 
 
@@ -140,7 +132,7 @@ STOWED = kitchen({MUG: FRIDGE})
 
 PICKUPS = [
     ("asked", PICKUP, kitchen(), [("PickupObject", MUG, HOLDING)], [(2.0, DONE)]),
-    ("another", PICKUP, kitchen(), [("PickupObject", CUP, kitchen(held=CUP))], [(0.0, FAILED)]),
+    ("another", PICKUP, kitchen(), [("PickupObject", CUP, kitchen(held=CUP))], [(0.0, GOES_ON)]),
     (
         "out of a drawer",
         PICKUP,
@@ -159,11 +151,11 @@ PICKUPS = [
         [(2.0, DONE)],
     ),
     (
-        "the whole is no slice",
+        "the whole, which has the slice's name",
         PlanTarget(PlanKind.PICKUP, SLICE_1),
         kitchen(),
         [("PickupObject", APPLE, kitchen(held=APPLE))],
-        [(0.0, FAILED)],
+        [(2.0, DONE)],
     ),
     (
         "no use, then refused",
@@ -224,24 +216,15 @@ OTHERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("rules", [DEFAULT, COMPAT], ids=["default", "compat"])
-@pytest.mark.parametrize(("target", "start", "events", "expected"), [row[1:] for row in PICKUPS + OTHERS],
-                         ids=[row[0] for row in PICKUPS + OTHERS])  # fmt: skip
-def test_what_both_rule_sets_pay_alike(rules, target, start, events, expected):
-    assert run(rules, target, start, events) == expected
-
-
-# (what, target, start, events, by default, published-compat); the latter ends where it is shorter.
 PUTS = [
-    ("put", PUT, HOLDING, [("PutObject", OTHER_TABLE, kitchen({MUG: OTHER_TABLE}))], [(2.0, DONE)], [(0.0, FAILED)]),
-    ("wrong place", PUT, HOLDING, [("PutObject", TABLE, kitchen())], [(0.0, FAILED)], [(0.0, FAILED)]),
+    ("put", PUT, HOLDING, [("PutObject", OTHER_TABLE, kitchen({MUG: OTHER_TABLE}))], [(2.0, DONE)]),
+    ("wrong place", PUT, HOLDING, [("PutObject", TABLE, kitchen())], [(0.0, GOES_ON)]),
     (
         "in a plate there",
         PUT,
         kitchen({PLATE: OTHER_TABLE}, held=MUG),
         [("PutObject", PLATE, kitchen({MUG: PLATE, PLATE: OTHER_TABLE}))],
-        [(0.0, FAILED)],
-        [(0.0, FAILED)],
+        [(0.0, GOES_ON)],
     ),
     (
         "stow",
@@ -255,7 +238,6 @@ PUTS = [
             ("CloseObject", FRIDGE, STOWED),
         ],
         [(2.0, GOES_ON), (0.0, GOES_ON), (0.0, GOES_ON), (2.0, GOES_ON), (2.0, DONE)],
-        [(2.0, GOES_ON), (0.0, GOES_ON), (0.0, GOES_ON), (0.0, FAILED)],
     ),
     (
         "stow elsewhere",
@@ -265,8 +247,7 @@ PUTS = [
             ("OpenObject", DRAWER, kitchen(held=MUG, opened=[DRAWER])),
             ("PutObject", DRAWER, kitchen({MUG: DRAWER}, opened=[DRAWER])),
         ],
-        [(0.0, GOES_ON), (0.0, FAILED)],
-        [(0.0, GOES_ON), (0.0, FAILED)],
+        [(0.0, GOES_ON), (0.0, GOES_ON)],
     ),
     (
         "open already",
@@ -274,7 +255,6 @@ PUTS = [
         OPEN_FRIDGE,
         [("PutObject", FRIDGE, IN_FRIDGE)],
         [(2.0, DONE)],
-        [(0.0, FAILED)],
     ),
     (
         "taken out again",
@@ -290,7 +270,6 @@ PUTS = [
             ("CloseObject", FRIDGE, STOWED),
         ],
         [(2.0, GOES_ON), (2.0, GOES_ON), *[(0.0, GOES_ON)] * 4, (2.0, DONE)],
-        [(2.0, GOES_ON), (0.0, FAILED)],
     ),
 ]
 
@@ -313,7 +292,6 @@ TREATED = [
         HOLDING,
         [("PutObject", BASIN, IN_SINK), ("ToggleObjectOn", FAUCET, WASHED)],
         [(0.0, GOES_ON), (2.0, DONE)],
-        [(0.0, FAILED)],
     ),
     (
         "clean without the mug",
@@ -325,7 +303,6 @@ TREATED = [
             ("OpenObject", FRIDGE, OPEN_FRIDGE),
         ],
         [(0.0, GOES_ON)] * 3,
-        [(0.0, GOES_ON)] * 3,
     ),
     (
         "clean what is in the sink already",
@@ -333,7 +310,6 @@ TREATED = [
         IN_SINK,
         [("ToggleObjectOn", FAUCET, WASHED)],
         [(2.0, DONE)],
-        [(0.0, GOES_ON)],
     ),
     (
         "clean, with the sink recorded as the object",
@@ -341,7 +317,6 @@ TREATED = [
         HOLDING,
         [("PutObject", BASIN, IN_SINK), ("ToggleObjectOn", FAUCET, WASHED)],
         [(0.0, GOES_ON), (2.0, DONE)],
-        [(0.0, FAILED)],
     ),
     (
         "heat",
@@ -354,7 +329,6 @@ TREATED = [
             ("ToggleObjectOn", MICROWAVE, kitchen({MUG: MICROWAVE}, on=[MICROWAVE])),
         ],
         [(0.0, GOES_ON)] * 3 + [(2.0, DONE)],
-        [(0.0, GOES_ON), (0.0, FAILED)],
     ),
     (
         "cool",
@@ -362,7 +336,6 @@ TREATED = [
         HOLDING,
         [*COOLING, ("PickupObject", MUG, OPEN_FRIDGE)],
         [(0.0, GOES_ON), (0.0, GOES_ON), (2.0, GOES_ON), (2.0, GOES_ON), (2.0, DONE)],
-        [(0.0, GOES_ON), (0.0, FAILED)],
     ),
     (
         "cool twice",
@@ -370,7 +343,6 @@ TREATED = [
         HOLDING,
         [*COOLING, ("CloseObject", FRIDGE, STOWED), COOLING[-1], ("PickupObject", CUP, kitchen(held=CUP))],
         [(0.0, GOES_ON), (0.0, GOES_ON), (2.0, GOES_ON), (2.0, GOES_ON), *[(0.0, GOES_ON)] * 3],
-        [(0.0, GOES_ON), (0.0, FAILED)],
     ),
     (
         "cool what stands in the fridge",
@@ -382,16 +354,18 @@ TREATED = [
             ("OpenObject", FRIDGE, IN_FRIDGE),
         ],
         [(2.0, GOES_ON), (0.0, GOES_ON), (2.0, GOES_ON)],
-        [(0.0, GOES_ON), (0.0, GOES_ON), (0.0, GOES_ON)],
     ),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("target", "start", "events", "expected", "published"), [row[1:] for row in PUTS + TREATED],
-                         ids=[row[0] for row in PUTS + TREATED])  # fmt: skip
-def test_what_the_published_faults_change(target, start, events, expected, published):
+ALL = PICKUPS + OTHERS + PUTS + TREATED
+
+
+@pytest.mark.parametrize(
+    ("target", "start", "events", "expected"), [row[1:] for row in ALL], ids=[row[0] for row in ALL]
+)
+def test_what_each_action_gives(target, start, events, expected):
     assert run(DEFAULT, target, start, events) == expected
-    assert run(COMPAT, target, start, events[: len(published)]) == published
 
 
 def test_what_was_washed_before_is_washed_again():
@@ -404,9 +378,6 @@ def test_treatments_are_followed():
     plan = PlanReward(DEFAULT, CLEAN, ELSEWHERE, IN_SINK, Treatments(hot=frozenset({CUP})))
     plan.after({"action": "ToggleObjectOn", "objectId": FAUCET}, IN_SINK, WASHED)
     assert plan.treatments == Treatments(clean=frozenset({MUG}), hot=frozenset({CUP}))
-    faulty = PlanReward(COMPAT, CLEAN, ELSEWHERE, IN_SINK, Treatments(hot=frozenset({CUP})))
-    faulty.after({"action": "ToggleObjectOn", "objectId": FAUCET}, IN_SINK, WASHED)
-    assert faulty.treatments == Treatments()
 
 
 # -- the task
@@ -419,34 +390,33 @@ TOGGLE = PlanTarget(PlanKind.TOGGLE, LAMP)
 
 TASKS = [
     ("done with the plan", PLACE, PUT, HOLDING, [("PutObject", OTHER_TABLE, kitchen({MUG: OTHER_TABLE}))],
-     [(7.0, DONE)], [(0.0, FAILED)]),
+     [(7.0, DONE)]),
     ("wrong place, right task", PLACE, PUT, HOLDING, [("PutObject", TABLE, kitchen())],
-     [(0.0, FAILED)], [(0.0, FAILED)]),
+     [(5.0, GOES_ON)]),
     ("once", IN_THE_FRIDGE, STOW, HOLDING,
      [("OpenObject", FRIDGE, OPEN_FRIDGE), ("PutObject", FRIDGE, IN_FRIDGE), ("CloseObject", FRIDGE, STOWED)],
-     [(2.0, GOES_ON), (7.0, GOES_ON), (2.0, DONE)], [(2.0, GOES_ON), (0.0, FAILED)]),
+     [(2.0, GOES_ON), (7.0, GOES_ON), (2.0, DONE)]),
     ("held already", PLACE, TOGGLE, kitchen(), [("ToggleObjectOn", LAMP, kitchen(on=[LAMP]))],
-     [(1.0, DONE)], [(1.0, DONE)]),
+     [(1.0, DONE)]),
     ("looked at", EXAMINE, TOGGLE, HOLDING, [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP]))],
-     [(6.0, DONE)], [(6.0, DONE)]),
+     [(6.0, DONE)]),
     ("looked at on the way", EXAMINE, PICKUP, kitchen(on=[LAMP]), [("PickupObject", MUG, kitchen(held=MUG, on=[LAMP]))],
-     [(7.0, DONE)], [(7.0, DONE)]),
+     [(7.0, DONE)]),
     ("out of sight", EXAMINE, TOGGLE, HOLDING,
-     [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP], hidden=[LAMP]))], [(1.0, DONE)], [(1.0, DONE)]),
+     [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP], hidden=[LAMP]))], [(1.0, DONE)]),
     ("with an action of no use", EXAMINE, PICKUP, kitchen({MUG: DRAWER}, held=CUP),
-     [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP]))], [(0.0, GOES_ON)], [(0.0, GOES_ON)]),
+     [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP]))], [(0.0, GOES_ON)]),
     ("washed", CLEAN_MUG, CLEAN, HOLDING, [("PutObject", BASIN, IN_SINK), ("ToggleObjectOn", FAUCET, WASHED)],
-     [(0.0, GOES_ON), (7.0, DONE)], [(0.0, FAILED)]),
+     [(0.0, GOES_ON), (7.0, DONE)]),
     ("washed, found there", CLEAN_MUG, CLEAN, IN_SINK, [("ToggleObjectOn", FAUCET, WASHED)],
-     [(7.0, DONE)], [(0.0, GOES_ON)]),
+     [(7.0, DONE)]),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("task", "target", "start", "events", "expected", "published"), [row[1:] for row in TASKS],
+@pytest.mark.parametrize(("task", "target", "start", "events", "expected"), [row[1:] for row in TASKS],
                          ids=[row[0] for row in TASKS])  # fmt: skip
-def test_the_task_is_paid_once_when_its_goal_comes_to_hold(task, target, start, events, expected, published):
+def test_the_task_is_paid_once_when_its_goal_comes_to_hold(task, target, start, events, expected):
     assert run(DEFAULT, target, start, events, task) == expected
-    assert run(COMPAT, target, start, events[: len(published)], task) == published
 
 
 def test_a_task_washed_for_in_an_earlier_plan():
@@ -461,32 +431,31 @@ def test_a_task_washed_for_in_an_earlier_plan():
 # -- the most there is
 
 MOST = [
-    (PICKUP, kitchen(), None, 2.0, 2.0),
-    (PUT, HOLDING, None, 2.0, 0.0),
-    (PUT, HOLDING, PLACE, 7.0, 0.0),
-    (STOW, HOLDING, None, 6.0, 2.0),
-    (STOW, HOLDING, IN_THE_FRIDGE, 11.0, 2.0),
-    (STOW, OPEN_FRIDGE, None, 2.0, 0.0),
-    (PlanTarget(PlanKind.OPEN, DRAWER), kitchen(), None, 2.0, 2.0),
-    (PlanTarget(PlanKind.CLOSE, DRAWER), kitchen(opened=[DRAWER]), None, 1.0, 1.0),
-    (TOGGLE, HOLDING, EXAMINE, 6.0, 6.0),
-    (PlanTarget(PlanKind.SLICE, APPLE), kitchen(), None, 1.0, 1.0),
-    (CLEAN, HOLDING, None, 2.0, 0.0),
-    (CLEAN, HOLDING, CLEAN_MUG, 7.0, 0.0),
-    (HEAT, HOLDING, None, 2.0, 0.0),
-    (COOL, HOLDING, None, 6.0, 0.0),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 9), 0), goal_horizon=60.0), kitchen(), None, 5.6, 5.6),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 3), 0), goal_horizon=30.0), kitchen(), None, 4.2, 4.2),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 2), 0), goal_horizon=30.0), kitchen(), None, 4.2, 4.2),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 0), 0), goal_horizon=30.0), kitchen(), EXAMINE, 9.0, 9.0),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((7, 7), 0), goal_horizon=30.0), kitchen(), None, 0.0, 0.0),
+    (PICKUP, kitchen(), None, 2.0),
+    (PUT, HOLDING, None, 2.0),
+    (PUT, HOLDING, PLACE, 7.0),
+    (STOW, HOLDING, None, 6.0),
+    (STOW, HOLDING, IN_THE_FRIDGE, 11.0),
+    (STOW, OPEN_FRIDGE, None, 2.0),
+    (PlanTarget(PlanKind.OPEN, DRAWER), kitchen(), None, 2.0),
+    (PlanTarget(PlanKind.CLOSE, DRAWER), kitchen(opened=[DRAWER]), None, 1.0),
+    (TOGGLE, HOLDING, EXAMINE, 6.0),
+    (PlanTarget(PlanKind.SLICE, APPLE), kitchen(), None, 1.0),
+    (CLEAN, HOLDING, None, 2.0),
+    (CLEAN, HOLDING, CLEAN_MUG, 7.0),
+    (HEAT, HOLDING, None, 2.0),
+    (COOL, HOLDING, None, 6.0),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 9), 0), goal_horizon=60.0), kitchen(), None, 5.6),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 3), 0), goal_horizon=30.0), kitchen(), None, 4.2),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 2), 0), goal_horizon=30.0), kitchen(), None, 4.2),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 0), 0), goal_horizon=30.0), kitchen(), EXAMINE, 9.0),
+    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((7, 7), 0), goal_horizon=30.0), kitchen(), None, 0.0),
 ]
 
 
-@pytest.mark.parametrize(("target", "start", "completes", "most", "published"), MOST)
-def test_the_most_that_a_plan_gives(target, start, completes, most, published):
+@pytest.mark.parametrize(("target", "start", "completes", "most"), MOST)
+def test_the_most_that_a_plan_gives(target, start, completes, most):
     assert max_reward(DEFAULT, target, start, CORRIDOR, completes) == pytest.approx(most)
-    assert max_reward(COMPAT, target, start, CORRIDOR, completes) == pytest.approx(published)
 
 
 def test_a_way_is_over_before_its_end_and_other_plans_go_on():
@@ -505,11 +474,12 @@ PUBLISHED = {
 }  # fmt: skip
 
 
-def test_the_rule_sets_differ_in_the_faults_alone():
-    assert DEFAULT.rewards == COMPAT.rewards == PUBLISHED
+def test_the_rule_sets_differ_in_who_scores_and_grounds_alone():
+    published = reward_rules("published")
+    assert DEFAULT.rewards == PUBLISHED
     assert DEFAULT.valid_actions.keys() == set(PlanKind)
-    faults = {"steps_count_once": True, "treatments_unnoticed": False, "puts_fail": False}
-    assert msgspec.structs.replace(COMPAT, **faults) == DEFAULT
+    changed = {"scoring": "default", "grounding": "strict", "force_action": False}
+    assert msgspec.structs.replace(published, **changed) == DEFAULT
 
 
 def test_unknown_rules():

@@ -87,22 +87,23 @@ def test_what_is_exported_has_a_sample_for_each_plan(prepared):
     rows = [json.loads(line) for line in path.read_text().splitlines()]
     assert [(row["doc_id"], row["target"], row["success"]) for row in rows] == [
         (0, "go to the cabinet", 1.0),
-        (1, "pick up the fork", 1.0),
+        (1, "pick up the Fork", 1.0),
         (2, "go to the drawer", 1.0),
-        (3, "put the fork in the drawer", 1.0),
+        (3, "put the Fork in the Drawer", 1.0),
     ]
-    assert list(outcome.samples)[1].prompt == "put a fork in the drawer\npick up the fork"
+    assert list(outcome.samples)[1].prompt == "put a fork in the drawer\npick up the Fork"
 
 
 def test_the_published_rules_have_the_published_faults(prepared):
-    plans = payloads(execute(prepared(rewards="published-compat")))
+    plans = payloads(execute(prepared(rewards="published")))
     assert [(plan.ended, plan.reward) for plan in plans] == [
         ("done", pytest.approx(6)),
         ("done", 2),
         ("done", pytest.approx(4.2)),
-        ("wrong outcome", 2),  # the drawer is opened, and the put counts as refused
+        ("refused by the simulator", 2),  # the drawer is opened, and the put counts as refused
     ]
-    assert [plan.max_reward for plan in plans[:3]] == [plan.reward for plan in plans[:3]]
+    assert [plan.max_reward for plan in plans] == [plan.reward for plan in plans]
+    assert all(step.call["forceAction"] for plan in plans for step in plan.steps)
 
 
 def test_the_limit_is_of_trajectories(prepared, tmp_path):
@@ -367,8 +368,8 @@ SETTINGS = [
     ("max_steps: 2.5", "dataset_kwargs: max_steps is 2.5; it is a whole number above 0"),
     ("preamble: 7", "dataset_kwargs: preamble is 7; it is a text"),
     ("bundled:", "dataset_kwargs: bundled is None; it is a text"),
-    ("rewards: generous", "unknown reward rules 'generous'; there are default, published-compat"),
-    ("history: all", "history all: there are full, last:TOKENS, text and frames:K"),
+    ("rewards: generous", "unknown reward rules 'generous'; there are default, published"),
+    ("history: all", "history all: there are full, published, last:TOKENS, text and frames:K"),
     ("bundled: nothing", "the installation lacks its data folder 'sets/nothing'"),
 ]
 
@@ -394,9 +395,9 @@ def test_a_setting_that_would_not_act_is_refused(prepared, task_file, settings, 
 
 
 def test_settings_of_a_task_file_act_and_options_go_before_them(prepared, task_file):
-    task_file("max_steps: 2, rewards: published-compat")
+    task_file("max_steps: 2, rewards: published")
     plans = payloads(execute(prepared()))
-    assert Counter(plan.ended for plan in plans) == {"step limit": 1, "done": 2, "wrong outcome": 1}
+    assert Counter(plan.ended for plan in plans) == {"step limit": 1, "done": 2, "refused by the simulator": 1}
     plans = payloads(execute(prepared(rewards="default")))
     assert Counter(plan.ended for plan in plans) == {"step limit": 2, "done": 2}
 
@@ -425,7 +426,10 @@ def test_another_setting_is_another_run(prepared, data):
 
     plain = identity()
     for changes in (
-        {"rewards": "published-compat"},
+        {"rewards": "published"},
+        {"words": "natural"},
+        {"force_action": True},
+        {"history": "published"},
         {"history": "last:100"},
         {"after_failure": "stop"},
         {"constrained": True},

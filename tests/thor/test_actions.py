@@ -71,7 +71,7 @@ def test_moves_need_no_object():
 )
 def test_types_of_ids(object_id, object_type):
     assert object_type_of(object_id) == object_type
-    assert text_of("PickupObject", object_id).types == (object_type,)
+    assert text_of("PickupObject", object_id).names == (object_type,)
 
 
 def test_what_is_possible_counts_every_object_in_view():

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
@@ -24,7 +25,7 @@ _ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
 def segments_of(root, name):
     data, folder = NiehSet(root), root / "metadata" / name
     (trajectory,) = iter_trajectories(folder / "traj_data.json")
-    return recorded_segments(trajectory, read_steps(folder), data.frames(name))
+    return recorded_segments(trajectory, read_steps(folder), data.frames(name), Words.PUBLISHED)
 
 
 def names_in(root):

@@ -11,6 +11,7 @@ from safetensors.torch import load_file
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.step_log import ObjectInFrame, read_steps
 from infthor_eval.training.encoding import Encoder
@@ -115,7 +116,7 @@ def test_words_are_tokens(blank):
 
 def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answer(small_set, blank):
     loaded, dataset = blank
-    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=2048, seed=0)
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0)
     index, counts = dataset.index_by_digest(), {"yes": 0, "no": 0}
     from infthor_eval.household.wording import noun
 
@@ -156,7 +157,7 @@ def test_synthetic_plans_replace_objects_in_plan_and_actions():
 
 def test_synthetic_plans_have_no_frame_and_loss_on_their_actions(small_set, blank):
     loaded, dataset = blank
-    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, seed=0)
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0)
     for plan in sampler.synthetic_plans(20):
         assert not plan.frames
         ends = [
@@ -167,7 +168,7 @@ def test_synthetic_plans_have_no_frame_and_loss_on_their_actions(small_set, blan
 
 def test_histories_are_windows_or_single_plans(small_set, blank):
     loaded, dataset = blank
-    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, seed=0)
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0)
     assert len(sampler.histories(2, 5, single_plan_share=0.0)) == 2
     plans = sampler.histories(2, 5, single_plan_share=1.0)
     assert len(plans) == 5
