@@ -60,6 +60,8 @@ class Decoding:
         seed: seed of the samples; the same request with the same seed gets the same reply.
         stop: strings that end the reply; the reply is cut before the first to appear.
         choices: allowed replies; if there are any, the reply is one of them, and no stop string cuts it.
+        repetition_penalty: penalty of tokens in context and reply, as in transformers, 1 for none; None for the
+            checkpoint's own (1.05 in Qwen2.5-VL).
     """
 
     max_new_tokens: int
@@ -68,6 +70,7 @@ class Decoding:
     seed: int = 0
     stop: tuple[str, ...] = ()
     choices: tuple[str, ...] = ()
+    repetition_penalty: float | None = None
 
     def __post_init__(self) -> None:
         """Check the ranges of all values; raise `UsageError` for one that is out of its range."""
@@ -77,6 +80,8 @@ class Decoding:
             raise UsageError(f"temperature must be 0 (greedy) or above, not {self.temperature}")
         if not 0 < self.top_p <= 1:
             raise UsageError(f"top_p must be above 0 and at most 1, not {self.top_p}")
+        if self.repetition_penalty is not None and not 0 < self.repetition_penalty < float("inf"):
+            raise UsageError(f"repetition_penalty must be above 0, not {self.repetition_penalty}")
         if "" in self.stop or "" in self.choices:
             raise UsageError("an empty text can neither stop a reply nor be one of its choices; leave it out")
 
@@ -86,8 +91,9 @@ class Decoding:
         return self.temperature == 0
 
     def document(self) -> dict[str, Any]:
-        """Return all settings as JSON values, for fingerprints."""
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
+        """Return all settings as JSON values, for fingerprints; a penalty that is the checkpoint's own is left out."""
+        given = {name: value for name, value in asdict(self).items() if value is not None}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in given.items()}
 
 
 @dataclass(frozen=True)

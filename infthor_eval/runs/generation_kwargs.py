@@ -8,7 +8,7 @@ from model_adapters.protocols import Decoding
 
 __all__ = ["decoding_of"]
 
-_KNOWN = ("until", "max_gen_toks", "do_sample", "temperature", "top_p", "choices")
+_KNOWN = ("until", "max_gen_toks", "do_sample", "temperature", "top_p", "choices", "repetition_penalty")
 
 
 def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
@@ -31,10 +31,18 @@ def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
     if not isinstance(limit, int) or isinstance(limit, bool):
         raise UsageError(f"{place}: generation_kwargs: max_gen_toks is {limit!r}; it is a whole number of tokens")
     temperature, top_p = _temperature(given, place), _number(given.get("top_p", 1.0), "top_p", place)
+    asked = given.get("repetition_penalty")
+    penalty = None if asked is None else _number(asked, "repetition_penalty", place)
     stop, choices = (_texts(given.get(name, ()), name, place) for name in ("until", "choices"))
     try:
         return Decoding(
-            max_new_tokens=limit, temperature=temperature, top_p=top_p, seed=seed, stop=stop, choices=choices
+            max_new_tokens=limit,
+            temperature=temperature,
+            top_p=top_p,
+            seed=seed,
+            stop=stop,
+            choices=choices,
+            repetition_penalty=penalty,
         )
     except UsageError as error:
         raise UsageError(f"{place}: generation_kwargs: {error}") from error

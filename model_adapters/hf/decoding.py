@@ -94,10 +94,10 @@ class ReplyState:
         self._generation = generation
         self._choices = choices
         self._finished = finished
+        asked = decoding.repetition_penalty
+        self._penalty = generation.repetition_penalty if asked is None else asked
         # The penalty depends on the set of tokens, not on their counts.
-        self._penalised_ids = (
-            torch.tensor([list(set(context))], dtype=torch.long) if generation.repetition_penalty != 1.0 else None
-        )
+        self._penalised_ids = torch.tensor([list(set(context))], dtype=torch.long) if self._penalty != 1.0 else None
         self._generator = torch.Generator().manual_seed(decoding.seed)
 
     @property
@@ -137,7 +137,7 @@ class ReplyState:
         if self._penalised_ids is None:
             return logits
         self._penalised_ids = self._penalised_ids.to(logits.device)  # copied once, then extended on the device
-        penalty = RepetitionPenaltyLogitsProcessor(self._generation.repetition_penalty)
+        penalty = RepetitionPenaltyLogitsProcessor(self._penalty)
         return penalty(cast(Any, self._penalised_ids), cast(Any, logits[None]))[0]
 
     def _restrict(self, scores: torch.Tensor) -> torch.Tensor:

@@ -34,7 +34,10 @@ _HINTS = {
     429: "lower max_in_flight, or set requests_per_minute and tokens_per_minute",
     500: "see the server's log",
 }
-_OTHER_HINT = "check model and the options of requests (send_seed, send_temperature, send_stop, max_tokens_field)"
+_OTHER_HINT = (
+    "check model and the options of requests (send_seed, send_temperature, send_stop, send_repetition_penalty, "
+    "max_tokens_field)"
+)
 
 
 class _TransientError(Exception):

@@ -102,9 +102,14 @@ class ServedModel:
                 request["top_p"] = decoding.top_p
         if options.send_seed and not decoding.greedy:
             request["seed"] = decoding.seed % _SEEDS
-        if decoding.choices:  # stop strings do not cut choices
-            request["extra_body"] = {"structured_outputs": {"choice": list(decoding.choices)}}
-        elif options.send_stop and decoding.stop:
+        extra: dict[str, Any] = {}  # what is not in OpenAI's own interface
+        if options.send_repetition_penalty and decoding.repetition_penalty is not None:
+            extra["repetition_penalty"] = decoding.repetition_penalty
+        if decoding.choices:
+            extra["structured_outputs"] = {"choice": list(decoding.choices)}
+        if extra:
+            request["extra_body"] = extra
+        if not decoding.choices and options.send_stop and decoding.stop:
             request["stop"] = list(decoding.stop[:_MOST_STOPS])
         return request
 

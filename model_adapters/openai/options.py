@@ -45,6 +45,7 @@ class OpenAIOptions:
         send_seed: send the seed of sampled replies.
         send_temperature: send temperature and top_p; some models refuse them and decode in their own way.
         send_stop: send stop strings, at most 4; replies are cut here in any case.
+        send_repetition_penalty: send the penalty of requests that have one, as agents' have; OpenAI itself refuses it.
         guided: method that restricts replies to choices: `vllm` sends its `structured_outputs`; None for no support.
         max_in_flight: requests at the same time.
         timeout_s: limit for a whole reply, from the connection to its last byte, in seconds.
@@ -68,6 +69,7 @@ class OpenAIOptions:
     send_seed: bool = True
     send_temperature: bool = True
     send_stop: bool = True
+    send_repetition_penalty: bool = True
     guided: str | None = None
     max_in_flight: int = 4
     timeout_s: float = 300.0
@@ -97,7 +99,9 @@ class OpenAIOptions:
 
     def document(self) -> dict[str, Any]:
         """Return everything that can change a reply, as JSON values."""
-        return {"base_url": self.url} | {name: getattr(self, name) for name in _IN_IDENTITY}
+        document = {"base_url": self.url} | {name: getattr(self, name) for name in _IN_IDENTITY}
+        # Only requests of agents have a penalty: what others ask is the same with this option at its default.
+        return document if self.send_repetition_penalty else document | {"send_repetition_penalty": False}
 
     def _check_address(self) -> None:
         address = server_address("base_url", self.base_url)

@@ -122,10 +122,11 @@ class VllmModel(CheckpointModel):
 
     def _settings(self, decoding: Decoding) -> dict[str, Any]:
         read_choices(self._loaded.tokenizer, decoding)  # refuses choices that are longer than the reply may be
+        own, asked = self._loaded.generation.repetition_penalty, decoding.repetition_penalty
         settings: dict[str, Any] = {
             "max_tokens": decoding.max_new_tokens,
             "temperature": decoding.temperature,
-            "repetition_penalty": self._loaded.generation.repetition_penalty,
+            "repetition_penalty": own if asked is None else asked,
             "stop_token_ids": sorted(self._ends),
         }
         if not decoding.greedy:

@@ -72,10 +72,18 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
 
 def test_what_a_server_does_not_take_is_not_sent() -> None:
     asked: list[dict[str, Any]] = []
-    without = {"send_seed": False, "send_stop": False, "send_temperature": False}
+    without = {"send_seed": False, "send_stop": False, "send_temperature": False, "send_repetition_penalty": False}
     with opened(kept(asked, says("x")), max_tokens_field="max_completion_tokens", **without) as model:
-        _ask(model, "What?", decoding=up_to(5, temperature=0.5, stop=("b",)))
+        _ask(model, "What?", decoding=up_to(5, temperature=0.5, stop=("b",), repetition_penalty=1.0))
     assert {name for name in asked[0] if name != "headers"} == {"model", "messages", "max_completion_tokens"}
+
+
+def test_a_penalty_is_sent_where_one_is_asked_for() -> None:
+    asked: list[dict[str, Any]] = []
+    with opened(kept(asked, says("x"))) as model:
+        _ask(model, "What?", decoding=up_to(5, repetition_penalty=1.0))
+        _ask(model, "What?", decoding=up_to(5))
+    assert [request.get("repetition_penalty") for request in asked] == [1.0, None]
 
 
 def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> None:

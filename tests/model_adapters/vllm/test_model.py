@@ -102,6 +102,8 @@ def test_a_checkpoint_with_a_penalty_is_written_with_it(
     )
     assert _facts(ours) == _facts(theirs) != _facts(in_process("qwen2.5-vl").answer(turns, decoding))
     assert vllm.calls[-1].params.repetition_penalty == 20.0
+    start(pretrained=folder).answer(turns, up_to(40, repetition_penalty=1.0))
+    assert vllm.calls[-1].params.repetition_penalty == 1.0
 
 
 def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
