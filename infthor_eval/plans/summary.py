@@ -12,6 +12,7 @@ from infthor_eval.episodes.summary import (
     summarise_episodes,
 )
 from infthor_eval.plans.plan import PlanKind
+from infthor_eval.plans.published_log import log_rows
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.rates import Rate, clustered_rate, rate_over_clusters
 from infthor_eval.runs import UnitRecord
@@ -40,6 +41,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         max_reward: highest possible reward of a trajectory's attempted plans.
         goals: share of tasks whose goal was reached in one of their plans.
         n_actions: actions of all plans.
+        logged: totals of a trajectory as the published script logs them, by its names; empty under other rules.
     """
 
     n_plans: int
@@ -50,6 +52,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     max_reward: Rate | None
     goals: Rate | None
     n_actions: int | None
+    logged: dict[str, Rate]
 
 
 PlansSummary = EpisodesSummary[PlanTaskSummary]
@@ -74,7 +77,20 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
         max_reward=_rate_of_trajectories(acted, lambda _, most: most),
         goals=_goals(acted),
         n_actions=sum(len(record.payload.steps) for record in acted) if has_steps else None,
+        logged=_logged(acted),
     )
+
+
+def _logged(records: Sequence[Record]) -> dict[str, Rate]:
+    """Return the mean over trajectories of the last totals in the published log."""
+    by_trajectory: dict[str, list[PlanRecord]] = {}
+    for record in records:
+        by_trajectory.setdefault(record.cluster, []).append(record.payload)
+    if not all(plan.expert_reward is not None for plans in by_trajectory.values() for plan in plans):
+        return {}
+    ends = [list(log_rows(plans))[-1] for _, plans in sorted(by_trajectory.items())]
+    totals = {"total_reward": [end.total_reward for end in ends], "agent_reward": [end.agent_reward for end in ends]}
+    return {name: rate for name, values in totals.items() if (rate := rate_over_clusters(values)) is not None}
 
 
 def _success(records: Sequence[Record], kinds: frozenset[str]) -> Rate | None:

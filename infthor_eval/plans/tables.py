@@ -11,6 +11,11 @@ from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["overview_table", "result_tables"]
 
+_PUBLISHED_RULES = (
+    "Under the published rules 'at most' is the planner's reward, as walking to and fro earns without end. The logged "
+    "totals are the script's, which leaves out the reward of an action that completes a plan."
+)
+
 
 def overview_table(runs: Sequence[RunSummary]) -> Table:
     """Return completed plans and reward, one number a task."""
@@ -47,12 +52,16 @@ def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, P
 
 
 def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
+    logged = [name for name in ("total_reward", "agent_reward") if any(name in task.logged for *_, task in tasks)]
     rows = []
     for *names, task in tasks:
         of_trajectory = format_number(task.reward), format_number(task.max_reward), format_percent(task.reward_share)
-        rows.append(Row((*names, *of_trajectory, format_percent(task.goals))))
-    columns = (*NAME_COLUMNS, *map(Column, ("reward", "at most", "% of it", "goals reached, %")))
-    return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows))
+        totals = (format_number(task.logged.get(name)) for name in logged)
+        rows.append(Row((*names, *of_trajectory, format_percent(task.goals), *totals)))
+    of_log = (f"logged {name}" for name in logged)
+    columns = (*NAME_COLUMNS, *map(Column, ("reward", "at most", "% of it", "goals reached, %", *of_log)))
+    notes = (_PUBLISHED_RULES,) if logged else ()
+    return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows), notes)
 
 
 def _actions(task: PlanTaskSummary) -> str:

@@ -3,6 +3,7 @@
 import gzip
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import ApiAction, HighAction, LowAction, TaskInfo, TrajectorySource
 from infthor_eval.household.sequence_text import ACT, action_text, plan_text
 from infthor_eval.plans.environment import Ended
+from infthor_eval.plans.habits import expert_texts
 from infthor_eval.plans.memory import Past, PublishedHistory
 from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.plans.published_goals import Treated
@@ -198,3 +200,58 @@ def test_every_prompt_call_and_total_of_the_loop_is_the_published_one():
 def _rounded(row: list[Any]) -> list[Any]:
     """A row whose totals are without the noise of adding in another order."""
     return [*(round(total, 9) for total in row[:3]), *row[3:]]
+
+
+def by_hand(document: dict[str, Any]) -> list[tuple[str, list[int]]]:
+    """Before each plan of a published file: the loop's text, and how many actions were done before each frame."""
+
+    def name(object_id: str) -> str:
+        return object_id[: object_id.index("|")]
+
+    def said(high: dict[str, Any]) -> str:
+        kind, planner = high["discrete_action"]["action"], high["planner_action"]
+        if kind == "GotoLocation":
+            return f"go to the {high['discrete_action']['args'][0]}"
+        if kind == "PutObject":
+            return f"put the {name(planner['objectId'])} in the {name(planner['receptacleObjectId'])}"
+        verbs = {"PickupObject": "pick up the", "CoolObject": "cool the", "SliceObject": "slice the"}
+        return f"{verbs[kind]} {name(planner['objectId'])}"
+
+    def done(call: dict[str, Any]) -> str:
+        return " ".join(
+            [call["action"], *(name(call[key]) for key in ("objectId", "receptacleObjectId") if key in call)]
+        )
+
+    text, frames, n_done, before = "", [], 0, []
+    for task, part in zip(document["sub_tasks"], document["sub_trajs"], strict=True):
+        text += f"<|goal|>Your main goal: {task['task_desc']}<|goal|><image>"
+        frames.append(0)
+        for place in range(*part["high_pddl_idx"]):
+            text += f"<|plan|>Plan: {said(document['plan']['high_pddl'][place])}<|plan|><|act|>"
+            before.append((text, list(frames)))
+            for low in document["plan"]["low_actions"]:
+                if low["high_idx"] == place:
+                    text += f"<|act|>{done(low['api_action'])}<|act|><image>"
+                    n_done += 1
+                    frames.append(n_done)
+    assert n_done == len(document["plan"]["low_actions"])
+    return before
+
+
+def test_the_history_of_a_published_trajectory_is_the_published_one():
+    path = GOLDENS / "floorplan28_test.json"
+    if not path.is_file():
+        pytest.skip(f"{path} is not here")
+    wanted = by_hand(json.loads(path.read_text()))
+    trajectory = TrajectorySource(path, None, path.read_bytes()).read()
+    plans, tasks = plans_of(trajectory, Words.PUBLISHED), tasks_of(trajectory)
+    assert len(plans) == len(wanted) == 36
+    segments: list[PlanSegment] = []
+    for plan, (text, numbers) in zip(plans, wanted, strict=True):
+        begins = plan.index == 0 or plans[plan.index - 1].task != plan.task
+        segment = PlanSegment(plan.text, tasks[plan.task].text if begins else None, frame(plan.low[0]))
+        parts = PublishedHistory().recall(Past(segments, segment), len)
+        assert "".join("<image>" if isinstance(part, FrameRef) else part for part in parts) + ACT == text
+        assert [int(str(part.path)) for part in parts if isinstance(part, FrameRef)] == numbers
+        done = zip(expert_texts(trajectory, plan, Words.PUBLISHED), range(*plan.low), strict=True)
+        segments.append(replace(segment, steps=tuple((said, frame(number + 1)) for said, number in done)))
