@@ -16,6 +16,7 @@ from pathlib import Path
 
 from infthor_eval.plans.suite import PlansSuite
 from infthor_eval.plans.summary import PlanTaskSummary
+from infthor_eval.rates import Rate
 from infthor_eval.runs import read_run
 
 _RULES = ("default", "published")
@@ -43,7 +44,8 @@ def run(
     baselines: Sequence[str], rules: str, out: Path, options: Sequence[str]
 ) -> Iterator[tuple[str, PlanTaskSummary]]:
     """Run baselines with the command line and yield the results of each."""
-    command = [sys.executable, "-m", "infthor_eval", "--model", ",".join(baselines), "--rewards", rules]
+    program = str(Path(sys.executable).with_name("infthor-eval"))
+    command = [program, "run", "--model", ",".join(baselines), "--rewards", rules]
     subprocess.run([*command, *options, "--output", str(out)], check=True, stdout=subprocess.DEVNULL)
     suite = PlansSuite()
     for name in baselines:
@@ -53,9 +55,8 @@ def run(
 
 
 def _row(name: str, rules: str, task: PlanTaskSummary) -> str:
-    def total(rate: object) -> str:
-        value = getattr(rate, "value", None)
-        return "-" if value is None else f"{value * task.n_trajectories:.1f}"
+    def total(rate: Rate | None) -> str:
+        return "-" if rate is None else f"{rate.mean * task.n_trajectories:.1f}"
 
     done = task.endings.get("done", 0)
     logged = (total(task.logged.get(key)) for key in ("total_reward", "agent_reward"))

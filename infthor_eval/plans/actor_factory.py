@@ -14,10 +14,16 @@ __all__ = ["ActorFactory", "actor_factory"]
 
 @dataclass(frozen=True)
 class ActorFactory:
-    """Creates the actors of a subject; `sees` tells whether they look at frames."""
+    """Creates the actors of a subject.
+
+    Attributes:
+        sees: whether they look at frames.
+        trained_words: words of plans and actions that the subject was trained on; None if it does not say.
+    """
 
     sees: bool
     create: Callable[[PlansTask, Trajectory], PlanActor]
+    trained_words: str | None = None
 
 
 def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> ActorFactory:
@@ -26,5 +32,6 @@ def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> Actor
         subject.fit(trajectories)
         return ActorFactory(False, lambda task, trajectory: subject.actor(trajectory, task.words))
     if isinstance(subject, Model):
-        return ActorFactory(True, lambda task, _: ModelActor(subject, task.agent_config()))
+        trained = subject.identity().get("trained_words")
+        return ActorFactory(True, lambda task, _: ModelActor(subject, task.agent_config()), trained)
     raise TypeError(f"{subject.name} is neither a model nor a baseline of plans")

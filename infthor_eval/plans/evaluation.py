@@ -1,6 +1,7 @@
 """Plans set up for a run, and the run of their trajectories."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
@@ -55,6 +56,7 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         # A trajectory is a group: its plans share the expert's history, in the simulator and in the prefix cache.
         groups = groupby(evaluation.units, lambda unit: (unit.key.task, unit.cluster))
         workload = evaluation.workload((same for _, same in groups), constrained=evaluation.options.constrained)
+        workload = replace(workload, warnings=_warnings(factory.trained_words, self._tasks.values()))
         super().__init__(evaluation, workload, [self._simulators])
 
     def run(self, group: Group[PlanUnit], session: Session[PlanRecord]) -> Iterator[UnitRecord[PlanRecord]]:
@@ -88,3 +90,13 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
             settings=task.file.settings["generation_kwargs"],
             reply=", ".join(step.action or (step.reply or "") for step in payload.steps),
         )
+
+
+def _warnings(trained: str | None, tasks: Iterable[PlansTask]) -> list[str]:
+    """Return a line for each task that asks a checkpoint in other words than it was trained on."""
+    return [
+        f"{task.name}: the checkpoint was trained on {trained} words and is asked in {task.words} ones; give --words"
+        f" {trained}"
+        for task in tasks
+        if trained is not None and trained != task.words
+    ]

@@ -102,12 +102,14 @@ class Workload(Generic[U_co]):
         skipped: units that cannot be evaluated.
         config: everything beside subject and seed that the numbers depend on, as JSON values.
         costs: costs of the tasks, where they are known.
+        warnings: what people should know before the first unit, such as a checkpoint that was trained otherwise.
     """
 
     groups: Sequence[Group[U_co]]
     skipped: Sequence[Skipped] = ()
     config: Mapping[str, Any] = field(default_factory=dict)
     costs: Sequence[Cost] = ()
+    warnings: Sequence[str] = ()
 
     @property
     def n_units(self) -> int:

@@ -91,7 +91,8 @@ class _Evaluator(Generic[U, P]):
         workload = self._bound.evaluation.workload
         # Units without the inputs that only the suite needs.
         groups = [Group([Unit(u.key, u.cluster, u.payload) for u in g.units], g.frames) for g in workload.groups]
-        return _Greeting(self._bound.header, Workload(groups, workload.skipped, workload.config, workload.costs))
+        parts = (workload.skipped, workload.config, workload.costs, workload.warnings)
+        return _Greeting(self._bound.header, Workload(groups, *parts))
 
     def do(self, job: _GroupJob[P] | _SampleJob[P]) -> Iterator[tuple[UnitRecord[P], bool] | UnitSample]:
         evaluation = self._bound.evaluation

@@ -7,10 +7,22 @@ import torch
 from torch.distributed.tensor import DTensor
 
 from infthor_eval.errors import wrap_errors
+from infthor_eval.formats.object_ids import Words
+from model_adapters.hf.card import WORDS
 from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.quiet import hide_transformers_output
 
 __all__ = ["export", "gather_weights"]
+
+_CARD = f"""\
+---
+library_name: transformers
+{WORDS}: {{words}}
+---
+# {{title}}
+
+Trained with infthor-eval, on plans and actions in the {{words}} words (`--words {{words}}` in evaluation).
+"""
 
 
 def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
@@ -24,11 +36,18 @@ def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
     return {name: item.full_tensor().cpu() if isinstance(item, DTensor) else item for name, item in weights.items()}
 
 
-def export(loaded: LoadedCheckpoint, folder: Path, weights: Mapping[str, torch.Tensor] | None = None) -> None:
-    """Write weights (safetensors), configs, tokenizer with its template, and image processor.
+def export(
+    loaded: LoadedCheckpoint,
+    folder: Path,
+    *,
+    title: str,
+    words: Words,
+    weights: Mapping[str, torch.Tensor] | None = None,
+) -> None:
+    """Write weights (safetensors), configs, tokenizer with its template, image processor and card.
 
-    The template is that of training, so that evaluation renders the same prompts. The folder is created. `weights` are
-    the gathered ones of a sharded model.
+    The template is that of training, so that evaluation renders the same prompts. The card has the title of the recipe
+    and the words of plans and actions. The folder is created. `weights` are the gathered ones of a sharded model.
 
     Raises:
         DataError: the checkpoint cannot be written.
@@ -40,3 +59,4 @@ def export(loaded: LoadedCheckpoint, folder: Path, weights: Mapping[str, torch.T
             loaded.tokenizer.save_pretrained(folder)
             loaded.image_processor.save_pretrained(folder)
             loaded.model.save_pretrained(folder, state_dict=None if weights is None else dict(weights))
+        (folder / "README.md").write_text(_CARD.format(title=title, words=words), encoding="utf-8")

@@ -107,7 +107,8 @@ def fine_tune(run: TrainingRun, out: Path, on_step: StepCallback) -> Path:
             adapters.merge_and_unload()
         weights = gather_weights(run.loaded.model)
         if is_first:
-            export(run.loaded, out / _CHECKPOINT, weights)
+            recipe = run.recipe
+            export(run.loaded, out / _CHECKPOINT, title=recipe.title, words=recipe.words, weights=weights)
     return out / _CHECKPOINT
 
 

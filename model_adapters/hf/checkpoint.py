@@ -20,6 +20,7 @@ import transformers
 from infthor_eval.errors import ModelError, UsageError, wrap_errors
 from infthor_eval.formats.digests import digest, digest_of_files
 from infthor_eval.formats.reading import require_plain_files
+from model_adapters.hf.card import read_card_words
 from model_adapters.hf.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
 from model_adapters.hf.hub import fetch
@@ -186,12 +187,17 @@ def _check_pixels(image_processor: Any) -> None:
 
 
 def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
-    """Return the source of weights, for an identity; the commit is None for a folder of the user's."""
+    """Return the source of weights, for an identity, and what it was trained on if its card says so.
+
+    The commit is None for a folder of the user's.
+    """
+    words = read_card_words(folder)
+    trained = {} if words is None else {"trained_words": words}
     if commit is not None:
-        return {"checkpoint": pretrained, "revision": commit}
+        return {"checkpoint": pretrained, "revision": commit} | trained
     # The folder's name, not its path: a moved checkpoint is the same checkpoint.
     files = (path for path in sorted(folder.iterdir()) if path.suffix in _FINGERPRINTED and path.is_file())
-    return {"checkpoint": folder.resolve().name, "fingerprint": digest_of_files(files)}
+    return {"checkpoint": folder.resolve().name, "fingerprint": digest_of_files(files)} | trained
 
 
 def versions() -> dict[str, str]:

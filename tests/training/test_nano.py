@@ -201,7 +201,8 @@ def test_training_is_the_same_for_a_seed_and_lowers_the_loss(small_set, tmp_path
     losses = []
     for name in ("a", "b"):
         steps = []
-        export(train_small_model(SMALL, [small_set], steps.append), tmp_path / name)
+        model = train_small_model(SMALL, [small_set], steps.append)
+        export(model, tmp_path / name, title=SMALL.title, words=SMALL.words)
         losses.append([step.loss for step in steps])
         assert [step.stage for step in steps] == ["vision"] * 20 + ["text"] * 3 + ["joint"] * 6
     assert losses[0] == losses[1]

@@ -24,6 +24,7 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
     come from the model that the training started from.
     """
     from infthor_eval.formats.files import prepare_folder
+    from infthor_eval.formats.object_ids import Words
     from infthor_eval.terminal import print_line
     from infthor_eval.training.export import export
     from infthor_eval.training.published import import_weights
@@ -32,7 +33,7 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
     prepare_folder(out)
     loaded = load_starting_model(model, parse_model_args(model_args), "plain", seed=0)
     weights = import_weights(loaded, folder)
-    export(loaded, out)
+    export(loaded, out, title=f"{model}, weights of {folder.name}", words=Words.PUBLISHED)
     counts = f"{weights.n_imported} weights imported, {weights.n_kept} kept, {weights.n_ignored} other tensors ignored"
     print_line(f"{counts}: {out}")
     return 0

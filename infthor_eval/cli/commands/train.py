@@ -15,6 +15,7 @@ from infthor_eval.cli.options.workers import parse_worker_settings, worker_optio
 from infthor_eval.cli.progress.bar import PacedBar, StepBars
 from infthor_eval.cli.progress.notes import NOTES, print_note
 from infthor_eval.errors import DataError
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.terminal import console, progress_bar
 
 if TYPE_CHECKING:
@@ -51,6 +52,11 @@ _STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "a
     "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Change a setting of the recipe; may be repeated."
 )
 @click.option(
+    "--words",
+    type=click.Choice(list(map(str, Words))),
+    help="Words of plans and actions, as in evaluation.  [default: the recipe's]",
+)
+@click.option(
     "--out", required=True, type=PATH, help="Folder of the run; the checkpoint is written to checkpoint/ in it."
 )
 @click.option(
@@ -71,6 +77,7 @@ def command(
     model: str | None,
     model_args: str | None,
     changes: tuple[str, ...],
+    words: str | None,
     out: Path,
     dry_run: bool,
     gpus: int | None,
@@ -91,6 +98,7 @@ def command(
     worker_settings = parse_worker_settings(**workers)
     settings = parse_pairs(changes, "--set")
     settings |= {} if model is None else {"model": model}
+    settings |= {} if words is None else {"words": words}
     settings |= {f"model_args.{key}": value for key, value in parse_model_args(model_args or "").items()}
     recipe = read_recipe(name, settings)
     if not dry_run and (gpus is not None or tflops is not None):
@@ -180,7 +188,7 @@ def _train_small_model(recipe: NanoRecipe, folders: Sequence[Path], out: Path, w
             bars.advance(_STAGES[step.stage], step.step, step.n_steps, f"loss {step.loss:.3f}")
 
         loaded = train_small_model(recipe, sets, observe, print_note)
-    export(loaded, out / "checkpoint")
+    export(loaded, out / "checkpoint", title=recipe.title, words=recipe.words)
     console().print(f"{out / 'checkpoint'}")
 
 

@@ -38,7 +38,9 @@ class _ProgressObserver:
 
 
 def print_workload(workload: Workload) -> None:
-    """Print what is skipped, by reason, and what each task costs."""
+    """Print warnings, what is skipped, by reason, and what each task costs."""
+    for warning in workload.warnings:
+        print_note(warning, "yellow")
     for task, reason, n in count_reasons((item.key.task, item.reason) for item in workload.skipped):
         print_note(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
     for cost in workload.costs:

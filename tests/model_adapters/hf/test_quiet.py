@@ -9,6 +9,7 @@ from transformers.utils import logging
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.training.export import export
 from model_adapters import load
 from model_adapters.hf.checkpoint import wrap_loading_errors
@@ -55,7 +56,7 @@ def test_a_model_is_loaded_asked_and_exported_in_silence(
     talk = model.conversation()
     talk.append(frames[0], "\nWhat is it?")
     talk.reply(up_to(2))
-    export(model.loaded, tmp_path / "exported")
+    export(model.loaded, tmp_path / "exported", title="a twin", words=Words.PUBLISHED)
     assert capfd.readouterr() == ("", "")
 
 
