@@ -23,12 +23,20 @@ class Act:
 
 @dataclass(frozen=True)
 class PlanSituation:
-    """A plan that begins: the environment reset to it, its first observation, and the seed of everything random."""
+    """A plan that begins.
+
+    Attributes:
+        environment: the environment, reset to it.
+        seed: seed of everything random.
+        observation: first observation.
+        goes_on: whether it follows the agent's own last plan, without a reset.
+    """
 
     environment: PlanEnvironment
     plan: Plan
     seed: str
     observation: Observation
+    goes_on: bool = False
 
 
 class PlanActor(Protocol):

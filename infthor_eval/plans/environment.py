@@ -93,6 +93,7 @@ class PlanEnvironment:
     trajectory. Unity repeats all actions before it.
 
     Attributes:
+        trajectory: the trajectory.
         plans: plans that can be reset to.
         tasks: tasks that they belong to.
         look_degrees: angle by which a look up or down turns the camera.
@@ -124,6 +125,7 @@ class PlanEnvironment:
             DataError: the trajectory has a task without a goal, or an unknown kind of plan.
             SimulatorError: the simulator has no such scene or fails.
         """
+        self.trajectory = trajectory
         self.plans: Sequence[Plan] = plans_of(trajectory, words)
         self.tasks = tasks_of(trajectory)
         self._simulator = simulator
@@ -172,6 +174,29 @@ class PlanEnvironment:
         else:
             info["max_reward"] = self._begin_default(present, view, start.treatments, end.mark.view.agent)
         return Observation(view, start.frame), info
+
+    def go_on(self, plan: int) -> tuple[Observation, Mapping[str, Any]]:
+        """Begin a later plan of the same task where the world is, without a reset; returns what `reset` does.
+
+        The expert must have passed it (`expert_actions`) before the reset, as it would otherwise act in this world.
+
+        Raises:
+            InfeasibleError: the scene lacks an object of the plan, or the published rewards fail in it.
+            SimulatorError: the simulator fails.
+        """
+        present, view = self.plans[plan], self._simulator.view
+        self._plan, self._n_steps = present, 0
+        info: dict[str, Any] = {"n_expert": len(self._expert.actions(plan)), "expert_reward": None}
+        if self._script is not None:
+            scripted = self._script.plan(plan)
+            assert isinstance(self._reward, PublishedReward)
+            self._reward = self._reward.next_plan(scripted.sub_goal)
+            info |= {"max_reward": scripted.planner_reward, "expert_reward": scripted.expert_reward}
+        else:
+            assert isinstance(self._reward, PlanReward)
+            end = self._expert.start(plan + 1).mark.view.agent
+            info["max_reward"] = self._begin_default(present, view, self._reward.treatments, end)
+        return Observation(view, self._frames.keep(view)), info
 
     def _begin_default(self, plan: Plan, view: SimulatorView, treatments: Treatments, end: AgentPose) -> float:
         """Begin a plan under the default rules, and return its highest possible reward."""

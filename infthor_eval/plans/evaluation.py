@@ -1,14 +1,16 @@
 """Plans set up for a run, and the run of their trajectories."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
 from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, EpisodeUnit
 from infthor_eval.episodes.records import NOT_ATTEMPTED
+from infthor_eval.episodes.running import EpisodeResult
 from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.plans.actor_factory import ActorFactory, actor_factory
+from infthor_eval.plans.final_protocol import FinalForm
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
 from infthor_eval.plans.records import PlanRecord
@@ -68,6 +70,9 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         task, trajectory = self._tasks[group.units[0].key.task], group.units[0].trajectory
         with self._simulators.one() as simulator, ScratchFolder() as folder:
             runner = PlanRunner(task, trajectory, self._factory, simulator, folder, self.seed)
+            if task.final_form is not None:
+                yield from self._run_in_one_go(group, task.final_form, runner, session)
+                return
             stopped = False
             for unit in group.units:
                 record = known[unit.key]
@@ -78,6 +83,30 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
                 yield record
                 failed = record.excluded is None and not record.payload.done
                 stopped = stopped or (failed and task.settings.after_failure == "stop")
+
+    def _run_in_one_go(
+        self, group: Group[PlanUnit], form: FinalForm, runner: PlanRunner, session: Session[PlanRecord]
+    ) -> Iterator[UnitRecord[PlanRecord]]:
+        """Run the plans of a final task as the published scripts do, all of them even if some have records."""
+        fingerprints, known = self._find_records(group, session)
+        tried, goes_on = 0, True
+        for unit in group.units:
+            if not tried:
+                run: Callable[[], EpisodeResult[PlanRecord]] = partial(self._first_of_all, runner, group, unit)
+            elif goes_on:
+                run = partial(runner.run, unit.episode, goes_on=True)
+            else:
+                run = partial(runner.pass_over, unit.episode)
+            record = runner.record(unit, fingerprints[unit.key], run, session)
+            tried += record.payload.attempted
+            # After a failure of the model or the simulator nobody knows where the world is.
+            goes_on = form.goes_on and goes_on and record.payload.attempted
+            yield known[unit.key] or record
+
+    @staticmethod
+    def _first_of_all(runner: PlanRunner, group: Group[PlanUnit], unit: PlanUnit) -> EpisodeResult[PlanRecord]:
+        runner.prepare([other.episode for other in group.units])
+        return runner.run(unit.episode)
 
     def to_sample(self, record: UnitRecord[PlanRecord]) -> UnitSample:
         """See `infthor_eval.runs.BoundEvaluation.to_sample`."""

@@ -9,7 +9,17 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import ACT, action_part, goal_part, plan_part
 from infthor_eval.plans.segments import Part, PlanSegment, goal_of_last, restart_at, segment_parts
 
-__all__ = ["FullHistory", "LastTokens", "Memory", "Past", "StateInWords", "TopFrames", "memory_named"]
+__all__ = [
+    "CountTokens",
+    "FullHistory",
+    "LastTokens",
+    "Memory",
+    "Past",
+    "PublishedHistory",
+    "StateInWords",
+    "TopFrames",
+    "memory_named",
+]
 
 CountTokens = Callable[[Sequence[Part]], int | None]
 _RETRIEVER = "openai/clip-vit-large-patch14"  # as published for questions
@@ -163,15 +173,16 @@ class TopFrames:
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `Memory`."""
+        return [*self.choose(past), goal_part(past.goal), past.present.before, plan_part(past.present.plan)]
+
+    def choose(self, past: Past) -> list[FrameRef]:
+        """Return the chosen frames; raises DataError if one cannot be read."""
         from model_adapters.hf.vectors import nearest
 
-        frames, present = past.frames, past.present.before
-        chosen: Sequence[int] = ()
-        if frames:
-            vectors = self._retriever.frames([*frames, present])
-            chosen = nearest(vectors[:-1], vectors[-1], self._n_frames)
-        shown = [frames[number] for number in chosen]
-        return [*shown, goal_part(past.goal), present, plan_part(past.present.plan)]
+        if not past.frames:
+            return []
+        vectors = self._retriever.frames([*past.frames, past.present.before])
+        return [past.frames[number] for number in nearest(vectors[:-1], vectors[-1], self._n_frames)]
 
 
 def memory_named(text: str, retriever: str | None = None) -> Memory:

@@ -11,6 +11,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.actors import Act, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
+from infthor_eval.plans.final_protocol import FinalForm, present_parts, with_recorded_state
 from infthor_eval.plans.memory import Memory
 from infthor_eval.plans.segments import Part
 from infthor_eval.thor.actions import applicable_actions
@@ -28,6 +29,7 @@ class AgentConfig:
     Attributes:
         memory: the part of the history that it is given.
         words: words of actions.
+        form: the published form of final tasks; None elsewhere.
         preamble: text before everything else; empty as published.
         constrained: whether its replies are restricted to the actions that are possible in view.
         blank: whether it is shown grey frames instead of the actual ones.
@@ -36,6 +38,7 @@ class AgentConfig:
     decoding: Decoding
     memory: Memory
     words: Words
+    form: FinalForm | None = None
     preamble: str = ""
     constrained: bool = False
     blank: bool = False
@@ -50,6 +53,8 @@ class ModelActor:
     def __init__(self, model: Model, config: AgentConfig) -> None:
         self._model, self._config = model, config
         self._conversation = model.conversation()
+        if config.form is not None:
+            self._conversation.append(config.form.system, role="system")
         self._start = self._conversation.mark()
 
     def begin(self, situation: PlanSituation) -> None:
@@ -57,8 +62,14 @@ class ModelActor:
         environment, plan = situation.environment, situation.plan.index
         self._seed, self._n_acts = situation.seed, 0
         self._observation = situation.observation
+        if situation.goes_on:
+            return
+        past = environment.past(plan)
+        if self._config.form is not None:
+            past = with_recorded_state(past, environment.trajectory, situation.plan.low[0])
         with wrap_request_errors(self._model.name):
-            self._restart(self._config.memory.recall(environment.past(plan), self._count))
+            self._given = self._config.memory.recall(past, self._count)
+            self._restart(self._given)
 
     def act(self) -> Act:
         """See `PlanActor`."""
@@ -68,6 +79,8 @@ class ModelActor:
             max_new_tokens = max(decoding.max_new_tokens, _MAX_ACTION_TOKENS)
             decoding = replace(decoding, choices=possible, max_new_tokens=max_new_tokens)
         self._n_acts += 1
+        if self._asks_anew:
+            self._restart([*self._given, *present_parts(self._present_frame())])
         with wrap_request_errors(self._model.name):
             reply = self._conversation.reply(decoding)
         return Act(reply.text, reply)
@@ -75,14 +88,25 @@ class ModelActor:
     def observe(self, outcome: StepOutcome) -> None:
         """See `PlanActor`; the action is appended as it was understood, not as the model wrote it."""
         self._observation = outcome.observation
-        frame = outcome.observation.frame
+        if self._asks_anew:
+            return
+        frame = self._present_frame()
+        self._conversation.append(f"{outcome.info.action}{ACT}", *self._visible_parts([frame]), ACT)
+
+    @property
+    def _asks_anew(self) -> bool:
+        return self._config.form is not None and self._config.form.asks_anew
+
+    def _present_frame(self) -> FrameRef:
+        frame = self._observation.frame
         if frame is None:
             raise ModelError("the environment keeps no frames, which a model needs")
-        self._conversation.append(f"{outcome.info.action}{ACT}", *self._visible_parts([frame]), ACT)
+        return frame
 
     def _restart(self, parts: Sequence[Part]) -> None:
         self._conversation.rewind(self._start)
-        self._conversation.append(self._config.preamble, *self._visible_parts(parts), ACT)
+        ends = () if self._asks_anew else (ACT,)
+        self._conversation.append(self._config.preamble, *self._visible_parts(parts), *ends)
 
     def _visible_parts(self, parts: Sequence[Part]) -> list[Part]:
         if not self._config.blank:

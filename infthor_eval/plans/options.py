@@ -34,6 +34,13 @@ class PlansOptions(SimulatorOptions):
             "metavar": "HOW",
         },
     )
+    protocol: str | None = field(
+        default=None,
+        metadata={
+            "choices": ("default", "published"),
+            "help": "How final tasks are run: each plan from the true state, or in one go as in the published scripts.",
+        },
+    )
     after_failure: str | None = field(
         default=None,
         metadata={"choices": ("continue", "stop"), "help": "What follows a failed plan; the task's own if not given."},

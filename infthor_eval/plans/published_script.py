@@ -49,6 +49,10 @@ class PublishedReward:
         self.goal_reached = self._task.goal_reached
         return StepReward(earned.reward, done=earned.plan_done)
 
+    def next_plan(self, sub_goal: int) -> "PublishedReward":
+        """Return the rewards of a later plan of the same task, which goes on from here."""
+        return PublishedReward(self._task, sub_goal)
+
 
 @dataclass(frozen=True)
 class ScriptedPlan:

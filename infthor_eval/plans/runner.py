@@ -1,6 +1,7 @@
 """Leading an actor through a trajectory, plan by plan (Algorithm 2)."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -10,6 +11,7 @@ from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.plans.actor_factory import ActorFactory
 from infthor_eval.plans.actors import Act, PlanSituation
 from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
+from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.plans.plan import Plan
 from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.plans.task import PlansTask
@@ -60,7 +62,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
                 simulator,
                 rules=task.rules,
                 words=task.words,
-                max_steps=task.settings.max_steps,
+                max_steps=task.max_steps,
                 frames=frames,
                 in_words=factory.sees and task.memory.needs_state,
             ),
@@ -68,8 +70,19 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         self._trajectory, self._actor = trajectory, factory.create(task, trajectory.data)
         self._seed = f"{seed}/{task.name}/{trajectory.traj_id}"
 
-    def run(self, plan: Plan) -> EpisodeResult[PlanRecord]:
-        """Run a plan from its true start.
+    def prepare(self, plans: Sequence[Plan]) -> None:
+        """Have the expert pass plans that are to follow each other without a reset, as far as it can here.
+
+        Raises:
+            SceneError: the simulator has no such scene.
+            SimulatorError: the simulator fails.
+        """
+        with suppress(ExpertRefusedError):
+            for plan in plans:
+                self.environment.expert_actions(plan.index)
+
+    def run(self, plan: Plan, *, goes_on: bool = False) -> EpisodeResult[PlanRecord]:
+        """Run a plan from its true start, or from where the plan before has left the world.
 
         Raises:
             InfeasibleError: this simulator refuses an action of the expert before the plan's end, or lacks an object of
@@ -80,7 +93,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             SimulatorError: the simulator fails.
         """
         environment = self.environment
-        observation, info = environment.reset(plan.index)
+        observation, info = environment.go_on(plan.index) if goes_on else environment.reset(plan.index)
         record = plan_record(self._trajectory, plan)
         of_expert = info["expert_reward"]
         self.begun = msgspec.structs.replace(
@@ -88,7 +101,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             max_reward=round(info["max_reward"], _DIGITS),
             expert_reward=None if of_expert is None else round(of_expert, _DIGITS),
         )
-        self._actor.begin(PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation))
+        self._actor.begin(PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation, goes_on))
         acts: list[tuple[Act, StepOutcome]] = []
         while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):
             if acts:

@@ -34,6 +34,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
 
     Attributes:
         n_plans: plans that count; a failed one earns nothing.
+        n_tried: those of them in which the subject acted.
         success: share of completed plans, by column of the published table.
         by_kind: share of completed plans, by kind.
         reward_share: reward of a trajectory divided by the highest possible reward of its attempted plans.
@@ -45,6 +46,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     """
 
     n_plans: int
+    n_tried: int | None
     success: dict[str, Rate]
     by_kind: dict[str, Rate]
     reward_share: Rate | None
@@ -70,6 +72,7 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
     return PlanTaskSummary(
         **common_results(config, records),
         n_plans=len(counted),
+        n_tried=sum(record.payload.attempted for record in counted) if has_steps else None,
         success={name: rate for name, kinds in _COLUMNS.items() if (rate := _success(counted, kinds))},
         by_kind={str(kind): rate for kind in PlanKind if (rate := _success(counted, frozenset({kind})))},
         reward_share=_rate_of_trajectories(acted, lambda reward, most: reward / most if most else 0.0),

@@ -1,6 +1,7 @@
 """Results of plans as tables: success beside the published rows, rewards, and how plans ended."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import published_tables
@@ -11,6 +12,12 @@ from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["overview_table", "result_tables"]
 
+_COUNTS = ("plans", "tried", "trajectories", "excluded", "skipped", "failed")
+_NEVER = "*"  # marks published cells that cannot be other than 0
+_AFTER_FAILURE = {
+    "continue": "After a failed plan the next one is tried, as in the published script (--after-failure continue).",
+    "stop": "After a failed plan the trajectory is over, as in the paper's Algorithm 2 (--after-failure stop).",
+}
 _PUBLISHED_RULES = (
     "Under the published rules 'at most' is the planner's reward, as walking to and fro earns without end. The logged "
     "totals are the script's, which leaves out the reward of an action that completes a plan."
@@ -20,10 +27,10 @@ _PUBLISHED_RULES = (
 def overview_table(runs: Sequence[RunSummary]) -> Table:
     """Return completed plans and reward, one number a task."""
     rows = [
-        Row((*names, format_percent(task.success.get("total")), format_percent(task.reward_share), *_sizes(task)[:2]))
+        Row((*names, format_percent(task.success.get("total")), format_percent(task.reward_share), *_sizes(task)[:3]))
         for *names, task in named_tasks(runs)
     ]
-    columns = (*NAME_COLUMNS, *map(Column, ("completed, %", "reward, % of the most", "plans", "trajectories")))
+    columns = (*NAME_COLUMNS, *map(Column, ("completed, %", "reward, % of the most", *_COUNTS[:3])))
     return Table("Plans, 95 % interval in brackets", columns, tuple(rows), result_notes(runs))
 
 
@@ -40,15 +47,27 @@ def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, P
         Row((*names, *(format_percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
         for *names, task in tasks
     ]
-    notes = [*result_notes(runs)]
-    if any(_has_final_task(run) for run in runs):
+    notes = [*result_notes(runs), *_conduct_notes(runs)]
+    if any(_is_comparable(run) for run in runs):
         for table in published_tables("plans"):
             for row in table.rows:
-                values = (f"{value:.1f}" for value in row.values)
+                cells = zip(table.columns, row.values, strict=True)
+                values = (f"{value:.1f}{_NEVER * (column == 'Put')}" for column, value in cells)
                 rows.append(Row((row.name, f"published, {table.title}", *values), is_published=True))
             notes += (f"Published, {table.title}: {note}" for note in table.notes)
-    columns = (*NAME_COLUMNS, *map(Column, (*FINAL_COLUMNS, "plans", "trajectories", "excluded", "skipped", "failed")))
+        notes.append(f"{_NEVER} Cannot be other than 0: the published script counts every put as failed.")
+    elif any(_has_final_task(run) for run in runs):
+        notes.append(
+            "Published rows stand beside runs with --protocol published --rewards published alone."
+        )
+    columns = (*NAME_COLUMNS, *map(Column, (*FINAL_COLUMNS, *_COUNTS)))
     return Table("Plans completed, %", columns, tuple(rows), tuple(notes))
+
+
+def _conduct_notes(runs: Sequence[RunSummary]) -> list[str]:
+    """Return how the runs went on after a failed plan; Algorithm 2 of the paper and its script differ in it."""
+    ways = {task.get("after_failure") for run in runs for task in run.header.config["tasks"].values()}
+    return [text for way, text in _AFTER_FAILURE.items() if way in ways]
 
 
 def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
@@ -69,10 +88,21 @@ def _actions(task: PlanTaskSummary) -> str:
 
 
 def _sizes(task: PlanTaskSummary) -> tuple[str, ...]:
-    counts = (task.n_plans, task.n_trajectories, sum(task.excluded.values()), sum(task.skipped.values()), task.n_failed)
-    return tuple(map(str, counts))
+    tried = "-" if task.n_tried is None else task.n_tried
+    others = (task.n_trajectories, sum(task.excluded.values()), sum(task.skipped.values()), task.n_failed)
+    return tuple(map(str, (task.n_plans, tried, *others)))
 
 
 def _has_final_task(run: RunSummary) -> bool:
     tasks = run.header.config["tasks"].values()
     return any(task["config"]["dataset_kwargs"].get("plans") == "final" for task in tasks)
+
+
+def _is_comparable(run: RunSummary) -> bool:
+    """Return whether a run has a task that was run as the published final tasks were, or comes from their logs."""
+    tasks = run.header.config["tasks"].values()
+    return any(task["rewards"] is None or _as_published(task) for task in tasks) and _has_final_task(run)
+
+
+def _as_published(task: Mapping[str, Any]) -> bool:
+    return task.get("protocol") == "published" and task["rewards"]["scoring"] == "published"

@@ -10,6 +10,8 @@ from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.environment import MAX_STEPS
+from infthor_eval.plans.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
+from infthor_eval.plans.final_protocol import FinalForm, final_form
 from infthor_eval.plans.memory import memory_named
 from infthor_eval.plans.model_actor import AgentConfig
 from infthor_eval.plans.options import PlansOptions
@@ -22,7 +24,14 @@ from infthor_eval.runs.limiting import limit_items
 
 __all__ = ["PlanTaskSettings", "PlansTask"]
 
-_CHOICES = {"plans": ("all", "final"), "after_failure": ("continue", "stop"), "words": tuple(map(str, Words))}
+_CHOICES = {
+    "plans": ("all", "final"),
+    "protocol": ("default", "published"),
+    "after_failure": ("continue", "stop"),
+    "words": tuple(map(str, Words)),
+}
+
+_GIVEN = ("rewards", "words", "history", "protocol", "after_failure")  # settings that are options too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +44,8 @@ class PlanTaskSettings:
         rewards: name of the reward rules.
         words: the words of plans and actions, see `Words`.
         history: how much of the history a model is given.
+        protocol: whether each plan begins in the true state ("default"), or a final task is done in one go as in the
+            "published" scripts (`final_protocol`).
         after_failure: whether to "continue" from the true state after a failed plan, or to "stop".
         max_steps: maximum number of steps of one plan.
         preamble: text before everything else that a model is given.
@@ -45,6 +56,7 @@ class PlanTaskSettings:
     rewards: str = "default"
     words: str = Words.PUBLISHED
     history: str = "full"
+    protocol: str = "default"
     after_failure: str = "continue"
     max_steps: int = MAX_STEPS
     preamble: str = ""
@@ -57,6 +69,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         rules: the rules of rewards.
         words: the words of plans and actions.
         memory: the part of the history that a model is given.
+        final_form: the published form of final tasks; None for the default protocol.
         evaluated_trajectories: trajectories that are evaluated.
     """
 
@@ -69,7 +82,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         """
         file.require("dataset_kwargs", "generation_kwargs")
         self._options = request.options
-        given = {name: getattr(self._options, name) for name in ("rewards", "words", "history", "after_failure")}
+        given = {name: getattr(self._options, name) for name in _GIVEN}
         settings = task_settings(file, PlanTaskSettings, given, _CHOICES)
         rules = reward_rules(settings.rewards)
         self.rules = rules.forcing() if self._options.force_action else rules
@@ -79,16 +92,32 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             kwargs = {**kwargs, "do_sample": False, "temperature": 0.0}
         self.decoding = decoding_of(kwargs, request.seed, file.name)
         self.memory = memory_named(settings.history, self._options.retriever)
+        self.final_form = self._final_form(settings, request.seed)
         super().__init__(file, request, settings, partial(read_plan_trajectory, words=self.words))
         having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
         self.evaluated_trajectories = limit_items(having_plans, lambda item: item.traj_id, request.seed, request.limit)
         if not self.evaluated_trajectories:
             raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
 
+    def _final_form(self, settings: PlanTaskSettings, seed: int) -> FinalForm | None:
+        """Return the published form of final tasks, and take its memory and decoding; None for the default protocol."""
+        if settings.protocol == "default":
+            return None
+        if settings.plans != "final":
+            raise UsageError("--protocol published is for final tasks; take --tasks infthor_final")
+        form = final_form(self.memory, settings.history)
+        self.memory, self.decoding = form.memory, form.decoding(seed)
+        return form
+
     def plans(self, trajectory: PlanTrajectory) -> list[Plan]:
         """Return the plans of a trajectory that are evaluated."""
         wanted = [plan for plan in trajectory.plans if plan.is_final or self.settings.plans == "all"]
         return [plan for plan in wanted if plan.in_task]
+
+    @property
+    def max_steps(self) -> int:
+        """Number of actions after which a plan is over."""
+        return self.settings.max_steps if self.final_form is None else max(self.settings.max_steps, MAX_FINAL_STEPS)
 
     def agent_config(self) -> AgentConfig:
         """Return how a model is prompted."""
@@ -96,6 +125,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             decoding=self.decoding,
             memory=self.memory,
             words=self.words,
+            form=self.final_form,
             preamble=self.settings.preamble,
             constrained=self._options.constrained,
             blank=self._options.frames == "blank",
@@ -107,6 +137,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             self.evaluated_trajectories,
             words=self.settings.words,
             history=self.settings.history,
+            protocol=self.settings.protocol,
             after_failure=self.settings.after_failure,
             rewards=self.rules.document(),
             decoding=self.decoding.document(),
