@@ -57,9 +57,7 @@ def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, P
             notes += (f"Published, {table.title}: {note}" for note in table.notes)
         notes.append(f"{_NEVER} Cannot be other than 0: the published script counts every put as failed.")
     elif any(_has_final_task(run) for run in runs):
-        notes.append(
-            "Published rows stand beside runs with --protocol published --rewards published alone."
-        )
+        notes.append("Published rows stand beside runs with --protocol published --rewards published alone.")
     columns = (*NAME_COLUMNS, *map(Column, (*FINAL_COLUMNS, *_COUNTS)))
     return Table("Plans completed, %", columns, tuple(rows), tuple(notes))
 

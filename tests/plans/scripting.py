@@ -17,7 +17,8 @@ class Talk(Transcript):
 
     @property
     def parts(self) -> list[Part]:
-        (turn,) = self.turns
+        *system, turn = self.turns
+        assert [other.role for other in system] in ([], ["system"])
         return list(turn.parts)
 
     @property
@@ -30,17 +31,19 @@ class Talk(Transcript):
             if isinstance(part, FrameRef):
                 assert part.digest  # it is there, and known when it no longer is
         self._model.asked.append((self.parts, decoding))
+        self._model.told = {part for turn in self.turns[:-1] for part in turn.parts}
         return Reply(self._model.say(self.parts, decoding), 1, self.n_tokens, 0)
 
 
 class ScriptedModel:
-    """Replies by a function of what was asked and the decoding; keeps what it was asked."""
+    """Replies by a function of what was asked and the decoding; keeps what it was asked, and last told by a system."""
 
     name, capabilities = "qwen2.5-vl-tiny", CAPABILITIES
 
     def __init__(self, say: Callable[[Sequence[Part], object], str]):
         self.say = say
         self.asked: list[tuple[list[Part], object]] = []
+        self.told: set[Part] = set()
 
     def identity(self):
         return {}

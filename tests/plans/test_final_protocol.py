@@ -1,0 +1,138 @@
+"""Final tasks in one go, as the published scripts run them."""
+
+import json
+
+import pytest
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.plans.habits import expert_texts
+from infthor_eval.plans.plan import plans_of
+from infthor_eval.runs import execute
+
+from .cut import FORK, cut, write
+from .scripting import ScriptedModel
+
+pytestmark = pytest.mark.usefixtures("shared_simulator")
+
+QWEN = "qwen2.5-vl-tiny"
+FIRST = "<|goal|>Your main goal: put a fork in the drawer<|goal|><image>"
+
+
+def text(parts):
+    return "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
+
+
+@pytest.fixture
+def final(tmp_path):
+    """A kitchen whose final task has two plans, after a task of four."""
+    return write(tmp_path / "final", cut(FORK, 6, final=True))
+
+
+@pytest.fixture
+def experts(final):
+    """The expert's actions of each plan, in words."""
+    (trajectory,) = iter_trajectories(final)
+    return [expert_texts(trajectory, plan, Words.PUBLISHED) for plan in plans_of(trajectory, Words.PUBLISHED)]
+
+
+@pytest.fixture
+def acting(prepared, monkeypatch, final):
+    """Runs a model that says these texts one after the other; gives the payloads and the model."""
+
+    def acting(said, **changes):
+        rest = iter(said)
+        model = ScriptedModel(lambda *_: next(rest))
+        monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: model)
+        settings = {"tasks": ("infthor_final",), "data": final, "protocol": "published", "rewards": "published"}
+        outcome = execute(prepared(QWEN, **settings | changes))
+        return [record.payload for record in outcome.records], model, outcome
+
+    return acting
+
+
+def test_the_interleaved_form_ends_after_its_first_plan(acting, experts):
+    (first, second), model, outcome = acting(experts[4])
+    assert (first.ended, second.ended) == ("done", "not attempted")
+    (task,) = outcome.summary.summary.tasks.values()
+    assert (task.n_plans, task.n_tried, task.success["total"].mean) == (2, 1, 0.5)
+    parts, decoding = model.asked[0]
+    shown = text(parts)
+    assert shown.startswith(f"{FIRST}<|act|><|act|>")
+    assert "<|plan|>" not in shown
+    assert shown.count("<|goal|>Your main goal: ") == 2
+    assert shown.endswith("<|goal|><image><|act|>")
+    frames = [part for part in parts if isinstance(part, FrameRef)]
+    assert frames[0].digest == frames[-1].digest  # the scene's first frame stands behind each goal
+    assert (decoding.max_new_tokens, decoding.temperature, decoding.stop) == (32, 0.0, ("<|act|>",))
+    assert decoding.repetition_penalty is None
+    assert [told.startswith("You are an embodied AI agent") for told in model.told] == [True]
+    grown = text(model.asked[1][0])
+    assert grown == f"{shown}{experts[4][0]}<|act|><image><|act|>"
+
+
+def test_a_failed_first_plan_ends_it_too(acting):
+    (first, second), model, _ = acting(["fly"])
+    assert (first.ended, second.ended) == ("no action", "not attempted")
+    assert len(model.asked) == 1
+
+
+def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(acting):
+    (first, second), model, _ = acting(["RotateLeft", "fly", *["RotateRight"] * 201], history="text")
+    assert (first.ended, second.ended) == ("no action", "step limit")
+    assert len(second.steps) == 201
+    prompts = [text(parts) for parts, _ in model.asked]
+    assert len({prompt.partition("Current state: ")[0] for prompt in prompts}) == 1  # the memory is not renewed
+    for prompt in prompts:
+        assert prompt.startswith("Your task is: put two slices of tomato")
+        assert ".\nState: You are in the middle of a room. Your hands are free." in prompt
+        assert prompt.endswith(";\nCurrent state: <image> Next action: ")
+    assert model.asked[0][1].stop == ()
+    shown = [parts[-2].digest for parts, _ in model.asked]
+    assert shown[0] != shown[1]  # it has turned left,
+    assert shown[1] == shown[2]  # and the next plan begins there
+    assert any("Available actions: RotateLeft" in told for told in model.told)
+
+
+def test_the_state_in_the_file_is_taken_where_there_is_one(acting, final):
+    path = final / f"{FORK}.json"
+    document = json.loads(path.read_text())
+    first = document["sub_trajs"][-1]["low_pddl_idx"][0]
+    path.write_text(json.dumps(document | {"state_summary": {str(first): "All is well"}}))
+    _, model, _ = acting(["fly", "fly"], history="text")
+    assert "State: You are in the middle of a room. All is well;\n" in text(model.asked[0][0])
+
+
+def test_frames_are_remembered_by_clip(acting, make_clip):
+    _, model, _ = acting(["fly", "fly"], history="frames:3", retriever=str(make_clip()))
+    shown = text(model.asked[0][0])
+    assert shown.startswith("Your task is: ")
+    assert shown.endswith(".\nPrevious states: <image><image><image>Current state: <image> Next action: ")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"history": "last:100"}, "--protocol published has the histories full, text and frames:K, not last:100"),
+        ({"tasks": ("infthor_plans",)}, "--protocol published is for final tasks; take --tasks infthor_final"),
+    ],
+)
+def test_what_the_scripts_have_not_is_refused(acting, changes, said):
+    with pytest.raises(UsageError) as caught:
+        acting([], **changes)
+    assert str(caught.value) == said
+
+
+def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepared, final, experts, monkeypatch):
+    rest = iter([*experts[4], "fly", *experts[4], "fly"])
+    model = ScriptedModel(lambda *_: next(rest))
+    monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: model)
+    settings = {"tasks": ("infthor_final",), "data": final, "protocol": "published", "history": "text"}
+    whole = execute(prepared(QWEN, **settings))
+    (journal,) = (whole.folder / "journal").glob("*.jsonl")
+    lines = journal.read_text().splitlines(keepends=True)
+    journal.write_text("".join(lines[:-1]))
+    again = execute(prepared(QWEN, **settings))
+    assert [record.payload for record in again.records] == [record.payload for record in whole.records]
