@@ -28,6 +28,7 @@ import torch
 
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.training.data import read_history, trajectory_names
@@ -108,7 +109,7 @@ def read_bundled_steps(n_steps: int) -> tuple[list[Part], list[Step]]:
     steps: list[Step] = []
     data = NiehSet(packaged_folder("sets/nieh_mini"))
     for name in trajectory_names(data):
-        for segment in read_history(data, name)[1]:
+        for segment in read_history(data, name, Words.PUBLISHED)[1]:
             (steps[-1][1] if steps else opening).extend(segment.opening())
             steps += [(action, [frame]) for action, frame in segment.steps]
     if len(steps) < n_steps:

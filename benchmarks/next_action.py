@@ -17,6 +17,7 @@ from infthor_eval.cli.options.values import parse_model_args
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.habits import Habits
@@ -33,7 +34,7 @@ def main() -> None:
     """Predict all actions and print the accuracies."""
     options = _arguments()
     data = NiehSet(options.data)
-    histories = [read_history(data, name) for name in trajectory_names(data)]
+    histories = [read_history(data, name, Words.PUBLISHED) for name in trajectory_names(data)]
     clusters = [trajectory.traj_id for trajectory, segments in histories for segment in segments for _ in segment.steps]
     rows = {
         "most frequent": [float(hit) for hit in most_frequent_hits(histories)],
@@ -72,7 +73,7 @@ def habit_hits(histories: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) ->
     """Yield True for each action that the habits of the other scenes predict."""
     for trajectory, segments in histories:
         scene = trajectory.scene.floor_plan
-        habits = Habits(other for other, _ in histories if other.scene.floor_plan != scene)
+        habits = Habits((other for other, _ in histories if other.scene.floor_plan != scene), Words.PUBLISHED)
         for segment in segments:
             done: list[str] = []
             for action, _ in segment.steps:

@@ -22,7 +22,7 @@ from infthor_eval.training.checkpoints import Checkpoints
 from infthor_eval.training.context_parallel import context_parallel
 from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.gradients import sum_gradients
-from infthor_eval.training.network import SequenceModel, decay_groups
+from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.ranks import Ranks
 from infthor_eval.training.schedule import LoopSettings
 
@@ -195,5 +195,5 @@ class Loop:
 
 
 def _optimizer(parameters: Sequence[torch.nn.Parameter], settings: LoopSettings) -> torch.optim.AdamW:
-    groups = decay_groups(parameters, settings.weight_decay)
-    return torch.optim.AdamW(groups, lr=settings.learning_rate, betas=settings.betas)
+    decay = settings.weight_decay
+    return torch.optim.AdamW(parameters, lr=settings.learning_rate, betas=settings.betas, weight_decay=decay)

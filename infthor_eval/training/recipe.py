@@ -47,7 +47,7 @@ class Optimizer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     Attributes:
         lr: highest learning rate.
         betas: betas of AdamW.
-        weight_decay: weight decay of AdamW.
+        weight_decay: weight decay of AdamW, for all trained weights.
         clip: largest norm of the gradient.
         warmup_ratio: share of the steps in which the learning rate rises.
     """

@@ -8,7 +8,18 @@ import torch
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.digests import seed_of
 
-__all__ = ["LoopSettings"]
+__all__ = ["LoopSettings", "linear_share"]
+
+
+def linear_share(step: int, n_steps: int, warmup_ratio: float) -> float:
+    """Return the share of the highest learning rate in a step, by the published trainer's linear schedule.
+
+    Steps count from 0. The first step of a warm-up has a part of the rate already, unlike in transformers' schedule.
+    """
+    n_warm = math.ceil(warmup_ratio * n_steps)
+    if step < n_warm:
+        return (step + 1) / (n_warm + 1)
+    return (n_steps - step) / max(1, n_steps - n_warm)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +29,7 @@ class LoopSettings:
     Attributes:
         learning_rate: highest learning rate, reached linearly at the end of the warm-up; it then falls linearly to 0.
         betas: betas of AdamW.
-        weight_decay: weight decay of AdamW, for matrices but not for biases and norms.
+        weight_decay: weight decay of AdamW, for all trained weights, biases and norms too.
         clip: largest norm of a step's gradient.
         warmup_ratio: share of the steps in which the learning rate rises.
         epochs: number of epochs.
@@ -66,11 +77,8 @@ class LoopSettings:
         return order[at * self.sequences_per_step : (at + 1) * self.sequences_per_step]
 
     def learning_rate_of(self, step: int, n_steps: int) -> float:
-        """Return the learning rate of a step, as in transformers' linear schedule: that of the first step is 0."""
-        n_warm = math.ceil(self.warmup_ratio * n_steps)
-        if step < n_warm:
-            return self.learning_rate * step / n_warm
-        return self.learning_rate * (n_steps - step) / max(1, n_steps - n_warm)
+        """Return the learning rate of a step."""
+        return self.learning_rate * linear_share(step, n_steps, self.warmup_ratio)
 
     def _epoch_steps(self, n_sequences: int) -> int:
         return math.ceil(n_sequences / self.sequences_per_step)

@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
 import transformers
@@ -19,6 +19,7 @@ from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.loop import Progress
 from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.recipe import Recipe
+from infthor_eval.training.schedule import linear_share
 
 __all__ = ["train_with_trainer"]
 
@@ -26,7 +27,23 @@ _WEIGHTS = "model.safetensors"
 
 
 class _SequenceTrainer(transformers.Trainer):
-    """Saves the weights of the transformers model only, with tied weights stored once, as transformers does."""
+    """Saves the weights of the transformers model only, with tied weights stored once, as transformers does.
+
+    Weight decay and schedule are those of the published trainer: all weights decay, and `linear_share`.
+    """
+
+    def get_decay_parameter_names(self, model: torch.nn.Module) -> list[str]:
+        return [name for name, _ in model.named_parameters()]
+
+    def create_scheduler(self, num_training_steps: int, optimizer: Any = None) -> Any:
+        if self.lr_scheduler is None:
+            warmup_ratio = float(self.args.warmup_steps)
+
+            def share(step: int) -> float:
+                return linear_share(step, num_training_steps, warmup_ratio)
+
+            self.lr_scheduler = torch.optim.lr_scheduler.LambdaLR(optimizer or cast(Any, self.optimizer), share)
+        return self.lr_scheduler
 
     def _save(self, output_dir: str | None = None, state_dict: dict[str, Any] | None = None) -> None:
         folder = Path(output_dir or str(self.args.output_dir))
