@@ -42,6 +42,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         max_reward: highest possible reward of a trajectory's attempted plans.
         goals: share of tasks whose goal was reached in one of their plans.
         n_actions: actions of all plans.
+        rules: name of the reward rules; None for imported counts.
         logged: totals of a trajectory as the published script logs them, by its names; empty under other rules.
     """
 
@@ -54,6 +55,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     max_reward: Rate | None
     goals: Rate | None
     n_actions: int | None
+    rules: str | None
     logged: dict[str, Rate]
 
 
@@ -80,8 +82,14 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
         max_reward=_rate_of_trajectories(acted, lambda _, most: most),
         goals=_goals(acted),
         n_actions=sum(len(record.payload.steps) for record in acted) if has_steps else None,
+        rules=_rules(config["rewards"]),
         logged=_logged(acted),
     )
+
+
+def _rules(rewards: Mapping[str, Any] | None) -> str | None:
+    """Return the name of reward rules as a run's config has them; runs of older versions do not say who scored."""
+    return None if rewards is None else str(rewards.get("scoring", "older"))
 
 
 def _logged(records: Sequence[Record]) -> dict[str, Rate]:

@@ -74,9 +74,13 @@ def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
     for *names, task in tasks:
         of_trajectory = format_number(task.reward), format_number(task.max_reward), format_percent(task.reward_share)
         totals = (format_number(task.logged.get(name)) for name in logged)
-        rows.append(Row((*names, *of_trajectory, format_percent(task.goals), *totals)))
+        rows.append(Row((*names, task.rules or "-", *of_trajectory, format_percent(task.goals), *totals)))
     of_log = (f"logged {name}" for name in logged)
-    columns = (*NAME_COLUMNS, *map(Column, ("reward", "at most", "% of it", "goals reached, %", *of_log)))
+    columns = (
+        *NAME_COLUMNS,
+        Column("rules", False),
+        *map(Column, ("reward", "at most", "% of it", "goals reached, %", *of_log)),
+    )
     notes = (_PUBLISHED_RULES,) if logged else ()
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows), notes)
 
@@ -103,4 +107,4 @@ def _is_comparable(run: RunSummary) -> bool:
 
 
 def _as_published(task: Mapping[str, Any]) -> bool:
-    return task.get("protocol") == "published" and task["rewards"]["scoring"] == "published"
+    return task.get("protocol") == "published" and task["rewards"].get("scoring") == "published"
