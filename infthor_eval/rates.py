@@ -13,7 +13,7 @@ from infthor_eval.tables import TableCell, interval_cell
 if TYPE_CHECKING:
     from infthor_eval.statistics import MeanEstimate
 
-__all__ = ["Rate", "clustered_rate", "format_number", "format_percent", "rate_over_clusters"]
+__all__ = ["Rate", "clustered_rate", "format_number", "format_percent", "paired_rate", "rate_over_clusters"]
 
 
 class Rate(msgspec.Struct, frozen=True):
@@ -37,6 +37,13 @@ def rate_over_clusters(values: Sequence[float]) -> Rate | None:
     from infthor_eval.statistics import mean_over_clusters
 
     return _rate(mean_over_clusters(values)) if values else None
+
+
+def paired_rate(first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]) -> Rate | None:
+    """Return the mean difference of paired values, second minus first (see `paired_difference`); None without any."""
+    from infthor_eval.statistics import paired_difference
+
+    return _rate(paired_difference(first, second, clusters).estimate) if first else None
 
 
 def format_percent(rate: Rate | None) -> TableCell:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 from infthor_eval.episodes.errors import InfeasibleError
@@ -23,7 +24,7 @@ from infthor_eval.thor.transfer import transfer
 from infthor_eval.thor.view import AgentPose, ArmState, SimulatorView, ThorObject, Vector
 from model_adapters import ArmDelta
 
-__all__ = ["ArmEnvironment", "ArmOutcome", "Grasp", "arm_of"]
+__all__ = ["ArmEnvironment", "ArmOutcome", "Closing", "Grasp", "Hand", "Stand", "arm_of"]
 
 _MAX_WAITS = 20  # until a released object lies still
 _HALVINGS = 8  # of the range of heights, to half a centimetre
@@ -31,11 +32,37 @@ _HELD_GAP = 0.02  # metres between the palm and an object that is held before it
 _PLACES = 5  # places between there and the centre of the sphere that are tried
 
 
+class Stand(StrEnum):
+    """Where the agent stands at the start: where the expert does, or did before the way there."""
+
+    EXPERT = "expert"
+    BEFORE = "before"
+
+
+class Closing(StrEnum):
+    """When a policy's hand closes in a pick-up: when it says so, with each step, or once at the end."""
+
+    ASKED = "asked"
+    ALWAYS = "always"
+    END = "end"
+
+
+class Hand(StrEnum):
+    """The height of the arm's base at the start of a pick-up: at rest, the lowest, the highest."""
+
+    REST = "rest"
+    LOW = "low"
+    HIGH = "high"
+
+
 @dataclass(frozen=True)
 class Grasp:
-    """How a hand closes and opens.
+    """How an episode begins, and how the hand closes and opens in it.
 
     Attributes:
+        stand: where the agent stands at the start.
+        hand: where its hand is at the start of a pick-up.
+        closing: when a policy's hand closes in a pick-up.
         radius: radius of its sphere, metres.
         takes_all: whether it takes everything in the sphere, or the target alone.
         at_palm: whether the object to put is held before the palm, or in the centre of the sphere if there is room.
@@ -46,6 +73,9 @@ class Grasp:
     takes_all: bool = False
     at_palm: bool = False
     threshold: float = 0.5
+    stand: Stand = Stand.EXPERT
+    hand: Hand = Hand.REST
+    closing: Closing = Closing.ASKED
 
 
 @dataclass(frozen=True)
@@ -110,12 +140,15 @@ class ArmEnvironment:
         if missing:
             raise InfeasibleError(f"{min(map(str, missing))} cannot be brought to where it was")
         self._target = start.view.objects[start.receptacle_id or start.object_id]
-        pose = start.view.agent
+        pose = start.view.agent if grasp.stand is Stand.EXPERT else start.before_the_way
         # An agent with an arm has another height than the default one, so the expert's y is not taken over.
         position = Vector(pose.position.x, view.agent.position.y, pose.position.z)
         self._require(teleport_call(AgentPose(position, pose.rotation, pose.horizon, view.agent.standing)))
         if episode.kind == ManipulationKind.PUT:
             self._put_in_hand(start.object_id, start.view)
+        elif grasp.hand is not Hand.REST:
+            # Where something is in the way, the arm stays as near as it comes.
+            self._simulator.step("MoveArmBase", y=float(grasp.hand is Hand.HIGH), returnToStart=False)
         view = self._require({"action": "SetHandSphereRadius", "radius": grasp.radius})
         self.starts_inside = start.object_id in arm_of(view).pickupable
         self._is_over = False
@@ -167,8 +200,21 @@ class ArmEnvironment:
     def _gripper(self, delta: ArmDelta) -> list[Call]:
         """Return the calls of the gripper: it closes around something, or releases what it holds."""
         arm = arm_of(self._simulator.view)
+        picks_up = self.episode.kind == ManipulationKind.PICKUP
+        if picks_up and self._grasp.closing is not Closing.ASKED:
+            return self.closing_calls() if self._grasp.closing is Closing.ALWAYS else []
         if delta.gripper >= self._grasp.threshold:
             return [{"action": "ReleaseObject"}] if arm.held else []
+        return self.closing_calls()
+
+    @property
+    def closes_at_the_end(self) -> bool:
+        """Whether a policy's hand closes once, after its last step."""
+        return self.episode.kind == ManipulationKind.PICKUP and self._grasp.closing is Closing.END
+
+    def closing_calls(self) -> list[Call]:
+        """Return the calls with which the hand closes around what is in its sphere; none if nothing is."""
+        arm = arm_of(self._simulator.view)
         if self._grasp.takes_all:
             return [{"action": "PickupObject"}] if arm.pickupable else []
         target = self.start.object_id

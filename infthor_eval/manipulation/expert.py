@@ -11,9 +11,11 @@ from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import SimulatorView
+from infthor_eval.thor.view import AgentPose, SimulatorView
 
 __all__ = ["EpisodeStart", "ExpertStates", "replay_expert"]
+
+_WALKING = {"MoveAhead", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
 
 
 @dataclass(frozen=True)
@@ -24,10 +26,12 @@ class EpisodeStart:
         view: the world at that time.
         object_id: id of the object that is picked up or put, in this simulator.
         receptacle_id: id of the receptacle that it is put into; None for pick-ups.
+        before_the_way: pose of the expert before it walked and looked to where it picks up or puts.
     """
 
     view: SimulatorView
     object_id: str
+    before_the_way: AgentPose
     receptacle_id: str | None = None
 
 
@@ -61,8 +65,12 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
     restore(simulator, trajectory.scene)
     grounding = Grounding(simulator.view)
     starts: dict[int, EpisodeStart] = {}
+    walked_from, walks = simulator.view.agent, False
     for number, low in enumerate(trajectory.plan.low_actions):
         before = simulator.view
+        walked, walks = walks, low.api_action.action in _WALKING
+        if walks and not walked:
+            walked_from = before.agent
         try:
             call = translate(low, grounding, before)
         except MissingObjectError as error:
@@ -72,9 +80,9 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
             return ExpertStates(starts, _refusal(number, low, after.error or "refused without a message"))
         kind = EXPERT_ACTIONS.get(low.api_action.action)
         if kind == ManipulationKind.PICKUP:
-            starts[number] = EpisodeStart(before, call["objectId"])
+            starts[number] = EpisodeStart(before, call["objectId"], walked_from)
         elif kind == ManipulationKind.PUT:
-            starts[number] = EpisodeStart(before, before.inventory[0], call["objectId"])
+            starts[number] = EpisodeStart(before, before.inventory[0], walked_from, call["objectId"])
     return ExpertStates(starts)
 
 

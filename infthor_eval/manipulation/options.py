@@ -18,6 +18,24 @@ class ManipulationOptions(SimulatorOptions):
         default=None,
         metadata={"help": "Radius of the hand's magnet, metres, a run with each.", "metavar": "R,...", "each": True},
     )
+    stand: str | None = field(
+        default=None,
+        metadata={
+            "choices": ("expert", "before"),
+            "help": "Where the agent stands at the start: the expert's place, or that before the way to it.",
+        },
+    )
+    hand: str | None = field(
+        default=None,
+        metadata={"choices": ("rest", "low", "high"), "help": "Height of the arm at the start of a pick-up."},
+    )
+    closing: str | None = field(
+        default=None,
+        metadata={
+            "choices": ("asked", "always", "end"),
+            "help": "When a policy's hand closes in a pick-up: when it says so, with each step, or once at the end.",
+        },
+    )
     instruction: str | None = field(
         default=None,
         metadata={

@@ -87,9 +87,14 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         """Let the actor act until the episode is over; the steps of a chunk are executed before it is asked again."""
         steps: list[ArmStep] = []
         chunk: list[Step] = []
+        step: Step = ()
         while outcome.ended is None:
             if len(steps) >= max_steps:
-                return steps, ArmEnded.LIMIT
+                if isinstance(step, ArmDelta) and environment.closes_at_the_end:
+                    closing = environment.closing_calls()
+                    outcome = environment.step(closing)
+                    steps.append(_arm_step(closing, outcome))
+                return steps, outcome.ended or ArmEnded.LIMIT
             chunk = chunk or list(self._actor.act(outcome.frame))
             if not chunk:
                 return steps, ArmEnded.GAVE_UP

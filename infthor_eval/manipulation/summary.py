@@ -32,6 +32,7 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         closest: smallest distance from the sphere's centre to the target, metres, mean over episodes.
         steps: steps of an episode, mean.
         collisions: collisions of an episode, mean.
+        outcomes: success of each episode by its id, 1 or 0; ids begin with the trajectory. Runs are paired by them.
     """
 
     kind: str
@@ -41,6 +42,7 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     closest: float | None
     steps: float | None
     collisions: float | None
+    outcomes: dict[str, float]
 
 
 ManipulationSummary = EpisodesSummary[ArmTaskSummary]
@@ -64,6 +66,7 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Arm
         closest=_mean([record.payload.closest for record in acted]),
         steps=_mean([len(record.payload.steps) for record in acted]),
         collisions=_mean([record.payload.n_collisions for record in acted]),
+        outcomes={record.id: float(record.payload.done) for record in counted},
     )
 
 

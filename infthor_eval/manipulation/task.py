@@ -9,7 +9,7 @@ from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.household.wording import canonical_type, noun
 from infthor_eval.manipulation.conversion import Conversion
-from infthor_eval.manipulation.environment import Grasp
+from infthor_eval.manipulation.environment import Closing, Grasp, Hand, Stand
 from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, read_arm_trajectory
@@ -22,7 +22,15 @@ _INSTRUCTIONS = {
     ManipulationKind.PICKUP: "pick up the {object}",
     ManipulationKind.PUT: "put the {object} in the {receptacle}",
 }
-_CHOICES = {"kind": tuple(ManipulationKind), "grasps": ("target", "all"), "hold": ("middle", "palm")}
+_CHOICES = {
+    "kind": tuple(ManipulationKind),
+    "grasps": ("target", "all"),
+    "hold": ("middle", "palm"),
+    "stand": tuple(map(str, Stand)),
+    "hand": tuple(map(str, Hand)),
+    "closing": tuple(map(str, Closing)),
+}
+_GIVEN = ("instruction", "stand", "hand", "closing")  # settings that are options too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +47,9 @@ class ArmTaskSettings:
         field_of_view: field of view of the camera, degrees.
         grasps: whether the hand takes the "target" alone out of its sphere, or "all" objects in it.
         hold: where the object to put is held: in the "middle" of the sphere if there is room, or before the "palm".
+        stand: where the agent stands at the start, see `Stand`.
+        hand: height of its arm at the start of a pick-up, see `Hand`.
+        closing: when a policy's hand closes in a pick-up, see `Closing`.
         gripper_threshold: value of a policy's gripper below which the hand closes; else it opens.
         translation_scale: see `Conversion`.
         max_step: see `Conversion`.
@@ -56,6 +67,9 @@ class ArmTaskSettings:
     field_of_view: float = 60.0
     grasps: str = "target"
     hold: str = "middle"
+    stand: str = Stand.EXPERT
+    hand: str = Hand.REST
+    closing: str = Closing.ASKED
     gripper_threshold: float = 0.5
     translation_scale: float = 1.0
     max_step: float = 0.1
@@ -71,7 +85,15 @@ class ArmTaskSettings:
     @property
     def grasp(self) -> Grasp:
         """How the hand closes and opens."""
-        return Grasp(self.radius, self.grasps == "all", self.hold == "palm", self.gripper_threshold)
+        return Grasp(
+            radius=self.radius,
+            takes_all=self.grasps == "all",
+            at_palm=self.hold == "palm",
+            threshold=self.gripper_threshold,
+            stand=Stand(self.stand),
+            hand=Hand(self.hand),
+            closing=Closing(self.closing),
+        )
 
     @property
     def camera(self) -> tuple[int, float]:
@@ -95,7 +117,8 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             DataError: the file is malformed, or none of its trajectories can be used.
         """
         file.require("dataset_kwargs")
-        given = {"radius": request.options.radius_metres, "instruction": request.options.instruction}
+        given = {"radius": request.options.radius_metres}
+        given |= {name: getattr(request.options, name) for name in _GIVEN}
         settings = task_settings(file, ArmTaskSettings, given, _CHOICES)
         self.kind = ManipulationKind(settings.kind)
         self._template = _INSTRUCTIONS[self.kind] if settings.instruction is None else settings.instruction
@@ -127,6 +150,9 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             kind=str(self.kind),
             radius=self.settings.radius,
             instruction=self.settings.instruction,
+            stand=self.settings.stand,
+            hand=self.settings.hand,
+            closing=self.settings.closing,
         )
 
     def _check_instruction(self, name: str) -> None:

@@ -106,7 +106,7 @@ def test_table_6_has_the_published_columns_and_rows():
     found = table("Low-level manipulation, success %", run())
     names = [column.name for column in found.columns]
     assert names == ["model", "radius, m", "Pick-up", "Put", "pick-ups", "puts", "trajectories", "excluded", "skipped",
-                     "failed"]  # fmt: skip
+                     "failed", "Pick-up above still", "Put above still"]  # fmt: skip
     published = [cells(row, found) for row in found.rows if row.is_published]
     assert [(row["model"], row["radius, m"], row["Pick-up"], row["Put"]) for row in published] == [
         ("OpenVLA 7B", "published, Table 6", "3.82", "6.38"),
@@ -154,10 +154,23 @@ def test_episodes_and_endings_have_a_row_per_task():
     assert (pick["step limit"], pick["released elsewhere"], put["released elsewhere"]) == ("1", "0", "1")
 
 
+def test_success_above_the_floor_is_that_of_the_same_episodes():
+    endings = {("a", 1): "done", ("a", 2): "done", ("b", 1): "gave up", ("b", 2): "done"}
+    policy = [episode(*key, ended) for key, ended in endings.items()]
+    still = [episode("a", 1), *(episode(*key, "gave up") for key in [("a", 2), ("b", 1)]), episode("b", 7)]
+    own_row, floor = own(table("Low-level", run(records=policy), run("still", still)))
+    assert own_row["Pick-up above still"].startswith("33.3 [")  # of the three that both have: 2 against 1
+    assert (own_row["Put above still"], floor["Pick-up above still"]) == ("-", "-")
+    (alone,) = own(table("Low-level", run(records=policy)))
+    assert alone["Pick-up above still"] == "-"
+    elsewhere, _ = own(table("Low-level", run(records=policy), run("still", still, radius=0.06)))
+    assert elsewhere["Pick-up above still"] == "-"
+
+
 def test_what_is_left_out_is_told_with_its_reason():
     broken = [("b.json", "b.json: not a trajectory"), ("c.json", "c.json: not a trajectory")]
     found = table("Low-level", run(broken=broken))
-    assert found.notes[1:] == (
+    assert found.notes[1:-1] == (
         "1 left out: b.json: not a trajectory",  # once, though both tasks read the file
         "1 left out: c.json: not a trajectory",
         "2 left out: no such scene",  # a pick-up and a put
@@ -169,7 +182,7 @@ def test_what_is_left_out_is_told_with_its_reason():
 def test_many_reasons_are_counted_at_the_end():
     records = [episode("a", index, "", excluded=f"reason {index}") for index in range(8)]
     notes = table("Low-level", run(records=records)).notes
-    assert notes[1:] == (*(f"1 left out: reason {index}" for index in range(5)), "3 more reasons to leave out")
+    assert notes[1:-1] == (*(f"1 left out: reason {index}" for index in range(5)), "3 more reasons to leave out")
 
 
 def test_an_episode_that_ended_scores_and_no_other_does():
