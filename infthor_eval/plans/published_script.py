@@ -38,14 +38,17 @@ class PublishedReward:
         """Return the reward of an agent's action; see `PlanReward.after`.
 
         A put into a receptacle counts as refused, though it was carried out: the script binds its event to a name of
-        another spelling, and takes the error that follows for a failure.
+        another spelling, and takes the error that follows for a failure. Switching on or off is refused, as the script
+        sends `ToggleObject`, which AI2-THOR does not have.
 
         Raises:
             UnscoredError: the published functions raise an exception.
         """
-        if not after.success or (call["action"] == "PutObject" and "objectId" in call):
+        action = call["action"]
+        fails = (action == "PutObject" and "objectId" in call) or action.startswith("ToggleObject")
+        if fails or not after.success:
             return StepReward(failed=True)
-        earned = self._task.transition(PublishedState.of(after, call["action"]), target=self._sub_goal)
+        earned = self._task.transition(PublishedState.of(after, action), target=self._sub_goal)
         self.goal_reached = self._task.goal_reached
         return StepReward(earned.reward, done=earned.plan_done)
 
@@ -100,12 +103,14 @@ class PublishedScript:
         self._stopped: UnscoredError | None = None
 
     def plan(self, index: int) -> ScriptedPlan:
-        """Return a plan of a task that the expert has passed.
+        """Return a plan that the expert has passed.
 
         Raises:
-            UnscoredError: the published functions raise an exception before its end.
+            UnscoredError: the published functions raise an exception before its end, or the plan belongs to no task.
         """
-        passed = self._passed[index]
+        passed = self._passed.get(index)
+        if passed is None:
+            raise UnscoredError(f"plan {index} belongs to no task, and the published loop never comes to it")
         if isinstance(passed, UnscoredError):
             raise passed
         return passed

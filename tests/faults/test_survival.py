@@ -15,6 +15,7 @@ import pytest
 import torch
 from PIL import Image
 
+from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.trajectory import DiscreteAction, HighAction, PlannerAction
 from infthor_eval.generation.replay_set import select
@@ -290,7 +291,8 @@ def test_a_file_that_cannot_be_read_leaves_the_others_to_be_replayed(tmp_path, d
 @pytest.mark.parametrize("action", ["{0.__class__}", "{", "{0:>9999999999}", "{missing}", "%s{}"])
 def test_a_format_string_in_a_plan_is_a_name(action):
     high = HighAction(0, DiscreteAction(action, ["mug"]), PlannerAction("x"))
-    assert plan_text(high) == action
+    assert plan_text(high, Words.NATURAL) == action
+    assert plan_text(high, Words.PUBLISHED) == ""
 
 
 def test_sigterm_leaves_no_temporary_folder(tmp_path):

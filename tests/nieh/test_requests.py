@@ -22,7 +22,7 @@ EXPECTED = {
     "nieh_haystack_64k": (0, 679, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
     "nieh_haystack_8k": (400, 279, "8d5f7a8b011595f0ab9f33bfa590099e"),
     "nieh_interleaved": (147, 0, "44df0f029b634401540af5abd2c77542"),
-    "nieh_interleaved_plans": (147, 0, "723140f33dd714c4d35ffc709c8ea732"),
+    "nieh_interleaved_plans": (147, 0, "9928243b774bb7338ab1bae2fdb881c2"),
     "nieh_memory_notes": (147, 0, "c022851edaa5c40a81fbd6cc40c20e71"),
     "nieh_text_state": (147, 0, "4c6677eb853621bf163d66feb549d6e5"),
     "nieh_truncate_head_128k": (147, 0, "6198fc625078c68495aa339150f419ab"),

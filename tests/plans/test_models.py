@@ -184,6 +184,26 @@ def test_replies_are_held_to_what_is_possible_where_that_is_asked(acting, brief)
     assert not {"no action", "unknown object", "not in view", "not possible"} & set(endings(outcome))
 
 
+@pytest.mark.parametrize(("trained", "n_warnings"), [("natural", 1), ("published", 0), (None, 0)])
+def test_a_checkpoint_that_was_trained_on_other_words_is_told_of(prepared, trained, n_warnings):
+    run, model = prepared(QWEN), ScriptedModel(lambda *_: "")
+    model.identity = lambda: {} if trained is None else {"trained_words": trained}
+    warnings = run.evaluation.bind(model).workload.warnings
+    assert len(warnings) == n_warnings
+    assert all(text.endswith("is asked in published ones; give --words natural") for text in warnings)
+
+
+@pytest.mark.parametrize("words", ["published", "natural"])
+def test_plans_and_actions_are_in_the_words_that_are_asked_for(acting, data, words):
+    (trajectory,) = iter_trajectories(data)
+    plans = plans_of(trajectory, Words(words))
+    known = {plan.text: expert_texts(trajectory, plan, Words(words)) for plan in plans}
+    outcome, model = acting(lambda parts, _: known[plan_asked(parts)][len(done_so_far(parts))], words=words)
+    assert set(endings(outcome)) == {"done"}
+    assert {plan_asked(parts) for parts, _ in model.asked} == set(known)
+    assert [record.payload.plan for record in outcome.records] == list(known)
+
+
 def test_a_preamble_is_told_before_everything_else(acting, task_files, data):
     (task_files / "plans" / "infthor_plans.yaml").write_text(
         "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {preamble: 'You are a robot. '}\n"

@@ -59,6 +59,7 @@ def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterab
     model = draw_model(_config(recipe, ids, len(tokenizer)), recipe.seed, ids["<|im_end|>"], ids["<|endoftext|>"])
     processor = image_processor()
     family = Qwen25VLFamily(model, processor, tokenizer)
+    family.video = None  # it is trained on no film
     return assemble(
         model,
         tokenizer,
