@@ -3,7 +3,7 @@
     python benchmarks/plan_rewards.py [--more FILE] [--scenes FOLDER] [--out FOLDER]
 
 It runs planner, random, scripted and history on the bundled set with the command line, under both sets of rules; with
---more also the planner on another file of trajectories, in recorded floor plans if they are given. The same command
+--more also on another file of trajectories, in recorded floor plans if they are given. The same command
 with the same --out resumes.
 """
 
@@ -36,7 +36,7 @@ def main() -> None:
         for rules in _RULES if options.more is not None else ():
             scenes = [] if options.scenes is None else ["--scenes", str(options.scenes)]
             given = ["--tasks", "infthor_plans", "--data", str(options.more), *scenes]
-            for name, task in run(("planner",), rules, out / f"{rules}-more", given):
+            for name, task in run(_BASELINES, rules, out / f"{rules}-more", given):
                 print(_row(f"{options.more.stem}, {name}", rules, task))
 
 
@@ -66,7 +66,7 @@ def _row(name: str, rules: str, task: PlanTaskSummary) -> str:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--more", type=Path, help="trajectories that the planner repeats too")
+    parser.add_argument("--more", type=Path, help="further trajectories")
     parser.add_argument("--scenes", type=Path, help="recorded floor plans for them")
     parser.add_argument("--out", type=Path, help="folder of the runs")
     return parser.parse_args()
