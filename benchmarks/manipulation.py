@@ -1,19 +1,23 @@
-"""Measure baselines of arms on the pick-ups and puts of long trajectories, by the radius of the hand's sphere.
+"""Measure baselines of arms on the pick-ups and puts of long trajectories, by the sphere's radius and by the protocol.
 
-    python benchmarks/manipulation.py --trajectories DIR [--data FOLDER] [--episodes 300] [--radii 0.06,0.5] [--out DIR]
+    python benchmarks/manipulation.py --trajectories DIR [--data FOLDER] [--episodes 300] [--radii 0.06,0.5]
+        [--protocols default,stand=before,hand=low] [--out DIR]
 
 It takes trajectories evenly spaced in DIR until they have enough pick-ups and puts. It runs planner-arm, still and
-random-arm on them with the command line, for each radius. It prints what stopped planner-arm in episodes without
-success. The same command with the same --out resumes.
+random-arm on them with the command line, for each radius and each protocol: options of `infthor-eval` with their
+values, joined by +. It prints what stopped planner-arm in episodes without success. The same command with the same
+--out resumes.
 """
 
 import argparse
+import math
 import re
 import subprocess
 import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 
 from infthor_eval.formats.trajectory import TrajectorySource, iter_sources
@@ -39,9 +43,10 @@ def main() -> None:
         if not data.exists():
             lines = (source.raw.replace(b"\n", b" ").strip() + b"\n" for source in choose_trajectories(options))
             data.write_bytes(b"".join(lines))
-        for radius in options.radii.split(","):
-            for name in _BASELINES:
-                show(name, radius, run(name, radius, data, out, options))
+        for radius, protocol in product(options.radii.split(","), options.protocols.split(",")):
+            # Baselines but random-arm close their hand themselves, so that --closing would change nothing.
+            for name in ("random-arm",) if protocol.startswith("closing=") else _BASELINES:
+                show(name, radius, protocol, run(name, radius, protocol, data, out, options))
 
 
 def _arguments() -> argparse.Namespace:
@@ -50,6 +55,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--data", type=Path, help="folder of recorded floor plans")
     parser.add_argument("--episodes", type=int, default=300, help="minimum number of episodes of each kind")
     parser.add_argument("--radii", default="0.5", help="radii of the hand's sphere in metres, separated by commas")
+    parser.add_argument("--protocols", default="default", help="such as default,stand=before,stand=before+hand=low")
     parser.add_argument("--out", type=Path, help="folder of the results; default: temporary")
     return parser.parse_args()
 
@@ -59,6 +65,8 @@ def choose_trajectories(options: argparse.Namespace) -> Iterator[TrajectorySourc
     every = list(iter_sources(options.trajectories))
     counts: Counter[ManipulationKind] = Counter()
     step = max(1, round(len(every) * 0.618))  # the golden ratio spreads them over the scenes
+    while math.gcd(step, len(every)) > 1:  # else some would come twice
+        step += 1
     for number in range(len(every)):
         source = every[number * step % len(every)]
         counts.update(episode.kind for episode in arm_episodes(source.read()))
@@ -67,11 +75,12 @@ def choose_trajectories(options: argparse.Namespace) -> Iterator[TrajectorySourc
             return
 
 
-def run(name: str, radius: str, data: Path, out: Path, options: argparse.Namespace) -> Path:
+def run(name: str, radius: str, protocol: str, data: Path, out: Path, options: argparse.Namespace) -> Path:
     """Run a baseline and return the folder of its run."""
-    results = out / f"radius-{radius}"
+    results = out / f"radius-{radius}" / protocol
+    settings = [] if protocol == "default" else [f"--{setting}" for setting in protocol.split("+")]
     scenes = ["--scenes", str(options.data)] if options.data else []
-    arguments = ["--tasks", "manipulathor", "--data", data, "--radius", radius, "--output", results, *scenes]
+    arguments = ["--tasks", "manipulathor", "--data", data, "--radius", radius, *settings, "--output", results, *scenes]
     command = [Path(sys.executable).with_name("infthor-eval"), "run", "--model", name, *arguments]
     result = subprocess.run(list(map(str, command)), check=False, stdout=subprocess.DEVNULL)
     folders = list((results / name).glob("manipulathor-*"))
@@ -80,7 +89,7 @@ def run(name: str, radius: str, data: Path, out: Path, options: argparse.Namespa
     return folders[0]
 
 
-def show(name: str, radius: str, folder: Path) -> None:
+def show(name: str, radius: str, protocol: str, folder: Path) -> None:
     """Print one line per kind, and what stopped the upper bound."""
     header, records = read_run(folder, ManipulationSuite.records)
     summary = ManipulationSuite().summarise(header, records)
@@ -90,8 +99,8 @@ def show(name: str, radius: str, folder: Path) -> None:
         seconds = sum(record.seconds for record in same)
         steps = sum(len(record.payload.steps) for record in same)
         print(
-            f"{name:12} radius {radius:5} {kind:7} {len(same):4} episodes, success {format_percent(about.success):24}"
-            f" in the sphere at the start {format_percent(about.inside):24}"
+            f"{name:12} radius {radius:5} {protocol:14} {kind:7} {len(same):4} episodes,"
+            f" success {format_percent(about.success):24} in the sphere at the start {format_percent(about.inside):24}"
             f" {steps} steps, {seconds / max(1, len(same)):.2f} s"
             f" an episode, {sum(about.excluded.values())} excluded, {about.n_failed} failed",
             flush=True,

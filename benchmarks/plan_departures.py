@@ -22,17 +22,22 @@ import msgspec
 import networkx as nx
 
 from infthor_eval.cli.main import main as command
+from infthor_eval.household.goals import goal_holds
+from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans import task as plans_task
 from infthor_eval.plans.plan import PlanKind
+from infthor_eval.plans.published_goals import Treated
 from infthor_eval.plans.published_paths import PublishedPaths
-from infthor_eval.plans.published_rewards import PublishedState, PublishedTask, Transition
+from infthor_eval.plans.published_rewards import PublishedState, PublishedTask, Transition, pose_of
 from infthor_eval.plans.published_script import PublishedReward, PublishedScript
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.rewards import StepReward
 from infthor_eval.plans.suite import PlansSuite
 from infthor_eval.runs import read_run
+from infthor_eval.thor.view import SimulatorView
 
 _BASELINES = ("planner", "random", "scripted", "history")
+_NONE = Treated()
 Patch = contextlib.AbstractContextManager[Any]
 
 
@@ -126,12 +131,14 @@ def _own_task_from_the_true_start() -> Patch:
 
 
 def _goal_pays_when_it_begins_to_hold() -> Patch:
-    def transition(task: PublishedTask, state: PublishedState, *given: Any, target: int | None = None) -> Transition:
+    def transition(
+        task: PublishedTask, state: PublishedState, treated: Treated = _NONE, target: int | None = None
+    ) -> Transition:
         held = vars(task).get("held_before")
         if held is None:
-            held = task.__dict__["held_before"] = task._goal_holds(task.previous, _nothing())
+            held = task.__dict__["held_before"] = task._goal_holds(task.previous, _NONE)
         task.goal_reached = False
-        earned = original(task, state, *given, target=target)
+        earned = original(task, state, treated, target)
         if held:
             earned = earned._replace(reward=earned.reward - task.rules.task_done * task.goal_reached)
         task.__dict__["held_before"] = held or task.goal_reached
@@ -141,12 +148,6 @@ def _goal_pays_when_it_begins_to_hold() -> Patch:
     return mock.patch.object(PublishedTask, "transition", transition)
 
 
-def _nothing() -> Any:
-    from infthor_eval.plans.published_goals import Treated
-
-    return Treated()
-
-
 def _puts_count() -> Patch:
     def after(plan: PublishedReward, call: Mapping[str, Any], before: Any, view: Any) -> StepReward:
         without_id = {name: value for name, value in call.items() if name != "objectId"}
@@ -154,6 +155,88 @@ def _puts_count() -> Patch:
 
     original = PublishedReward.after
     return mock.patch.object(PublishedReward, "after", after)
+
+
+def _switches_count() -> Patch:
+    def after(plan: PublishedReward, call: Mapping[str, Any], before: Any, view: Any) -> StepReward:
+        if not call["action"].startswith("ToggleObject") or not view.success:
+            return original(plan, call, before, view)
+        earned = plan._task.transition(PublishedState.of(view, call["action"]), target=plan._sub_goal)
+        return StepReward(earned.reward, done=earned.plan_done)
+
+    original = PublishedReward.after
+    return mock.patch.object(PublishedReward, "after", after)
+
+
+def _every_plan_by_its_own_rule() -> Patch:
+    def transition(
+        task: PublishedTask, state: PublishedState, treated: Treated = _NONE, target: int | None = None
+    ) -> Transition:
+        if target == 0:
+            task.goal_index = 0
+        return original(task, state, treated, target)
+
+    original = PublishedTask.transition
+    return mock.patch.object(PublishedTask, "transition", transition)
+
+
+def _states_that_the_action_brought() -> Patch:
+    def state_reward(task: PublishedTask, step: Any, kind: PlanKind, is_done: Any) -> tuple[float, bool]:
+        key = task.plan[step.index].planner_action.object_id
+        now, was = step.state.objects.get(key), step.before.objects.get(key)
+        if kind == PlanKind.TOGGLE:
+            return task._pay(kind, now is not None and was is not None and now.is_toggled != was.is_toggled)
+        if kind == PlanKind.SLICE and now is None:  # AI2-THOR 5 drops what was cut
+            return task._pay(kind, was is not None)
+        return task._pay(kind, now is not None and is_done(now) and not (was is not None and is_done(was)))
+
+    return mock.patch.object(PublishedTask, "_state_reward", state_reward)
+
+
+def _alfreds_treatments_and_goals() -> Patch:
+    """Track washing, heating and cooling through the whole task, and test the goals as ALFRED does."""
+
+    def of(view: SimulatorView, last_action: str) -> PublishedState:
+        state = PublishedState(last_action, pose_of(view), view.inventory, view.objects)
+        state.__dict__["view"] = view
+        return state
+
+    def new_task(script: PublishedScript, number: int) -> PublishedTask:
+        task = new(script, number)
+        tracked = vars(script).setdefault("tracked", {}).get(number, Treatments())
+        task.__dict__.update(goal=script._tasks[number].task, treatments=tracked)
+        return task
+
+    def pass_plan(script: PublishedScript, plan: Any, replayed: Any) -> None:
+        passed(script, plan, replayed)
+        tracked = vars(script).setdefault("tracked", {})
+        for action, view, *_ in replayed:
+            now = tracked.get(plan.task, Treatments())
+            tracked[plan.task] = now.after(action.call["action"], action.call.get("objectId"), view)
+
+    def goal_holds_in(task: PublishedTask, state: PublishedState, _: Treated) -> bool:
+        here = vars(task)
+        here["treatments"] = _treated_with(here["treatments"], task.previous, state)
+        return goal_holds(here["goal"], vars(state)["view"], here["treatments"])
+
+    new, passed = PublishedScript._new_task, PublishedScript.pass_plan
+    patches = contextlib.ExitStack()
+    patches.enter_context(mock.patch.object(PublishedState, "of", of))
+    patches.enter_context(mock.patch.object(PublishedScript, "_new_task", new_task))
+    patches.enter_context(mock.patch.object(PublishedScript, "pass_plan", pass_plan))
+    patches.enter_context(mock.patch.object(PublishedTask, "_goal_holds", goal_holds_in))
+    return patches
+
+
+def _treated_with(treatments: Treatments, before: PublishedState, now: PublishedState) -> Treatments:
+    """Return the treatments after an action: whatever was switched on or closed by it acts on what is in it."""
+    for key, item in now.objects.items():
+        was = before.objects.get(key)
+        switched = was is not None and item.is_toggled and not was.is_toggled
+        closed = was is not None and was.is_open and not item.is_open
+        if switched or closed:
+            treatments = treatments.after("ToggleObjectOn" if switched else "CloseObject", key, vars(now)["view"])
+    return treatments
 
 
 def _opening_pays_for_the_receptacle_alone() -> Patch:
@@ -177,6 +260,10 @@ _MENDINGS: Mapping[str, Callable[[], Patch]] = {
     "the goal pays when it begins to hold": _goal_pays_when_it_begins_to_hold,
     "opening pays for the receptacle alone": _opening_pays_for_the_receptacle_alone,
     "puts count": _puts_count,
+    "switches count": _switches_count,
+    "every plan by its own rule": _every_plan_by_its_own_rule,
+    "states that the action brought": _states_that_the_action_brought,
+    "ALFRED's treatments and goals": _alfreds_treatments_and_goals,
     "strict grounding": partial(_with_rules, grounding="strict"),
     "no forceAction": partial(_with_rules, force_action=False),
 }

@@ -13,6 +13,7 @@ from infthor_eval.report.figures.curves import draw_curves
 
 from ..plans.made_runs import made_run, plan, planner_run
 
+MODELS = ("qwen", "qwen-ft32k", "qwen-ft64k", "qwen-ft130k")
 EXAMPLE = Path(__file__).parents[2] / "docs" / "figure7_panels.yaml"
 
 
@@ -123,9 +124,9 @@ def test_panels_of_another_form_are_refused(tmp_path, content):
         read_panels(file, plan_curves(runs()))
 
 
-def test_the_example_names_five_panels_for_runs_of_its_names():
-    names = ["qwen", "qwen-yarn2", "qwen-yarn4", "qwen-linear2", "qwen-dynamic2", "qwen-ft32k", "qwen-ft64k"]
-    curves = plan_curves([made_run(name, records(1.0)) for name in [*names, "qwen-ft64k-yarn2"]])
-    panels = read_panels(EXAMPLE, curves)
-    assert len(panels) == 5
-    assert {label for panel in panels for label in panel.labels} == {*names, "qwen-ft64k-yarn2"}
+def test_the_example_has_six_panels_with_the_published_settings():
+    extended = [f"{model}-{method}4" for model in MODELS for method in ("dynamic", "longrope", "yarn")]
+    names = {*MODELS, *extended, "qwen-ft130k-yarn8"}
+    panels = read_panels(EXAMPLE, plan_curves([made_run(name, records(1.0)) for name in sorted(names)]))
+    assert len(panels) == 6
+    assert {label for panel in panels for label in panel.labels} == names
