@@ -7,7 +7,7 @@ from transformers import LlavaConfig
 from transformers.models.pixtral.image_processing_pil_pixtral import PixtralImageProcessorPil
 
 from model_adapters.hf.families.pixtral import PixtralFamily
-from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin, text_config
+from model_adapters.tiny.twin import HEAD, SPREAD, TinyAdapter, Twin, text_config
 
 __all__ = ["PixtralTiny"]
 
@@ -38,7 +38,7 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
             ids["</s>"],
             ids["<pad>"],
             model_type="mistral",
-            head_dim=16,
+            head_dim=HEAD,
             max_position_embeddings=131_072,
             sliding_window=None,
             bos_token_id=ids["<s>"],

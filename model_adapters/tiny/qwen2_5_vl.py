@@ -9,7 +9,7 @@ from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLIm
 
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.options.tiny import Qwen25VLTinyOptions
-from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin, text_config
+from model_adapters.tiny.twin import HIDDEN, SPREAD, TinyAdapter, Twin, text_config
 
 __all__ = ["SPECIAL", "Qwen25VLTiny", "save_tiny_checkpoint"]
 
@@ -63,14 +63,14 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
             ids["<|im_end|>"],
             ids["<|endoftext|>"],
             max_position_embeddings=128_000,
-            rope_parameters={"rope_type": "default", "rope_theta": 1e6, "mrope_section": [2, 3, 3]},
+            rope_parameters={"rope_type": "default", "rope_theta": 1e6, "mrope_section": [4, 6, 6]},
         ),
         vision_config={
             "depth": 2,
             "hidden_size": 32,
             "intermediate_size": 64,
             "num_heads": 2,
-            "out_hidden_size": 64,
+            "out_hidden_size": HIDDEN,
             "fullatt_block_indexes": [1],
             "initializer_range": SPREAD,
         },

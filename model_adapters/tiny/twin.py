@@ -18,11 +18,14 @@ from model_adapters.hf.templates import plain_template
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = ["SPREAD", "TinyAdapter", "Twin", "draw_model", "siglip_config", "text_config", "token_ids"]
+__all__ = ["HEAD", "HIDDEN", "SPREAD", "TinyAdapter", "Twin", "draw_model", "siglip_config", "text_config", "token_ids"]
 
 # Standard deviation of the weights. Ten times the usual one, so that replies of an untrained model differ from frame to
 # frame and from question to question.
 SPREAD = 0.2
+# Sizes of the language models. vLLM's attention on a CPU takes no heads below 32.
+HEAD = 32
+HIDDEN = 4 * HEAD
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,10 +118,10 @@ def text_config(vocab_size: int, end_id: int, pad_id: int, **settings: Any) -> d
     """Return the config of a tiny language model of two layers; settings add to the usual ones or replace them."""
     return {
         "vocab_size": vocab_size,
-        "hidden_size": 64,
+        "hidden_size": HIDDEN,
         "intermediate_size": 128,
         "num_hidden_layers": 2,
-        "num_attention_heads": 4,
+        "num_attention_heads": HIDDEN // HEAD,
         "num_key_value_heads": 2,
         "initializer_range": SPREAD,
         "bos_token_id": None,

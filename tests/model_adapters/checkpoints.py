@@ -27,7 +27,7 @@ from transformers.models.idefics3.image_processing_pil_idefics3 import Idefics3I
 
 from model_adapters.built_in import BUILT_IN
 from model_adapters.tiny.tokenizer import train_tokenizer
-from model_adapters.tiny.twin import Twin
+from model_adapters.tiny.twin import HEAD, HIDDEN, Twin
 
 __all__ = ["FAMILIES", "OTHERS", "save", "twin"]
 
@@ -40,12 +40,12 @@ TEMPLATE = """\
 {%- if add_generation_prompt -%}{{- 'assistant:' -}}{%- endif -%}
 """
 TEXT = {
-    "hidden_size": 64,
+    "hidden_size": HIDDEN,
     "intermediate_size": 128,
     "num_hidden_layers": 2,
     "num_attention_heads": 4,
     "num_key_value_heads": 2,
-    "head_dim": 16,
+    "head_dim": HEAD,
     "initializer_range": 0.2,
 }
 VISION = {
@@ -140,7 +140,7 @@ def _gemma3(folder: Path) -> None:
         eoi_token_index=ids["eoi_token"],
         mm_tokens_per_image=4,
         vision_config={"model_type": "siglip_vision_model", "vision_use_head": False, **VISION},
-        text_config={"vocab_size": len(tokenizer), "sliding_window": 64, "query_pre_attn_scalar": 16, **TEXT},
+        text_config={"vocab_size": len(tokenizer), "sliding_window": 64, "query_pre_attn_scalar": HEAD, **TEXT},
     )
     model = Gemma3ForConditionalGeneration(config)
     torch.nn.init.normal_(model.model.multi_modal_projector.mm_input_projection_weight, std=0.5)

@@ -19,6 +19,7 @@ from model_adapters.hf.prompt import token_ids
 from model_adapters.hf.uncached import UncachedModel, process_turns
 from model_adapters.tiny.pixtral import PixtralTiny
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny, save_tiny_checkpoint
+from model_adapters.tiny.twin import HIDDEN
 
 from ..asking import up_to, user
 
@@ -102,7 +103,7 @@ def _qwen2_vl_config(ids: Mapping[str, int], vocab_size: int) -> Qwen2VLConfig:
     names = ("image_token_id", "video_token_id", "vision_start_token_id", "vision_end_token_id")
     return Qwen2VLConfig(
         text_config=text,
-        vision_config={"depth": 2, "embed_dim": 32, "hidden_size": 64, "num_heads": 2, "mlp_ratio": 2},
+        vision_config={"depth": 2, "embed_dim": 32, "hidden_size": HIDDEN, "num_heads": 2, "mlp_ratio": 2},
         **{name: getattr(newer, name) for name in names},
     )
 

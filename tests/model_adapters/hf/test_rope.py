@@ -111,7 +111,7 @@ def test_yarn_is_written_as_transformers_wants_it() -> None:
         "rope_theta": 1e6,
         "factor": 4.0,
         "original_max_position_embeddings": 128_000,
-        "mrope_section": [2, 3, 3],
+        "mrope_section": [4, 6, 6],
     }
 
 
