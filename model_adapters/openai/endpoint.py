@@ -36,7 +36,7 @@ _HINTS = {
 }
 _OTHER_HINT = (
     "check model and the options of requests (send_seed, send_temperature, send_stop, send_repetition_penalty, "
-    "max_tokens_field)"
+    "send_skip_special_tokens, max_tokens_field)"
 )
 
 

@@ -107,10 +107,12 @@ class ServedModel:
             extra["repetition_penalty"] = decoding.repetition_penalty
         if decoding.choices:
             extra["structured_outputs"] = {"choice": list(decoding.choices)}
-        if extra:
-            request["extra_body"] = extra
         if not decoding.choices and options.send_stop and decoding.stop:
             request["stop"] = list(decoding.stop[:_MOST_STOPS])
+            if options.send_skip_special_tokens:
+                extra["skip_special_tokens"] = False
+        if extra:
+            request["extra_body"] = extra
         return request
 
     def _send(self, request: dict[str, Any], charge: Charge) -> tuple[Completion, tuple[str, ...]]:

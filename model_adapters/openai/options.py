@@ -28,6 +28,9 @@ _IN_IDENTITY = (  # options that can change a reply; rates and prices cannot
     "send_stop",
     "guided",
 )
+# Only requests of agents have these: what others ask is the same whatever they are, so that the document names them
+# only where they are not at their default.
+_OF_AGENTS = ("send_repetition_penalty", "send_skip_special_tokens")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +49,8 @@ class OpenAIOptions:
         send_temperature: send temperature and top_p; some models refuse them and decode in their own way.
         send_stop: send stop strings, at most 4; replies are cut here in any case.
         send_repetition_penalty: send the penalty of requests that have one, as agents' have; OpenAI itself refuses it.
+        send_skip_special_tokens: send `skip_special_tokens: false` with stop strings, as agents have: else vLLM and
+            SGLang strip `<|act|>` from the text before they look for it. OpenAI itself refuses it.
         guided: method that restricts replies to choices: `vllm` sends its `structured_outputs`; None for no support.
         max_in_flight: requests at the same time.
         timeout_s: limit for a whole reply, from the connection to its last byte, in seconds.
@@ -70,6 +75,7 @@ class OpenAIOptions:
     send_temperature: bool = True
     send_stop: bool = True
     send_repetition_penalty: bool = True
+    send_skip_special_tokens: bool = True
     guided: str | None = None
     max_in_flight: int = 4
     timeout_s: float = 300.0
@@ -100,8 +106,7 @@ class OpenAIOptions:
     def document(self) -> dict[str, Any]:
         """Return everything that can change a reply, as JSON values."""
         document = {"base_url": self.url} | {name: getattr(self, name) for name in _IN_IDENTITY}
-        # Only requests of agents have a penalty: what others ask is the same with this option at its default.
-        return document if self.send_repetition_penalty else document | {"send_repetition_penalty": False}
+        return document | {name: False for name in _OF_AGENTS if not getattr(self, name)}
 
     def _check_address(self) -> None:
         address = server_address("base_url", self.base_url)

@@ -12,6 +12,7 @@ from model_adapters.hf.families.qwen2_5_vl import Qwen25VL
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.limits import wrap_model_errors
 from model_adapters.vllm.arguments import frame_limit, model_arguments, token_limit
+from model_adapters.vllm.cpu import check_head_size, runs_on_cpu
 from model_adapters.vllm.engine import Engine, import_vllm
 from model_adapters.vllm.model import VllmModel
 from model_adapters.vllm.options import (
@@ -86,6 +87,8 @@ class HfVlmOnVllm:
 
 def _start(name: str, located: LocatedCheckpoint[Any], family: MakeFamily) -> VllmModel:
     options: VllmOptions = located.options
+    if runs_on_cpu():
+        check_head_size(name, located.config.get_text_config())
     loaded = read_checkpoint(located, family, build_meta_model)
     max_tokens = token_limit(options.pretrained, loaded.max_tokens, options)
     with wrap_model_errors(name):

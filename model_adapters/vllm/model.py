@@ -75,6 +75,7 @@ class VllmModel(CheckpointModel):
             "quantization": options.quantization or loaded.identity["quantization"],
             "max_tokens": self._max_tokens,
             "max_frames": self._max_frames,
+            "image_backend": options.image_backend,
             "prompt": options.prompt,
             "parallel": [options.tensor_parallel_size, options.pipeline_parallel_size, options.data_parallel_size],
             "enforce_eager": options.enforce_eager,

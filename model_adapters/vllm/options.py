@@ -35,6 +35,7 @@ _RANGES = {
     "max_frames": (1, 2**31 - 1),
 }
 _LAUNCHED = "external_launcher"
+_IMAGE_BACKENDS = ("pil", "torchvision")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,14 +95,19 @@ class VllmOptions(EngineOptions, CheckpointReading):
     Attributes:
         frame_size: width and height in pixels of the largest frame, for which vLLM reserves memory.
         max_frames: most frames of a request; as many as fit into max_model_len where None.
+        image_backend: what resizes frames: pil, as with transformers here, or torchvision, vLLM's own choice. They make
+            slightly different pixels.
     """
 
     frame_size: int = 300
     max_frames: int | None = None
+    image_backend: str = "pil"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         CheckpointReading.__post_init__(self)
+        if self.image_backend not in _IMAGE_BACKENDS:
+            raise ValueError(f"image_backend={self.image_backend} is not {' or '.join(_IMAGE_BACKENDS)}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -78,7 +78,7 @@ class _Vlm:
         located = locate(CheckpointOptions(pretrained=arguments["model"], dtype=dtype, device="cpu"))
         for part, changed in arguments.get("hf_overrides", {}).items():
             for name, value in changed.items():
-                setattr(getattr(located.config, part), name, value)
+                setattr(getattr(located.config, part), name, _as_read(name, value))
         family = family_of(located.config)
         if family is None:
             family = functools.partial(ProcessorFamily, processor=load_processor(located))
@@ -225,6 +225,7 @@ class Double:
         fails: raised instead of an answer, once there is one.
         expands: one token more for every prompt, if true: another version's processor.
         would_say: ids that the next replies begin with, instead of the model's own.
+        on_cpu: whether it says that it runs on a CPU.
     """
 
     started: list[dict[str, Any]] = field(default_factory=list)
@@ -232,15 +233,17 @@ class Double:
     fails: Exception | None = None
     expands: bool = False
     would_say: Sequence[int] = ()
+    on_cpu: bool = False
 
     def modules(self) -> dict[str, ModuleType]:
         """What `import vllm` is to find, by name."""
-        top, params = ModuleType("vllm"), ModuleType("vllm.sampling_params")
+        top, params, platforms = (ModuleType(name) for name in ("vllm", "vllm.sampling_params", "vllm.platforms"))
+        vars(platforms).update(current_platform=SimpleNamespace(is_cpu=lambda: self.on_cpu))
         vars(top).update(
             LLM=functools.partial(_LLM, self), SamplingParams=SamplingParams, __version__=SIGNATURES["version"]
         )
         vars(params).update(StructuredOutputsParams=StructuredOutputsParams, SamplingParams=SamplingParams)
-        return {"vllm": top, "vllm.sampling_params": params}
+        return {module.__name__: module for module in (top, params, platforms)}
 
 
 class _LLM:
@@ -296,6 +299,13 @@ class _LLM:
         prompt_ids = read.ids + [0] * self._double.expands
         completion = SimpleNamespace(token_ids=ids, text=text)
         return SimpleNamespace(outputs=[completion], prompt_token_ids=prompt_ids, num_cached_tokens=cached)
+
+
+def _as_read(name: str, value: Any) -> Any:
+    """What vLLM makes of an override: for positions on three axes it multiplies YaRN's original length by four."""
+    if name != "rope_parameters" or "mrope_section" not in value:
+        return value
+    return value | {"original_max_position_embeddings": 4 * value["original_max_position_embeddings"]}
 
 
 def _count(limit: int | dict[str, int]) -> int:

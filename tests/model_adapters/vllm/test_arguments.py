@@ -82,13 +82,14 @@ def test_every_option_arrives_under_vllms_name() -> None:
         "max_model_len": 9_999,
         "trust_remote_code": True,
         "limit_mm_per_prompt": {"image": {"count": 12, "width": 640, "height": 640}, "video": 0},
+        "mm_processor_kwargs": {"use_fast": False},
         "hf_overrides": {
             "text_config": {
                 "rope_parameters": {
                     "rope_type": "yarn",
                     "rope_theta": 1e6,
                     "factor": 4.0,
-                    "original_max_position_embeddings": 128_000,
+                    "original_max_position_embeddings": 32_000,  # vLLM makes four times as many of it
                     "mrope_section": [16, 24, 24],
                 },
                 "max_position_embeddings": 512_000,
@@ -98,9 +99,9 @@ def test_every_option_arrives_under_vllms_name() -> None:
 
 
 def test_limits_of_a_frames_area_are_the_processors() -> None:
-    typed = Qwen25VLOnVllm.Options(min_pixels=100, max_pixels=200)
+    typed = Qwen25VLOnVllm.Options(min_pixels=100, max_pixels=200, image_backend="torchvision")
     arguments = model_arguments(FOLDER, _qwen("yarn:2"), typed, max_tokens=10, max_frames=1)
-    assert arguments["mm_processor_kwargs"] == {"min_pixels": 100, "max_pixels": 200}
+    assert arguments["mm_processor_kwargs"] == {"use_fast": True, "min_pixels": 100, "max_pixels": 200}
     assert "hf_overrides" not in arguments
 
 
@@ -152,10 +153,24 @@ def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type: str, longer
     assert overrides.get("max_position_embeddings") == (200 if longer else None)
 
 
-@pytest.mark.parametrize("rope", ["linear:2", "dynamic:2", "longrope:2"])
+@pytest.mark.parametrize("rope", ["linear:2", "longrope:2"])
 def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> None:
     with pytest.raises(ModelError, match=r"qwen2_5_vl, which has three-axis positions, .* only yarn; use yarn:2"):
         rope_overrides(_qwen(rope), rope)
+
+
+def test_a_dynamic_extension_is_refused_as_vllm_answers_nonsense_with_it() -> None:
+    config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
+    apply_rope(config, "dynamic:2")
+    with pytest.raises(ModelError, match=r"rope=dynamic:2: vLLM has angles up to the original length .* use yarn:2"):
+        rope_overrides(config, "dynamic:2")
+
+
+def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
+    config = _qwen("yarn:2")
+    config.model_type = "qwen9_vl"
+    with pytest.raises(ModelError, match=r"rope=yarn:2: of qwen9_vl, .* not known whether .* --engine transformers"):
+        rope_overrides(config, "yarn:2")
 
 
 @pytest.mark.parametrize(

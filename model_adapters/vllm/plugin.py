@@ -1,0 +1,50 @@
+"""A plugin of vLLM, which vLLM calls in each of its processes: it loads checkpoints that new transformers saved.
+
+From 5.17 on, transformers saves the towers of LLaVA and its kin without the level `vision_model` that published
+checkpoints have, and that vLLM 0.32 expects.
+"""
+
+import functools
+import importlib
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+__all__ = ["ACTIVE", "register"]
+
+# Set by our engine. Whatever else uses vLLM in this environment keeps vLLM as it is.
+ACTIVE = "INFTHOR_EVAL_VLLM_PLUGIN"
+_MODELS = {
+    "gemma3_mm": "Gemma3ForConditionalGeneration",
+    "llava": "LlavaForConditionalGeneration",
+    "llava_next": "LlavaNextForConditionalGeneration",
+    "llava_onevision": "LlavaOnevisionForConditionalGeneration",
+}
+# Parts of CLIP's and SigLIP's towers; Pixtral's has others and no such level.
+_FLAT = re.compile(r"^((?:model\.)?vision_tower\.)(?=(?:embeddings|encoder|pre_layrnorm|post_layernorm|head)\.)")
+_Weights = Iterable[tuple[str, Any]]
+
+
+def register() -> None:
+    """Let vLLM's models take the names of both; called by vLLM (entry point `vllm.general_plugins`)."""
+    if os.environ.get(ACTIVE) != "1":
+        return
+    for module, name in _MODELS.items():
+        model = getattr(importlib.import_module(f"vllm.model_executor.models.{module}"), name)
+        if not hasattr(model.load_weights, "__wrapped__"):
+            model.load_weights = _taking_both(model.load_weights)
+
+
+def _taking_both(load_weights: Callable[[Any, _Weights], Any]) -> Callable[[Any, _Weights], Any]:
+    @functools.wraps(load_weights)
+    def load(model: Any, weights: _Weights) -> Any:
+        has_level = hasattr(getattr(model, "vision_tower", None), "vision_model")
+        return load_weights(model, _with_level(weights) if has_level else weights)
+
+    return load
+
+
+def _with_level(weights: _Weights) -> Iterator[tuple[str, Any]]:
+    for name, tensor in weights:
+        yield _FLAT.sub(r"\1vision_model.", name), tensor

@@ -1,0 +1,33 @@
+"""Models in real vLLM; `make test-vllm` makes an environment that has it."""
+
+import importlib.util
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from model_adapters import load
+
+
+@pytest.fixture(scope="session", autouse=True)
+def installed() -> None:
+    """Skips where vLLM is not installed."""
+    if importlib.util.find_spec("vllm") is None:
+        pytest.skip("vLLM is not installed (make test-vllm makes an environment with it)")
+
+
+@pytest.fixture
+def start(checkpoints: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Any]]:
+    """Starts a model of a tiny checkpoint in vLLM, and ends it with the test."""
+    monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
+    started: list[Any] = []
+
+    def start(family: str = "qwen2.5-vl", name: str | None = None, **options: object) -> Any:
+        given = {"pretrained": checkpoints[family], "dtype": "float32", "enforce_eager": True, **options}
+        started.append(load(f"{name or family}@vllm", {key: str(value) for key, value in given.items()}, 0))
+        return started[-1]
+
+    yield start
+    for model in started:
+        model.close()

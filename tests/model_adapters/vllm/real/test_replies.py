@@ -1,0 +1,101 @@
+"""Replies of real vLLM: token for token those of transformers, in float32 and greedy, for all families."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Part, Reply, check_adapter
+
+from ...asking import up_to, user
+
+Start = Callable[..., Any]
+FAMILIES = ("qwen2.5-vl", "llava-onevision", "pixtral", "llava", "idefics3")
+
+
+def _name(family: str) -> str:
+    return family if family in FAMILIES[:3] else "hf-vlm"
+
+
+def _facts(reply: Reply) -> tuple[Any, ...]:
+    return reply.text, reply.token_ids, reply.n_reply_tokens, reply.n_context_tokens
+
+
+def _prompts(frames: list[FrameRef]) -> list[tuple[Part, ...]]:
+    return [
+        ("What do you see?",),
+        (frames[0], "\nWhat is it?"),
+        ("First ", frames[1], " then ", frames[2], "?"),
+        (*frames, "\nWhere is the mug?"),
+        (*frames, "\nHow many apples are there?"),
+    ]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("cached", [True, False])
+def test_replies_are_those_of_transformers(
+    family: str, cached: bool, start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
+    ours = start(family, _name(family), **({} if cached else {"prefix_caching": False}))
+    theirs = in_process(family, _name(family))
+    for parts in _prompts(frames):
+        replies = [model.answer(user(*parts), up_to(50)) for model in (ours, theirs)]
+        assert _facts(replies[0]) == _facts(replies[1])
+
+
+@pytest.mark.parametrize("family", ["qwen2.5-vl", "pixtral", "llava"])
+def test_it_keeps_the_contract(family: str, start: Start) -> None:
+    check_adapter(start(family, _name(family)), (84, 84))
+
+
+def test_of_continuations_the_others_find_the_prefix_of_the_first(
+    start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
+    asked = [[f"\nQuestion {number}: what is it?"] for number in range(5)]
+    models, replies = (start(), in_process("qwen2.5-vl")), []
+    for model in models:
+        talk = model.conversation()
+        talk.append(*frames, "It is a long way. " * 40)
+        replies.append(talk.replies(asked, up_to(8)))
+    assert [_facts(reply) for reply in replies[0]] == [_facts(reply) for reply in replies[1]]
+    assert replies[0][0].n_cached_tokens == 0
+    assert all(reply.n_cached_tokens >= 128 for reply in replies[0][1:])  # a block of vLLM's on a CPU
+
+
+def test_a_reply_is_held_to_choices(start: Start, in_process: Start, frames: list[FrameRef]) -> None:
+    decoding = up_to(30, choices=("on the table", "in the sink", "in the fridge"))
+    ours, theirs = start(), in_process("qwen2.5-vl")
+    for frame in frames:
+        turns = user(frame, "Where is the mug?")
+        assert ours.answer(turns, decoding).text in decoding.choices
+        assert theirs.answer(turns, decoding).text in decoding.choices
+
+
+def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
+    start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
+    ours, theirs, turns = start(), in_process("qwen2.5-vl"), user(frames[0], "Where?")
+    # An untrained model writes halves of characters, too, which vLLM holds back and transformers decodes.
+    plain = [letter for letter in theirs.answer(turns, up_to(12)).text if letter.isascii()]
+    for stop in (plain[2], plain[-1], "never"):
+        replies = [model.answer(turns, up_to(12, stop=("not this", stop))) for model in (ours, theirs)]
+        assert _facts(replies[0]) == _facts(replies[1])
+
+
+def test_draws_repeat_with_their_seed(start: Start, frames: list[FrameRef]) -> None:
+    model, turns = start(), user(frames[0], "Say it.")
+    replies = [model.answer(turns, up_to(20, temperature=1.5, top_p=0.9, seed=seed)).text for seed in (3, 4, 3)]
+    assert replies[0] == replies[2] != replies[1]
+
+
+@pytest.mark.parametrize(("family", "rope"), [("qwen2.5-vl", "yarn:4"), ("pixtral", "yarn:2"), ("pixtral", "linear:2")])
+def test_an_extended_model_answers_as_in_transformers(
+    family: str, rope: str, start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
+    ours, theirs = start(family, rope=rope), in_process(family, rope=rope)
+    for parts in _prompts(frames):
+        turns = user(*parts, "Where is the mug? " * 40)
+        assert _facts(ours.answer(turns, up_to(30))) == _facts(theirs.answer(turns, up_to(30)))
+    plain = in_process(family).answer(turns, up_to(30))
+    assert _facts(plain) != _facts(theirs.answer(turns, up_to(30)))
