@@ -10,7 +10,11 @@ PEERS := $(VENV)/test-peers
 COMPILE := $(BIN)/python -m pytest -q tests/sim/test_questions.py tests/sim/test_pictures.py -m "not slow" \
 	-k "test_questions or test_ids_frame_names or numba"
 
-.PHONY: demo shell test test-all test-times lint docs clean
+# Real vLLM, on a GPU or a CPU, has an environment of its own.
+VLLM := .venv-vllm
+REAL := tests/model_adapters/vllm/real
+
+.PHONY: demo shell test test-all test-times test-vllm lint docs clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled set, by the bounds and a small model.
 demo: $(INSTALLED)
@@ -40,6 +44,15 @@ test-times: $(INSTALLED) $(PEERS)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -p tests.processor_times
 	$(BIN)/python -m tests.processor_times
 
+# Models in real vLLM against the same ones in transformers.
+test-vllm: $(VLLM)/.installed
+	HF_HUB_OFFLINE=1 OMP_NUM_THREADS=1 $(VLLM)/bin/python -m pytest $(REAL)
+
+$(VLLM)/.installed: $(REAL)/install.sh pyproject.toml
+	rm -rf $(VLLM)
+	PYTHON=$(PYTHON) $(REAL)/install.sh $(VLLM)
+	touch $@
+
 lint: $(INSTALLED)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -61,4 +74,4 @@ $(PEERS): $(INSTALLED)
 	touch $@
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info
+	rm -rf $(VENV) $(VLLM) build dist *.egg-info

@@ -46,6 +46,15 @@ _CONFIG: dict[str, Any] = {
 }
 
 
+_TOKENIZER = {
+    "tokenizer_class": "PreTrainedTokenizerFast",
+    "bos_token": "<s>",
+    "eos_token": "</s>",
+    "unk_token": "<unk>",
+    "pad_token": "</s>",
+}
+
+
 def _tokenizer() -> Tokenizer:
     special = ("<unk>", "<s>", "</s>")
     return train_tokenizer(special, begin="<s>", end="</s>", pad="</s>", named={}).backend_tokenizer
@@ -62,4 +71,9 @@ class OpenVLATiny(TinyPolicyAdapter):
     """The adapter `openvla-tiny`."""
 
     Options = OpenVLATinyOptions
-    twin = PolicyTwin(files={"config.json": _CONFIG}, tokenizer=_tokenizer, layout=_layout, load=load_openvla)
+    twin = PolicyTwin(
+        files={"config.json": _CONFIG, "tokenizer_config.json": _TOKENIZER},
+        tokenizer=_tokenizer,
+        layout=_layout,
+        load=load_openvla,
+    )

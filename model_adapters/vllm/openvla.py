@@ -2,12 +2,13 @@
 
 from typing import Any, ClassVar
 
+import msgspec
 import numpy as np
 from PIL import Image
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.checkpoint import versions
-from model_adapters.policies.checkpoint import find_policy_checkpoint
+from model_adapters.policies.checkpoint import PolicyCheckpoint, find_policy_checkpoint
 from model_adapters.policies.openvla.adapter import OpenVLADescription, describe_openvla
 from model_adapters.policies.openvla.network import prompt_ids
 from model_adapters.policies.policy import VlaPolicy
@@ -37,6 +38,7 @@ class OpenVLAOnVllm:
         import_vllm(name)  # fails before gigabytes are downloaded
         checkpoint = find_policy_checkpoint(options.pretrained, options.revision)
         description = describe_openvla(checkpoint, options.unnorm_key)
+        _check_begin_token(name, checkpoint)
         engine = Engine(name, engine_arguments(checkpoint.folder, options) | {"limit_mm_per_prompt": {"image": 1}})
         identity = checkpoint.origin | {
             "engine": "vllm",
@@ -49,6 +51,25 @@ class OpenVLAOnVllm:
             "unnorm_key": description.key,
         }
         return VllmPolicy(name, _VllmNetwork(name, engine, description), description, options, identity)
+
+
+class _TokenizerConfig(msgspec.Struct):
+    bos_token: Any = None  # a text, or an object with its settings
+
+
+def _check_begin_token(name: str, checkpoint: PolicyCheckpoint) -> None:
+    """Refuse a checkpoint that does not name the begin token, before which vLLM would put the frame without a word.
+
+    Raises:
+        ModelError: the tokenizer's config does not name it.
+        DataError: the config cannot be read.
+    """
+    file = "tokenizer_config.json"
+    if not checkpoint.has_file(file) or not checkpoint.read(file, _TokenizerConfig).bos_token:
+        raise ModelError(
+            f"{name}: {file} of {checkpoint.pretrained} names no bos_token, which belongs before the frame; add"
+            ' "bos_token": "<s>" to it, or use --engine transformers'
+        )
 
 
 class _VllmNetwork:

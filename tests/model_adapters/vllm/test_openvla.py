@@ -1,5 +1,7 @@
 """OpenVLA on the double: the actions of the native port."""
 
+import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -84,4 +86,17 @@ def test_what_is_wrong_with_checkpoint_or_key_is_told_as_in_the_native_port(
         policy(unnorm_key="x")
     with pytest.raises(ModelError, match="is a qwen2_5_vl checkpoint, not openvla"):
         policy(pretrained=checkpoints["qwen2.5-vl"])
+    assert vllm.started == []
+
+
+@pytest.mark.parametrize("content", [None, {}, {"bos_token": None}])
+def test_a_tokenizer_without_a_begin_token_is_refused(
+    content: dict[str, Any] | None, policy: Callable[..., Any], folder: Path, vllm: Double, tmp_path: Path
+) -> None:
+    copy = Path(shutil.copytree(folder, tmp_path / "copy"))
+    (copy / "tokenizer_config.json").unlink()
+    if content is not None:
+        (copy / "tokenizer_config.json").write_text(json.dumps(content))
+    with pytest.raises(ModelError, match=r"tokenizer_config\.json of .* names no bos_token, .* --engine transformers"):
+        policy(pretrained=copy)
     assert vllm.started == []

@@ -1,0 +1,97 @@
+"""Whole runs in real vLLM, as their user types them, on the small trained model: equal to those in transformers."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.runs import UnitRecord, read_header, read_run
+from infthor_eval.suites import find_suite
+from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
+from tests.plans.cut import CANDLE, FORK, cut, write
+from tests.waiting import PATIENCE_S, wait_until
+
+OURS = "from infthor_eval.cli import main; main()"
+ENGINES = ("vllm", "transformers")
+Run = Callable[..., list[UnitRecord[Any]]]
+
+
+def _arguments(engine: str, output: Path, *more: object) -> list[str]:
+    given = f"pretrained={packaged_folder(FOLDER)},dtype=float32"
+    given += ",enforce_eager=true" if engine == "vllm" else ",device=cpu"
+    typed = ["--model", "qwen2.5-vl", "--engine", engine, "--model-args", given, "--output", output, *more]
+    return list(map(str, typed))
+
+
+def _records(output: Path) -> list[UnitRecord[Any]]:
+    (results,) = output.rglob("results.json")
+    return read_run(results.parent, find_suite(read_header(results.parent).suite).records)[1]
+
+
+@pytest.fixture
+def asked(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Runs a command with one of the engines; its records."""
+    monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
+
+    def asked(engine: str, *more: object) -> list[UnitRecord[Any]]:
+        output = tmp_path / engine / str(random.getrandbits(32))
+        code, _, err = run(*_arguments(engine, output, *more))
+        assert code == 0, err
+        return _records(output)
+
+    return asked
+
+
+def test_questions_are_answered_alike(asked: Run) -> None:
+    ours, theirs = (asked(engine, "--tasks", "nieh_mini_gt,nieh_mini_full", "--limit", 40) for engine in ENGINES)
+    assert [record.payload for record in ours] == [record.payload for record in theirs]
+    assert [record.tokens.context for record in ours] == [record.tokens.context for record in theirs]
+    read, cached = (sum(getattr(record.tokens, name) for record in ours) for name in ("context", "cached"))
+    assert cached > 0.5 * read
+
+
+@pytest.mark.parametrize("more", [("--greedy",), ("--greedy", "--constrained")])
+def test_plans_are_carried_out_alike(more: tuple[str, ...], asked: Run, tmp_path: Path) -> None:
+    data = write(tmp_path / "data", cut(FORK, 6), cut(CANDLE, 4))
+    ours, theirs = (asked(engine, "--tasks", "infthor_plans", "--data", data, *more) for engine in ENGINES)
+    assert len(ours) == 10
+    assert [record.payload for record in ours] == [record.payload for record in theirs]
+
+
+def test_two_workers_answer_as_one(asked: Run) -> None:
+    one, two = (asked("vllm", "--tasks", "nieh_mini_gt", "--limit", 24, *more) for more in ((), ("--workers", 2)))
+    assert {record.key: record.payload for record in one} == {record.key: record.payload for record in two}
+
+
+def test_plans_are_carried_out_by_workers(asked: Run, tmp_path: Path) -> None:
+    data = write(tmp_path / "data", cut(FORK, 3), cut(CANDLE, 3))
+    words = ("--tasks", "infthor_plans", "--data", data, "--greedy")
+    one, two = (asked("vllm", *words, *more) for more in ((), ("--workers", 2)))
+    assert {record.key: record.payload for record in one} == {record.key: record.payload for record in two}
+
+
+def test_a_run_that_was_killed_goes_on(asked: Run, tmp_path: Path) -> None:
+    words = ("--tasks", "nieh_mini_full", "--limit", 40)
+    output = tmp_path / "killed"
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[4])}
+    command = [sys.executable, "-c", OURS, *_arguments("vllm", output, *words)]
+
+    def n_lines() -> int:
+        return sum(path.read_bytes().count(b"\n") for path in output.rglob("worker-0.jsonl"))
+
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
+    wait_until(lambda: n_lines() >= 5 or process.poll() is not None)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    assert 5 <= n_lines() < 40, "it was not killed in the middle"
+    again = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE_S, check=False)
+    assert again.returncode == 0, again.stderr
+    assert "resumed from the journal" in again.stderr + again.stdout
+    assert [record.payload for record in _records(output)] == [record.payload for record in asked("vllm", *words)]
