@@ -119,7 +119,7 @@ class Endpoint:
         status, body = error.status_code, error.response.content
         phrase = f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
         problem = f"answers {status}{phrase}: {self._quote(body)}"
-        hint = _HINTS.get(status) or _HINTS.get(status // 100 * 100) or _OTHER_HINT
+        hint = _hint_of(body) or _HINTS.get(status) or _HINTS.get(status // 100 * 100) or _OTHER_HINT
         is_transient = status in _TRANSIENT or status >= 500
         if not is_transient or (status == 429 and _QUOTA_EXCEEDED in body):
             return ModelError(f"{self.where} {problem}; {hint}")
@@ -134,6 +134,13 @@ class Endpoint:
         text = self._secret.redact(body.decode("utf-8", "replace"))
         short = " ".join(text.split())[:_QUOTED]
         return repr(short) if short else "nothing"
+
+
+def _hint_of(body: bytes) -> str | None:
+    """Return the hint to a refusal that servers have words of their own for; None for others."""
+    if b"may be provided in one prompt" in body:  # vLLM
+        return "start the server with a higher --limit-mm-per-prompt '{\"image\": N}', or use fewer frames"
+    return None
 
 
 def _pause_s(n_faults: int, fault: _TransientError) -> float:

@@ -5,7 +5,13 @@ from typing import Any, ClassVar
 
 from model_adapters.hf.adapter import CheckpointAdapter
 from model_adapters.hf.checkpoint import LocatedCheckpoint, build_meta_model, read_checkpoint
-from model_adapters.hf.families.hf_vlm import HfVlm, ProcessorFamily, family_of, load_processor
+from model_adapters.hf.families.hf_vlm import (
+    HfVlm,
+    ProcessorFamily,
+    family_of,
+    load_processor,
+    require_same_ids,
+)
 from model_adapters.hf.families.llava_onevision import LlavaOnevision
 from model_adapters.hf.families.pixtral import Pixtral
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VL
@@ -80,16 +86,20 @@ class HfVlmOnVllm:
         import_vllm(name)
         located = HfVlm.locate(name, options)
         family = family_of(located.config)
-        if family is None:
-            family = functools.partial(ProcessorFamily, processor=load_processor(located))
-        return _start(name, located, family)
+        if family is not None:
+            return _start(name, located, family)
+        processor = load_processor(located)
+        return _start(name, located, functools.partial(ProcessorFamily, processor=processor), processor)
 
 
-def _start(name: str, located: LocatedCheckpoint[Any], family: MakeFamily) -> VllmModel:
+def _start(name: str, located: LocatedCheckpoint[Any], family: MakeFamily, processor: Any = None) -> VllmModel:
     options: VllmOptions = located.options
     if runs_on_cpu():
         check_head_size(name, located.config.get_text_config())
     loaded = read_checkpoint(located, family, build_meta_model)
+    if processor is not None:
+        hint = f"{located.config.model_type} cannot be run in vLLM; use --engine transformers"
+        require_same_ids(loaded, processor, options.pretrained, hint)
     max_tokens = token_limit(options.pretrained, loaded.max_tokens, options)
     with wrap_model_errors(name):
         per_frame = len(loaded.family.frame_ids((options.frame_size, options.frame_size)))

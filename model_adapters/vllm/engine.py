@@ -100,7 +100,7 @@ class Engine:
         self.batch_invariant = os.environ.get("VLLM_BATCH_INVARIANT", "0") not in ("", "0")
         hint = "see its output above; if memory is short, set a smaller max_model_len or max_frames"
         with self._wrap_errors("does not start", hint), cpu.readable_globals():
-            self._llm = self._vllm.LLM(**arguments)
+            self._llm: Any = self._vllm.LLM(**arguments)
 
     def generate(
         self, requests: Sequence[EngineRequest], settings: Mapping[str, Any], choices: Sequence[str] = ()
@@ -123,8 +123,8 @@ class Engine:
             return [_engine_output(output) for output in outputs]
 
     def close(self) -> None:
-        """Free the memory: vLLM ends its processes when the last reference to it is gone."""
-        del self._llm
+        """Free the memory, also twice: vLLM ends its processes when the last reference to it is gone."""
+        self._llm = None
         gc.collect()
 
     def _params(self, settings: Mapping[str, Any], choices: Sequence[str]) -> Any:

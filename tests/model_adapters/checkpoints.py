@@ -1,6 +1,7 @@
 """Tiny checkpoints of every family that is run: our twins, and for `hf-vlm` families without code of their own."""
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -125,14 +126,17 @@ def _deepseek_vl(folder: Path) -> None:
     _save(folder, DeepseekVLForConditionalGeneration(config), processor)
 
 
-def _gemma3(folder: Path) -> None:
-    """Attends in both directions within an image, which no shared prefix of ours does."""
+def _gemma3(folder: Path, line_breaks: tuple[str, ...] = ()) -> None:
+    """Attends in both directions within an image, which no shared prefix of ours does.
+
+    The published vocabulary has several line breaks as one token, which then joins frames and words.
+    """
     names = {
         "boi_token": "<start_of_image>",
         "eoi_token": "<end_of_image>",
         "image_token": "<image_soft_token>",
     }
-    tokenizer = _tokenizer(tuple(names.values()), **names)
+    tokenizer = _tokenizer((*names.values(), *line_breaks), **names)
     ids = {name: tokenizer.convert_tokens_to_ids(token) for name, token in names.items()}
     config = Gemma3Config(
         image_token_index=ids["image_token"],
@@ -159,6 +163,7 @@ OTHERS: dict[str, Callable[[Path], None]] = {
     "idefics3": _idefics3,
     "deepseek-vl-1.3b": _deepseek_vl,
     "gemma3": _gemma3,
+    "gemma3-line-breaks": partial(_gemma3, line_breaks=("\n", "\n\n", "\n\n\n", "\n\n\n\n")),
 }
 
 

@@ -10,7 +10,7 @@ shows only that processor and model fit each other.
 import functools
 import inspect
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -32,13 +32,13 @@ from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.family import MakeFamily, Size
 from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.prompt import token_ids
+from model_adapters.hf.prompt import Piece, Prompter, token_ids
 from model_adapters.hf.uncached import UncachedModel, expand_image_token, image_token, process_turns
 from model_adapters.options.checkpoints import CheckpointReading
 from model_adapters.options.families import HfVlmOptions
 from model_adapters.protocols import Model, Part, Turn
 
-__all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor"]
+__all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor", "require_same_ids"]
 
 _TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}  # relative to the largest logit; more in half precision
 _HALF_TOLERANCE = 0.1
@@ -168,6 +168,23 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
     return processor
 
 
+def require_same_ids(loaded: LoadedCheckpoint, processor: Any, pretrained: str, hint: str) -> None:
+    """Refuse a checkpoint whose processor makes other token ids of a sample than the parts of a conversation have.
+
+    Raises:
+        ModelError: the ids differ; the message ends in `hint`.
+    """
+    prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
+    with tempfile.TemporaryDirectory() as folder, wrap_mismatch_errors(pretrained):
+        turns = [Turn("user", _sample(Path(folder)))]
+        _compare_ids(prompter.pieces(turns), process_turns(processor, loaded.template, turns), hint)
+
+
+def _compare_ids(pieces: Iterable[Piece], inputs: Any, hint: str) -> None:
+    if list(token_ids(pieces)) != inputs["input_ids"][0].tolist():
+        raise ModelError(f"token ids differ from the processor's: {hint}")
+
+
 @torch.inference_mode()
 def _compare_with_plain_model(
     model: TransformersModel | UncachedModel, loaded: LoadedCheckpoint, processor: Any, pretrained: str
@@ -180,8 +197,7 @@ def _compare_with_plain_model(
         inputs = process_turns(processor, loaded.template, turns)
         if isinstance(model, TransformersModel):
             pieces = model.pieces(turns)
-            if list(token_ids(pieces)) != inputs["input_ids"][0].tolist():
-                raise ModelError(f"token ids differ from the processor's: {hint}")
+            _compare_ids(pieces, inputs, hint)
             shared = model.encode(pieces)
         weight = loaded.model.get_input_embeddings().weight
         plain = loaded.model(**inputs.to(weight.device, loaded.model.dtype)).logits[0, -1]

@@ -179,6 +179,13 @@ def test_a_reply_that_is_no_choice_fails(start: Start, vllm: Double) -> None:
         model.answer(user("x"), up_to(20, choices=("yes", "no")))
 
 
+def test_a_processor_that_joins_words_and_frames_is_refused_before_vllm_starts(start: Start, vllm: Double) -> None:
+    # Gemma 3 makes one token of the line breaks after a frame and before the words that follow.
+    with pytest.raises(ModelError, match=r"token ids differ .*: gemma3 cannot be run in vLLM; use --engine transf"):
+        start("gemma3-line-breaks", "hf-vlm")
+    assert vllm.started == []
+
+
 # What its cache finds.
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.runs import UnitRecord, read_header, read_run
@@ -25,7 +26,7 @@ from ...asking import up_to
 
 START_S = 600
 SERVER = "vllm.entrypoints.openai.api_server"
-MOST_FRAMES = 300
+MOST_FRAMES = 100  # more than a context of `nieh_mini_full` has
 
 
 @pytest.fixture(scope="module")
@@ -98,4 +99,15 @@ def test_choices_hold(served: dict[str, str], frames: list[FrameRef]) -> None:
     talk = model.conversation()
     talk.append(frames[0], "Where is the mug?")
     assert talk.reply(up_to(20, choices=("on the table", "in the sink"))).text in ("on the table", "in the sink")
+    model.close()
+
+
+def test_more_frames_than_the_server_takes_are_refused_with_its_option(
+    served: dict[str, str], make_frames: Callable[..., list[FrameRef]]
+) -> None:
+    model: Any = load("openai", served, 0)
+    talk = model.conversation()
+    talk.append(*make_frames(MOST_FRAMES + 1, 28, 28), "What is it?")
+    with pytest.raises(ModelError, match=r"/v1 answers 400 Bad Request: .* --limit-mm-per-prompt .* fewer frames"):
+        talk.reply(up_to(4))
     model.close()
