@@ -11,6 +11,7 @@ from infthor_eval.formats.object_ids import Words
 from model_adapters.hf.card import WORDS
 from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.quiet import hide_transformers_output
+from model_adapters.hf.tower_names import with_published_names
 
 __all__ = ["export", "gather_weights"]
 
@@ -44,7 +45,7 @@ def export(
     words: Words,
     weights: Mapping[str, torch.Tensor] | None = None,
 ) -> None:
-    """Write weights (safetensors), configs, tokenizer with its template, image processor and card.
+    """Write weights by their published names (safetensors), configs, tokenizer with template, image processor, card.
 
     The template is that of training, so that evaluation renders the same prompts. The card has the title of the recipe
     and the words of plans and actions. The folder is created. `weights` are the gathered ones of a sharded model.
@@ -58,5 +59,6 @@ def export(
         with hide_transformers_output():
             loaded.tokenizer.save_pretrained(folder)
             loaded.image_processor.save_pretrained(folder)
-            loaded.model.save_pretrained(folder, state_dict=None if weights is None else dict(weights))
+            own = loaded.model.state_dict() if weights is None else weights
+            loaded.model.save_pretrained(folder, state_dict=with_published_names(own))
         (folder / "README.md").write_text(_CARD.format(title=title, words=words), encoding="utf-8")

@@ -15,6 +15,7 @@ from model_adapters.hf.model import TransformersModel
 from model_adapters.hf.quiet import hide_transformers_output
 from model_adapters.hf.rope import apply_rope
 from model_adapters.hf.templates import plain_template
+from model_adapters.hf.tower_names import with_published_names
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.tokenizer import train_tokenizer
 
@@ -84,7 +85,8 @@ class Twin:
         tokenizer.chat_template = self.template
         with hide_transformers_output():
             tokenizer.save_pretrained(folder)
-            self.model(tokenizer, self.model_config(tokenizer), seed, "sdpa").save_pretrained(folder)
+            model = self.model(tokenizer, self.model_config(tokenizer), seed, "sdpa")
+            model.save_pretrained(folder, state_dict=with_published_names(model.state_dict()))
             self.image_processor(**self.image_settings).save_pretrained(folder)
         for name, content in self.files.items():
             (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

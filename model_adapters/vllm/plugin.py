@@ -1,15 +1,15 @@
 """A plugin of vLLM, which vLLM calls in each of its processes: it loads checkpoints that new transformers saved.
 
-From 5.17 on, transformers saves the towers of LLaVA and its kin without the level `vision_model` that published
-checkpoints have, and that vLLM 0.32 expects.
+See `hf.tower_names` for the two forms; vLLM 0.32 reads one of them alone.
 """
 
 import functools
 import importlib
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
+
+from model_adapters.hf.tower_names import published_name
 
 __all__ = ["ACTIVE", "register"]
 
@@ -21,8 +21,6 @@ _MODELS = {
     "llava_next": "LlavaNextForConditionalGeneration",
     "llava_onevision": "LlavaOnevisionForConditionalGeneration",
 }
-# Parts of CLIP's and SigLIP's towers; Pixtral's has others and no such level.
-_FLAT = re.compile(r"^((?:model\.)?vision_tower\.)(?=(?:embeddings|encoder|pre_layrnorm|post_layernorm|head)\.)")
 _Weights = Iterable[tuple[str, Any]]
 
 
@@ -47,4 +45,4 @@ def _taking_both(load_weights: Callable[[Any, _Weights], Any]) -> Callable[[Any,
 
 def _with_level(weights: _Weights) -> Iterator[tuple[str, Any]]:
     for name, tensor in weights:
-        yield _FLAT.sub(r"\1vision_model.", name), tensor
+        yield published_name(name), tensor

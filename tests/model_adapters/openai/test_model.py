@@ -86,6 +86,16 @@ def test_a_penalty_is_sent_where_one_is_asked_for() -> None:
     assert [request.get("repetition_penalty") for request in asked] == [1.0, None]
 
 
+@pytest.mark.parametrize(("sent", "expected"), [(True, [False, None]), (False, [None, None])])
+def test_special_tokens_are_asked_for_where_one_may_stop_a_reply(sent: bool, expected: list[bool | None]) -> None:
+    asked: list[dict[str, Any]] = []
+    with opened(kept(asked, says("x")), send_skip_special_tokens=sent) as model:
+        for stop in (("<|act|>",), ()):
+            _ask(model, "What?", decoding=up_to(5, stop=stop))
+        assert model.identity().get("send_skip_special_tokens") == (None if sent else False)
+    assert [request.get("skip_special_tokens") for request in asked] == expected
+
+
 def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OTHER_KEY", f" {KEY}\n")
     asked: list[dict[str, Any]] = []
