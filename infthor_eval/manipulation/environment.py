@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any
 
 from infthor_eval.episodes.errors import InfeasibleError
@@ -14,6 +13,7 @@ from infthor_eval.manipulation.conversion import Call, Conversion
 from infthor_eval.manipulation.expert import EpisodeStart
 from infthor_eval.manipulation.geometry import distance_to, interpolate, middle_of, offset, point_of, size_of, xyz
 from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.protocol import Closing, Hand, Stand
 from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.manipulation.trajectories import ArmEpisode
 from infthor_eval.thor.frames import FrameKeeper
@@ -24,35 +24,12 @@ from infthor_eval.thor.transfer import transfer
 from infthor_eval.thor.view import AgentPose, ArmState, SimulatorView, ThorObject, Vector
 from model_adapters import ArmDelta
 
-__all__ = ["ArmEnvironment", "ArmOutcome", "Closing", "Grasp", "Hand", "Stand", "arm_of"]
+__all__ = ["ArmEnvironment", "ArmOutcome", "Grasp", "arm_of"]
 
 _MAX_WAITS = 20  # until a released object lies still
 _HALVINGS = 8  # of the range of heights, to half a centimetre
 _HELD_GAP = 0.02  # metres between the palm and an object that is held before it
 _PLACES = 5  # places between there and the centre of the sphere that are tried
-
-
-class Stand(StrEnum):
-    """Where the agent stands at the start: where the expert does, or did before the way there."""
-
-    EXPERT = "expert"
-    BEFORE = "before"
-
-
-class Closing(StrEnum):
-    """When a policy's hand closes in a pick-up: when it says so, with each step, or once at the end."""
-
-    ASKED = "asked"
-    ALWAYS = "always"
-    END = "end"
-
-
-class Hand(StrEnum):
-    """The height of the arm's base at the start of a pick-up: at rest, the lowest, the highest."""
-
-    REST = "rest"
-    LOW = "low"
-    HIGH = "high"
 
 
 @dataclass(frozen=True)

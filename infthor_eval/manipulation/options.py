@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from infthor_eval.episodes.options import SimulatorOptions
 from infthor_eval.errors import UsageError
+from infthor_eval.manipulation.protocol import Closing, Hand, Stand
 
 __all__ = ["RADII", "ManipulationOptions"]
 
@@ -21,18 +22,18 @@ class ManipulationOptions(SimulatorOptions):
     stand: str | None = field(
         default=None,
         metadata={
-            "choices": ("expert", "before"),
+            "choices": tuple(map(str, Stand)),
             "help": "Where the agent stands at the start: the expert's place, or that before the way to it.",
         },
     )
     hand: str | None = field(
         default=None,
-        metadata={"choices": ("rest", "low", "high"), "help": "Height of the arm at the start of a pick-up."},
+        metadata={"choices": tuple(map(str, Hand)), "help": "Height of the arm at the start of a pick-up."},
     )
     closing: str | None = field(
         default=None,
         metadata={
-            "choices": ("asked", "always", "end"),
+            "choices": tuple(map(str, Closing)),
             "help": "When a policy's hand closes in a pick-up: when it says so, with each step, or once at the end.",
         },
     )

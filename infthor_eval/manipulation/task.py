@@ -9,9 +9,10 @@ from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.household.wording import canonical_type, noun
 from infthor_eval.manipulation.conversion import Conversion
-from infthor_eval.manipulation.environment import Closing, Grasp, Hand, Stand
+from infthor_eval.manipulation.environment import Grasp
 from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
+from infthor_eval.manipulation.protocol import Closing, Hand, Stand
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, read_arm_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.limiting import limit_items

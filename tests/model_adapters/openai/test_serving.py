@@ -3,12 +3,8 @@
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
-import time
-import urllib.error
-import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,19 +13,18 @@ import pytest
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.runs import UnitRecord, read_header, read_run
-from infthor_eval.suites import find_suite
+from infthor_eval.runs import UnitRecord
 from model_adapters import check_adapter, load
 from tests.plans.cut import CANDLE, FORK, cut, write
 
 from ..asking import up_to
 from ..checkpoints import save
+from ..serving import free_port, records_in, wait_for_server
 
 for package in ("openai", "fastapi", "uvicorn", "multipart"):
     pytest.importorskip(package, reason="what `transformers serve` needs is not installed (pip install -e '.[dev]')")
 
 SERVE = "from transformers.cli.transformers import main; main()"
-START_S = 600
 WITHOUT_STOP = {"send_stop": "false"}  # this server fails on stop strings for models with images
 
 
@@ -51,9 +46,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     save("idefics3", folder)
     settings = folder / "generation_config.json"  # without do_sample this server draws at no temperature
     settings.write_text(json.dumps(json.loads(settings.read_text()) | {"do_sample": True}))
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     command = [sys.executable, "-c", SERVE, "serve", "--host", "127.0.0.1", "--port", str(port)]
     environment = os.environ | {"HF_HUB_OFFLINE": "1", "HF_HOME": str(root / "home"), "OMP_NUM_THREADS": "1"}
     with (root / "log").open("w") as log:
@@ -61,22 +54,11 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
             [*command, "--device", "cpu", "--dtype", "float32"], stdout=log, stderr=log, env=environment
         )
         try:
-            _wait_for(f"http://127.0.0.1:{port}/health", server, root / "log")
+            wait_for_server(f"http://127.0.0.1:{port}/health", server, root / "log")
             yield Served(f"http://127.0.0.1:{port}/v1", folder)
         finally:
             server.send_signal(signal.SIGKILL)
             server.wait()
-
-
-def _wait_for(url: str, server: "subprocess.Popen[bytes]", log: Path) -> None:
-    end = time.monotonic() + START_S
-    while time.monotonic() < end and server.poll() is None:
-        try:
-            with urllib.request.urlopen(url, timeout=60):
-                return
-        except (urllib.error.URLError, ConnectionError):
-            time.sleep(0.2)
-    pytest.fail(f"transformers serve does not come up: {log.read_text()[-2000:]}")
 
 
 @pytest.fixture
@@ -91,8 +73,7 @@ def both(served: Served, tmp_path: Path, run: Any) -> Callable[..., list[list[Un
             typed = ["--model", model, "--model-args", options, "--name", model, "--output", tmp_path / "out"]
             code, _, err = run(*typed, *arguments)
             assert code == 0, err
-            (results,) = (tmp_path / "out" / model).rglob("results.json")
-            records.append(read_run(results.parent, find_suite(read_header(results.parent).suite).records)[1])
+            records.append(records_in(tmp_path / "out" / model))
         return records
 
     return both

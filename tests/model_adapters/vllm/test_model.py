@@ -14,28 +14,19 @@ import pytest
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Decoding, Part, Reply, check_adapter, load
+from model_adapters import Decoding, Part, check_adapter, load
 from model_adapters.vllm.engine import import_vllm
 
 from ..asking import up_to, user
 from .double import Double
+from .families import FAMILIES, adapter_of, facts
 
 Start = Callable[..., Any]
-FAMILIES = ("qwen2.5-vl", "llava-onevision", "pixtral", "llava", "idefics3")
-
-
-def _name(family: str) -> str:
-    """Who loads it; the others are nobody's own."""
-    return family if family in FAMILIES[:3] else "hf-vlm"
-
-
-def _facts(reply: Reply) -> tuple[Any, ...]:
-    return reply.text, reply.token_ids, reply.n_reply_tokens, reply.n_context_tokens
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "pixtral", "llava"])
 def test_it_keeps_the_contract(family: str, start: Start) -> None:
-    model = start(family, _name(family))
+    model = start(family, adapter_of(family))
     check_adapter(model, (84, 84))
     model.close()
 
@@ -44,7 +35,7 @@ def test_it_keeps_the_contract(family: str, start: Start) -> None:
 def test_replies_and_counts_are_those_of_transformers(
     family: str, start: Start, in_process: Start, frames: list[FrameRef]
 ) -> None:
-    ours, theirs = start(family, _name(family)), in_process(family, _name(family))
+    ours, theirs = start(family, adapter_of(family)), in_process(family, adapter_of(family))
     assert ours.tokens_per_frame(frames[0]) == theirs.tokens_per_frame(frames[0])
     prompts: list[tuple[Part, ...]] = [
         ("What do you see?",),
@@ -57,7 +48,7 @@ def test_replies_and_counts_are_those_of_transformers(
             talk.append(*parts)
         assert talks[0].n_tokens == talks[1].n_tokens
         replies = [talk.reply(up_to(8)) for talk in talks]
-        assert _facts(replies[0]) == _facts(replies[1])
+        assert facts(replies[0]) == facts(replies[1])
         assert replies[0].n_context_tokens == talks[0].n_tokens
 
 
@@ -70,7 +61,7 @@ def test_options_that_change_what_is_read_change_it_alike(
     if "max_pixels" in options:  # the double's processor is the checkpoint's own: counts alone tell
         assert ours.count(turns) == theirs.count(turns) < in_process("qwen2.5-vl").count(turns)
         return
-    assert _facts(ours.answer(turns, up_to(8))) == _facts(theirs.answer(turns, up_to(8)))
+    assert facts(ours.answer(turns, up_to(8))) == facts(theirs.answer(turns, up_to(8)))
     assert ours.capabilities.max_tokens == theirs.capabilities.max_tokens
     assert ours.capabilities.max_tokens_before_extension == theirs.capabilities.max_tokens_before_extension
 
@@ -83,9 +74,7 @@ def test_a_model_of_one_axis_is_extended_alike(
     assert vllm.started[0]["hf_overrides"]["text_config"]["rope_parameters"]["rope_type"] == rope.partition(":")[0]
     extended = theirs.answer(turns, up_to(12))
     assert (
-        _facts(ours.answer(turns, up_to(12)))
-        == _facts(extended)
-        != _facts(in_process("pixtral").answer(turns, up_to(12)))
+        facts(ours.answer(turns, up_to(12))) == facts(extended) != facts(in_process("pixtral").answer(turns, up_to(12)))
     )
 
 
@@ -100,7 +89,7 @@ def test_a_checkpoint_with_a_penalty_is_written_with_it(
     ours, theirs = (
         make(pretrained=folder).answer(turns, decoding) for make in (start, partial(in_process, "qwen2.5-vl"))
     )
-    assert _facts(ours) == _facts(theirs) != _facts(in_process("qwen2.5-vl").answer(turns, decoding))
+    assert facts(ours) == facts(theirs) != facts(in_process("qwen2.5-vl").answer(turns, decoding))
     assert vllm.calls[-1].params.repetition_penalty == 20.0
     start(pretrained=folder).answer(turns, up_to(40, repetition_penalty=1.0))
     assert vllm.calls[-1].params.repetition_penalty == 1.0
@@ -113,7 +102,7 @@ def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
     whole = theirs.answer(turns, up_to(12)).text
     for stop in (whole[3:5], whole[-1], "never"):
         replies = [model.answer(turns, up_to(12, stop=("not this", stop))) for model in (ours, theirs)]
-        assert _facts(replies[0]) == _facts(replies[1])
+        assert facts(replies[0]) == facts(replies[1])
 
 
 SPECIAL = "<|im_start|>"
@@ -160,7 +149,7 @@ def test_a_reply_is_held_to_choices_and_no_stop_string_cuts_it(
     decoding = up_to(30, choices=("on the table", "in the sink"), stop=("the",))
     turns = user(frames[0], "Where is the mug?")
     ours, theirs = start().answer(turns, decoding), in_process("qwen2.5-vl").answer(turns, decoding)
-    assert _facts(ours) == _facts(theirs)
+    assert facts(ours) == facts(theirs)
     params = vllm.calls[-1].params
     assert params.structured_outputs is not None
     assert (params.structured_outputs.choice, params.stop) == (["on the table", "in the sink"], [])
@@ -202,7 +191,7 @@ def test_of_continuations_the_first_goes_alone_and_the_others_find_its_prefix(
     replies = _talk(start(), *frames).replies(asked, up_to(4))
     assert [len(call.prompts) for call in vllm.calls] == [1, 4]
     theirs = _talk(in_process("qwen2.5-vl"), *frames).replies(asked, up_to(4))
-    assert [_facts(reply) for reply in replies] == [_facts(reply) for reply in theirs]
+    assert [facts(reply) for reply in replies] == [facts(reply) for reply in theirs]
     shared = _talk(start(), *frames).n_tokens // 16 * 16 - 16
     assert replies[0].n_cached_tokens == 0
     assert all(reply.n_cached_tokens >= shared > 0 for reply in replies[1:])

@@ -15,6 +15,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.vllm.cpu import runs_on_cpu
 
 from ...asking import up_to, user
+from ..families import adapter_of
 
 Start = Callable[..., Any]
 
@@ -36,7 +37,7 @@ def test_towers_of_both_forms_are_loaded(
     published = Path(shutil.copytree(checkpoints[family], tmp_path / "published"))
     save_file(levelled, published / "model.safetensors", metadata={"format": "pt"})
     assert _keys(flat) != _keys(published)
-    name = "hf-vlm" if family == "llava" else family
+    name = adapter_of(family)
     expected = in_process(family, name).answer(user(*frames, "Where is the mug?"), up_to(20)).token_ids
     for folder in (flat, published):
         model = start(family, name, pretrained=folder)

@@ -12,11 +12,12 @@ from typing import Any
 import pytest
 
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.runs import UnitRecord, read_header, read_run
-from infthor_eval.suites import find_suite
+from infthor_eval.runs import UnitRecord
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 from tests.plans.cut import CANDLE, FORK, cut, write
 from tests.waiting import PATIENCE_S, wait_until
+
+from ...serving import records_in
 
 OURS = "from infthor_eval.cli import main; main()"
 ENGINES = ("vllm", "transformers")
@@ -30,11 +31,6 @@ def _arguments(engine: str, output: Path, *more: object) -> list[str]:
     return list(map(str, typed))
 
 
-def _records(output: Path) -> list[UnitRecord[Any]]:
-    (results,) = output.rglob("results.json")
-    return read_run(results.parent, find_suite(read_header(results.parent).suite).records)[1]
-
-
 @pytest.fixture
 def asked(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs a command with one of the engines; its records."""
@@ -44,7 +40,7 @@ def asked(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
         output = tmp_path / engine / str(random.getrandbits(32))
         code, _, err = run(*_arguments(engine, output, *more))
         assert code == 0, err
-        return _records(output)
+        return records_in(output)
 
     return asked
 
@@ -94,4 +90,4 @@ def test_a_run_that_was_killed_goes_on(asked: Run, tmp_path: Path) -> None:
     again = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE_S, check=False)
     assert again.returncode == 0, again.stderr
     assert "resumed from the journal" in again.stderr + again.stdout
-    assert [record.payload for record in _records(output)] == [record.payload for record in asked("vllm", *words)]
+    assert [record.payload for record in records_in(output)] == [record.payload for record in asked("vllm", *words)]

@@ -6,20 +6,12 @@ from typing import Any
 import pytest
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Part, Reply, check_adapter
+from model_adapters import Part, check_adapter
 
 from ...asking import up_to, user
+from ..families import FAMILIES, adapter_of, facts
 
 Start = Callable[..., Any]
-FAMILIES = ("qwen2.5-vl", "llava-onevision", "pixtral", "llava", "idefics3")
-
-
-def _name(family: str) -> str:
-    return family if family in FAMILIES[:3] else "hf-vlm"
-
-
-def _facts(reply: Reply) -> tuple[Any, ...]:
-    return reply.text, reply.token_ids, reply.n_reply_tokens, reply.n_context_tokens
 
 
 def _prompts(frames: list[FrameRef]) -> list[tuple[Part, ...]]:
@@ -37,16 +29,16 @@ def _prompts(frames: list[FrameRef]) -> list[tuple[Part, ...]]:
 def test_replies_are_those_of_transformers(
     family: str, cached: bool, start: Start, in_process: Start, frames: list[FrameRef]
 ) -> None:
-    ours = start(family, _name(family), **({} if cached else {"prefix_caching": False}))
-    theirs = in_process(family, _name(family))
+    ours = start(family, adapter_of(family), **({} if cached else {"prefix_caching": False}))
+    theirs = in_process(family, adapter_of(family))
     for parts in _prompts(frames):
         replies = [model.answer(user(*parts), up_to(50)) for model in (ours, theirs)]
-        assert _facts(replies[0]) == _facts(replies[1])
+        assert facts(replies[0]) == facts(replies[1])
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "pixtral", "llava"])
 def test_it_keeps_the_contract(family: str, start: Start) -> None:
-    check_adapter(start(family, _name(family)), (84, 84))
+    check_adapter(start(family, adapter_of(family)), (84, 84))
 
 
 def test_of_continuations_the_others_find_the_prefix_of_the_first(
@@ -58,7 +50,7 @@ def test_of_continuations_the_others_find_the_prefix_of_the_first(
         talk = model.conversation()
         talk.append(*frames, "It is a long way. " * 40)
         replies.append(talk.replies(asked, up_to(8)))
-    assert [_facts(reply) for reply in replies[0]] == [_facts(reply) for reply in replies[1]]
+    assert [facts(reply) for reply in replies[0]] == [facts(reply) for reply in replies[1]]
     assert replies[0][0].n_cached_tokens == 0
     assert all(reply.n_cached_tokens >= 128 for reply in replies[0][1:])  # a block of vLLM's on a CPU
 
@@ -80,7 +72,7 @@ def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
     plain = [letter for letter in theirs.answer(turns, up_to(12)).text if letter.isascii()]
     for stop in (plain[2], plain[-1], "never"):
         replies = [model.answer(turns, up_to(12, stop=("not this", stop))) for model in (ours, theirs)]
-        assert _facts(replies[0]) == _facts(replies[1])
+        assert facts(replies[0]) == facts(replies[1])
 
 
 def test_draws_repeat_with_their_seed(start: Start, frames: list[FrameRef]) -> None:
@@ -96,6 +88,6 @@ def test_an_extended_model_answers_as_in_transformers(
     ours, theirs = start(family, rope=rope), in_process(family, rope=rope)
     for parts in _prompts(frames):
         turns = user(*parts, "Where is the mug? " * 40)
-        assert _facts(ours.answer(turns, up_to(30))) == _facts(theirs.answer(turns, up_to(30)))
+        assert facts(ours.answer(turns, up_to(30))) == facts(theirs.answer(turns, up_to(30)))
     plain = in_process(family).answer(turns, up_to(30))
-    assert _facts(plain) != _facts(theirs.answer(turns, up_to(30)))
+    assert facts(plain) != facts(theirs.answer(turns, up_to(30)))

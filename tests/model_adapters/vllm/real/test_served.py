@@ -1,12 +1,8 @@
 """vLLM's own server behind `--model openai`: the replies of the same checkpoint in transformers."""
 
 import os
-import socket
 import subprocess
 import sys
-import time
-import urllib.error
-import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,15 +12,14 @@ import pytest
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.runs import UnitRecord, read_header, read_run
-from infthor_eval.suites import find_suite
+from infthor_eval.runs import UnitRecord
 from model_adapters import load
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 from tests.plans.cut import CANDLE, FORK, cut, write
 
 from ...asking import up_to
+from ...serving import free_port, records_in, wait_for_server
 
-START_S = 600
 SERVER = "vllm.entrypoints.openai.api_server"
 MOST_FRAMES = 100  # more than a context of `nieh_mini_full` has
 
@@ -33,9 +28,7 @@ MOST_FRAMES = 100  # more than a context of `nieh_mini_full` has
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
     """The small trained model behind vLLM's server; the options of `--model openai` for it."""
     log, folder = tmp_path_factory.mktemp("served") / "log", str(packaged_folder(FOLDER))
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     limits = ["--max-model-len", "32768", "--limit-mm-per-prompt", f'{{"image": {MOST_FRAMES}, "video": 0}}']
     pixels = ["--mm-processor-kwargs", '{"use_fast": false}', "--enable-prompt-tokens-details"]
     where = ["--host", "127.0.0.1", "--port", str(port)]
@@ -44,22 +37,11 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]
     with log.open("w") as said:
         server = subprocess.Popen([*command, *pixels, *where], stdout=said, stderr=said, env=environment)
         try:
-            _wait_for(f"http://127.0.0.1:{port}/health", server, log)
+            wait_for_server(f"http://127.0.0.1:{port}/health", server, log)
             yield {"base_url": f"http://127.0.0.1:{port}/v1", "model": folder}
         finally:
             server.terminate()
             server.wait()
-
-
-def _wait_for(url: str, server: "subprocess.Popen[bytes]", log: Path) -> None:
-    end = time.monotonic() + START_S
-    while time.monotonic() < end and server.poll() is None:
-        try:
-            with urllib.request.urlopen(url, timeout=60):
-                return
-        except (urllib.error.URLError, ConnectionError):
-            time.sleep(0.5)
-    pytest.fail(f"vLLM's server does not come up: {log.read_text()[-2000:]}")
 
 
 @pytest.fixture
@@ -75,8 +57,7 @@ def both(served: dict[str, str], tmp_path: Path, run: Any) -> Callable[..., list
                 *("--model", model, "--model-args", options, "--name", model, "--output", tmp_path / "out"), *arguments
             )
             assert code == 0, err
-            (results,) = (tmp_path / "out" / model).rglob("results.json")
-            records.append(read_run(results.parent, find_suite(read_header(results.parent).suite).records)[1])
+            records.append(records_in(tmp_path / "out" / model))
         return records
 
     return both
