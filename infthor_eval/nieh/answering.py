@@ -235,15 +235,18 @@ def _in_context(
     except (DataError, ModelError) as error:
         yield from [item.unit.record_failure(session.describe_failure(item.unit, error)) for item in requests]
         return
-    waiting = []
-    for item in [replace(item, context=context) for item in requests]:
-        record = _find_record(item, session)
-        if record is None:
-            waiting.append(item)
-        else:
-            yield record
-    for at in range(0, len(waiting), answerer.batch_size):
-        yield from _answer(waiting[at : at + answerer.batch_size], answerer, session)
+    asked = [replace(item, context=context) for item in requests]
+    # A batch has the same requests when a run is resumed, as replies can differ by rounding with those beside them.
+    for at in range(0, len(asked), answerer.batch_size):
+        waiting = []
+        for item in asked[at : at + answerer.batch_size]:
+            record = _find_record(item, session)
+            if record is None:
+                waiting.append(item)
+            else:
+                yield record
+        if waiting:
+            yield from _answer(waiting, answerer, session)
 
 
 def _find_record(request: _UnitRequest, session: Session[NiehAnswer]) -> UnitRecord[NiehAnswer] | None:

@@ -1,67 +1,90 @@
-"""Continuations of one encoded prefix, answered together: one row each, decoded in lockstep."""
+"""Continuations of one encoded prefix, answered together: behind the prefix in one sequence, decoded in lockstep."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import torch
-from torch.nn.functional import pad
 
+from model_adapters.hf.branch_attention import BranchAttention
 from model_adapters.hf.decoding import ReplyState, decode_replies
-from model_adapters.hf.embedding import Embedder
-from model_adapters.hf.prefix import Prefix
+from model_adapters.hf.embedding import EmbeddedSpan, Embedder
+from model_adapters.hf.prefix import Prefix, chunks
 from model_adapters.hf.prompt import Piece
 
 __all__ = ["answer_together"]
 
+_Span = tuple[int, EmbeddedSpan]  # of a branch
 
-class _Rows:
-    """Continuations of one prefix, of different length, padded on the left so that all end in the same column.
 
-    Padding on the left lets every row append its next token at the same place of the cache. The attention mask hides
-    the padding; positions are given explicitly, so they do not depend on it.
-    """
+class _Branches:
+    """Continuations of a prefix, each with the positions that it has alone."""
 
-    def __init__(self, model: Any, embed: Embedder, prefix: Prefix) -> None:
+    def __init__(self, model: Any, embed: Embedder, prefix: Prefix, n_branches: int) -> None:
         self._model = model
         self._embed = embed
         self._prefix = prefix
+        self._ends = [prefix.end] * n_branches  # position of the next token of each
+        self._places = [prefix.n_tokens] * n_branches  # tokens of each, with the prefix
+        device = model.get_input_embeddings().weight.device
+        self._attention = BranchAttention(model.get_decoder().config, prefix.n_tokens, device)
 
     @torch.inference_mode()
-    def feed(self, continuations: Sequence[Sequence[Piece]], reserve: int) -> torch.Tensor:
-        """Encode all continuations; return the logits of each row's next token, (rows, vocabulary)."""
-        spans = [self._embed(pieces, self._prefix.end) for pieces in continuations]
-        self._ends = [span.end for span in spans]
-        width = max(len(span.embeds) for span in spans)
-        self._cache = self._prefix.expand(len(spans), width + reserve)
-        gaps = [width - len(span.embeds) for span in spans]
-        embeds = torch.stack([pad(span.embeds, (0, 0, gap, 0)) for span, gap in zip(spans, gaps, strict=True)])
-        positions = torch.cat([pad(span.positions, (gap, 0)) for span, gap in zip(spans, gaps, strict=True)], dim=-2)
-        n_prefix = self._prefix.n_tokens
-        self._mask = torch.ones(len(spans), n_prefix + width, dtype=torch.long, device=embeds.device)
-        for row, gap in enumerate(gaps):
-            self._mask[row, n_prefix : n_prefix + gap] = 0
-        return self._forward(embeds, positions)
+    def feed(self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int) -> torch.Tensor:
+        """Encode all continuations; return the logits of each one's next token, (branches, vocabulary)."""
+        logits: dict[int, torch.Tensor] = {}
+        for group in self._groups(continuations, chunk_tokens):
+            logits |= self._forward(group)  # the last chunk of a branch has the logits of its next token
+        return torch.stack([logits[branch] for branch in range(len(continuations))])
+
+    def _groups(self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int) -> Iterator[list[_Span]]:
+        """Yield chunks of branches that are encoded in one forward pass."""
+        group: list[_Span] = []
+        n_tokens = 0
+        for branch, pieces in enumerate(continuations):
+            for chunk in chunks(pieces, chunk_tokens):
+                span = self._embed(chunk, self._ends[branch])
+                self._ends[branch] = span.end
+                if group and n_tokens + len(span.embeds) > chunk_tokens:
+                    yield group
+                    group, n_tokens = [], 0
+                group.append((branch, span))
+                n_tokens += len(span.embeds)
+        yield group
 
     @torch.inference_mode()
-    def step(self, tokens: Sequence[int]) -> torch.Tensor:
-        """Feed one token to each row; return the logits of the next, (rows, vocabulary)."""
-        spans = [self._embed([token], end) for token, end in zip(tokens, self._ends, strict=True)]
-        self._ends = [span.end for span in spans]
-        self._mask = pad(self._mask, (0, 1), value=1)
-        return self._forward(
-            torch.stack([span.embeds for span in spans]), torch.cat([span.positions for span in spans], dim=-2)
-        )
+    def step(self, tokens: Mapping[int, int]) -> torch.Tensor:
+        """Feed one token to each of some branches; return the logits of the next, (these branches, vocabulary)."""
+        span = self._embed.words(list(tokens.values()), [self._ends[branch] for branch in tokens])
+        for branch in tokens:
+            self._ends[branch] += 1
+        return self._logits(span.embeds, span.positions, list(tokens), slice(None))
 
-    def _forward(self, embeds: torch.Tensor, positions: torch.Tensor) -> torch.Tensor:
-        output = self._model(
-            inputs_embeds=embeds,
-            attention_mask=self._mask,
-            position_ids=positions,
-            past_key_values=self._cache,
-            use_cache=True,
-            logits_to_keep=1,
-        )
-        logits: torch.Tensor = output.logits[:, -1]
+    def _forward(self, group: Sequence[_Span]) -> dict[int, torch.Tensor]:
+        """Encode chunks of branches; return the logits behind each branch's last one, (vocabulary,)."""
+        owners = [branch for branch, span in group for _ in span.embeds]
+        last = {branch: at for at, branch in enumerate(owners)}
+        positions = torch.cat([span.positions for _, span in group], dim=-1)
+        embeds = torch.cat([span.embeds for _, span in group])
+        rows = self._logits(embeds, positions, owners, torch.tensor(list(last.values())))
+        return dict(zip(last, rows, strict=True))
+
+    def _logits(
+        self, embeds: torch.Tensor, positions: torch.Tensor, owners: Sequence[int], keep: slice | torch.Tensor
+    ) -> torch.Tensor:
+        """Encode tokens of the owners' branches; return the logits of the kept ones, (kept, vocabulary)."""
+        places = []
+        for branch in owners:
+            places.append(self._places[branch])
+            self._places[branch] += 1
+        with self._attention.appended(owners, places):
+            output = self._model(
+                inputs_embeds=embeds[None],
+                position_ids=positions,
+                past_key_values=self._prefix.cache,
+                use_cache=True,
+                logits_to_keep=keep,
+            )
+        logits: torch.Tensor = output.logits[0]
         return logits
 
 
@@ -73,12 +96,14 @@ def answer_together(
     prompts: Sequence[Sequence[Piece]],
     n_shared: int,
     replies: Sequence[ReplyState],
+    chunk_tokens: int,
 ) -> None:
     """Decode the replies to prompts that begin with the same `n_shared` pieces, each prompt with more behind them.
 
-    `prefix` has encoded the shared pieces and nothing more; `replies` are empty, one for each prompt.
+    `prefix` has encoded the shared pieces and nothing more, and has no more afterwards; `replies` are empty, one for
+    each prompt.
     """
-    rows = _Rows(model, embed, prefix)
-    reserve = max(reply.decoding.max_new_tokens for reply in replies)
-    logits = rows.feed([prompt[n_shared:] for prompt in prompts], reserve)
-    decode_replies(logits, rows.step, replies)
+    continuations = [prompt[n_shared:] for prompt in prompts]
+    branches = _Branches(model, embed, prefix, len(prompts))
+    with prefix.extended(continuations, sum(reply.decoding.max_new_tokens for reply in replies)):
+        decode_replies(branches.feed(continuations, chunk_tokens), branches.step, replies)

@@ -4,7 +4,7 @@ Sampling is that of transformers: temperature, then the most likely tokens (`top
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -162,21 +162,22 @@ class ReplyState:
 
 
 def decode_replies(
-    logits: torch.Tensor, step: Callable[[Sequence[int]], torch.Tensor], replies: Sequence[ReplyState]
+    logits: torch.Tensor, step: Callable[[Mapping[int, int]], torch.Tensor], replies: Sequence[ReplyState]
 ) -> None:
     """Decode replies in lockstep until all are done.
 
     Args:
         logits: logits of the first token of each reply, (replies, vocabulary).
-        step: feeds one token to each reply and returns the logits of the next, (replies, vocabulary).
+        step: feeds tokens, by the numbers of the replies that are not done, and returns the logits of the next ones,
+            (these replies, vocabulary).
         replies: empty replies, which are filled in place.
     """
-    while True:
-        extend_replies([(reply, logits[row]) for row, reply in enumerate(replies) if not reply.done])
-        if all(reply.done for reply in replies):
-            return
-        # Finished rows are fed any token; their logits are ignored.
-        logits = step([0 if reply.done else reply.ids[-1] for reply in replies])
+    numbers = list(range(len(replies)))
+    while numbers:
+        extend_replies([(replies[number], row) for number, row in zip(numbers, logits, strict=True)])
+        numbers = [number for number in numbers if not replies[number].done]
+        if numbers:
+            logits = step({number: replies[number].ids[-1] for number in numbers})
 
 
 def extend_replies(replies: Sequence[tuple[ReplyState, torch.Tensor]]) -> None:

@@ -74,6 +74,15 @@ class Embedder:
         behind = [start, *(largest + 1).tolist()]
         return EmbeddedSpan(embeds, positions.to(device), tuple(behind[at] for at in firsts), behind[-1])
 
+    @torch.inference_mode()
+    def words(self, tokens: Sequence[int], starts: Sequence[int]) -> EmbeddedSpan:
+        """Embed tokens of text of different sequences, each of which begins at its own position."""
+        ids = torch.tensor(tokens)
+        positions = torch.empty_like(self._family.positions(ids, [], 0)).copy_(torch.tensor(starts))
+        device = self._embeddings.weight.device
+        ends = tuple(start + 1 for start in starts)
+        return EmbeddedSpan(self._embeddings(ids.to(device)), positions.to(device), tuple(starts), max(ends))
+
     def _slot_features(self, visuals: Sequence[Frame | Clip], n_slots: int) -> torch.Tensor:
         features = torch.cat(self._features.get(visuals))
         if len(features) != n_slots:

@@ -58,15 +58,6 @@ class BufferedCache(Cache):
         if excess > 0:
             self.crop(-excess)
 
-    def expand(self, n_rows: int, capacity: int) -> "BufferedCache":
-        """Return a new cache with this one's single sequence in each of its rows, and this capacity in tokens."""
-        expanded = BufferedCache(self._allocation.storage)
-        expanded.reserve(capacity)
-        for index, layer in enumerate(self.layers):
-            if isinstance(layer, BufferedLayer) and layer.keys is not None and layer.values is not None:
-                expanded.update(layer.keys.expand(n_rows, -1, -1, -1), layer.values.expand(n_rows, -1, -1, -1), index)
-        return expanded
-
 
 class BufferedLayer(DynamicLayer):
     """Keys and values of one layer; `keys` and `values` are views on the used part of the buffers.

@@ -6,6 +6,7 @@ import torch
 
 from infthor_eval.errors import ModelError
 from model_adapters.hf.batch import answer_together
+from model_adapters.hf.branch_attention import can_branch
 from model_adapters.hf.checkpoint_model import HfModel
 from model_adapters.hf.decoding import ReplyState, decode_replies
 from model_adapters.hf.embedding import Embedder
@@ -72,14 +73,15 @@ class TransformersModel(HfModel):
 
     @property
     def _batch_size(self) -> int:
-        # Rows of a batch have to share one prefix and one set of rotary frequencies.
-        return self._options.batch_size if self._options.share_prefix and self._rope is None else 1
+        # Branches have to share one prefix and one set of rotary frequencies.
+        branches = self._options.share_prefix and self._rope is None and can_branch(self._loaded.model)
+        return self._options.batch_size if branches else 1
 
     def _answer_batch(self, prompts: Sequence[Sequence[Piece]], decoding: Decoding) -> list[Reply]:
         if not self._options.share_prefix:
             self._prefix.reset()
         replies = [begin_reply(self._loaded, decoding, token_ids(prompt)) for prompt in prompts]
-        decode = self._decode_one if len(prompts) == 1 else self._decode_rows
+        decode = self._decode_one if len(prompts) == 1 else self._decode_branches
         try:
             with wrap_model_errors(self.name), wrap_memory_errors(self.name, sum(map(n_tokens, prompts))):
                 n_cached = decode(prompts, replies)
@@ -99,19 +101,25 @@ class TransformersModel(HfModel):
         shared = self._prefix.rewind_to(prompt)
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
-        decode_replies(logits[None], lambda tokens: self._prefix.feed(tokens)[None], [reply])
+        decode_replies(logits[None], lambda tokens: self._prefix.feed(list(tokens.values()))[None], [reply])
         return [cached]
 
-    def _decode_rows(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]) -> list[int]:
+    def _decode_branches(self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]) -> list[int]:
         """Decode several replies together; return how many tokens of each prompt were in the cache."""
         common = n_common(prompts)
         shared = min(self._prefix.rewind_to(prompts[0]), common)
-        # The cached sequence may share more with the first prompt than all prompts share: rows copy the common part.
+        # The cached sequence may share more with the first prompt than all prompts share.
         self._prefix.cut(shared)
         cached = self._prefix.n_tokens
         if shared < common:
             self._prefix.feed(prompts[0][shared:common])
         answer_together(
-            self._loaded.model, self._embed, prefix=self._prefix, prompts=prompts, n_shared=common, replies=replies
+            self._loaded.model,
+            self._embed,
+            prefix=self._prefix,
+            prompts=prompts,
+            n_shared=common,
+            replies=replies,
+            chunk_tokens=self._options.chunk_tokens,
         )
         return [cached, *[self._prefix.n_tokens] * (len(prompts) - 1)]

@@ -6,6 +6,7 @@ attend to the cache, so the numbers differ from those of one pass only by roundi
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import torch
@@ -16,7 +17,7 @@ from model_adapters.hf.kv_cache import BufferedCache
 from model_adapters.hf.prompt import Piece, n_tokens, token_ids
 from model_adapters.hf.rope import LengthRope
 
-__all__ = ["Prefix"]
+__all__ = ["Prefix", "chunks"]
 
 
 class Prefix:
@@ -67,9 +68,24 @@ class Prefix:
         """Position of the next token."""
         return self._starts[-1]
 
-    def expand(self, n_rows: int, n_more: int) -> BufferedCache:
-        """Return a separate cache with the sequence in each of several rows, and capacity for more tokens."""
-        return self._cache.expand(n_rows, self.n_tokens + n_more)
+    @property
+    def cache(self) -> BufferedCache:
+        """Keys and values of the sequence."""
+        return self._cache
+
+    @contextmanager
+    def extended(self, continuations: Sequence[Sequence[Piece]], reserve: int) -> Iterator[None]:
+        """Let others append to the cache within the context, what these continuations and some more tokens need."""
+        self._cache.reserve(self.n_tokens + sum(map(n_tokens, continuations)) + reserve)
+        done = False
+        try:
+            yield
+            done = True
+        finally:
+            if done:
+                self._cache.truncate(self.n_tokens)
+            else:  # some layers may have cached more than others
+                self.reset()
 
     def rewind_to(self, pieces: Sequence[Piece]) -> int:
         """Cut the sequence behind its longest common prefix with these pieces, of which at least one is left to feed.
@@ -120,24 +136,11 @@ class Prefix:
         """
         self._cache.reserve(self.n_tokens + n_tokens(pieces) + reserve)
         logits = None
-        for chunk in self._chunks(pieces):
+        for chunk in chunks(pieces, self._chunk_tokens):
             logits = self._forward(chunk)
         if logits is None:
             raise ValueError("nothing to feed")
         return logits
-
-    def _chunks(self, pieces: Sequence[Piece]) -> Iterator[list[Piece]]:
-        chunk: list[Piece] = []
-        size = 0
-        for piece in pieces:
-            width = 1 if isinstance(piece, int) else len(piece.ids)
-            if chunk and size + width > self._chunk_tokens:
-                yield chunk
-                chunk, size = [], 0
-            chunk.append(piece)
-            size += width
-        if chunk:
-            yield chunk
 
     @torch.inference_mode()
     def _forward(self, chunk: list[Piece]) -> torch.Tensor:
@@ -162,3 +165,18 @@ class Prefix:
             self._ends.append(end)
         self._starts[-1:] = [*span.starts, span.end]
         return output.logits[0, -1]
+
+
+def chunks(pieces: Sequence[Piece], chunk_tokens: int) -> Iterator[list[Piece]]:
+    """Yield pieces in chunks of at most so many tokens; a larger frame is a chunk alone."""
+    chunk: list[Piece] = []
+    size = 0
+    for piece in pieces:
+        width = 1 if isinstance(piece, int) else len(piece.ids)
+        if chunk and size + width > chunk_tokens:
+            yield chunk
+            chunk, size = [], 0
+        chunk.append(piece)
+        size += width
+    if chunk:
+        yield chunk

@@ -119,8 +119,8 @@ class HfOptions(Reading, Placement):
     Attributes:
         share_prefix: encode the common prefix of two prompts once; false encodes every prompt as a whole.
         chunk_tokens: most tokens encoded in one forward pass.
-        batch_size: most continuations of one prefix that are answered together; each has its own copy of the prefix's
-            keys and values, which attention copies again for each token if the continuations differ in length.
+        batch_size: most continuations of one prefix that are answered together. They read the prefix's keys and values
+            together, and a reply can differ by rounding with what is answered beside it.
         kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
         feature_cache_mb: memory for vision features of earlier frames, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
@@ -128,7 +128,7 @@ class HfOptions(Reading, Placement):
 
     share_prefix: bool = True
     chunk_tokens: int = 1024
-    batch_size: int = 1
+    batch_size: int = 64
     kv_offload: bool = False
     feature_cache_mb: int = 128
     max_tokens: int | None = None

@@ -11,6 +11,7 @@ from infthor_eval.harness import nieh_task, registration
 from infthor_eval.harness.model import InfthorLM
 from infthor_eval.runs import read_run
 from model_adapters.hf.model import TransformersModel
+from model_adapters.options.checkpoints import HfOptions
 from tests.runs.toy import Prepared, Sums, ToySuite
 
 KWARGS = {"until": [], "max_gen_toks": 6, "do_sample": False, "temperature": 0.0}
@@ -46,7 +47,7 @@ def test_replies_come_in_the_order_of_the_requests_and_are_found_again(requests,
 
 def test_what_lm_eval_says_by_default_is_not_taken_for_a_wish(requests):
     model = InfthorLM("qwen2.5-vl-tiny", batch_size=1, max_batch_size=None, device="cuda:0")
-    assert model._model.capabilities.batch_size == 1
+    assert model._model.capabilities.batch_size == HfOptions.batch_size > 1
     assert InfthorLM("qwen2.5-vl-tiny", batch_size="4", device="cpu")._model.capabilities.batch_size == 4
     with pytest.raises(UsageError, match="device=nowhere"):
         InfthorLM("qwen2.5-vl-tiny", device="nowhere")

@@ -41,7 +41,8 @@ def asked(monkeypatch):
 @pytest.fixture
 def taking_notes(prepared):
     def make(model="qwen2.5-vl-tiny", model_options=None, **changes):
-        return prepared(model, model_options, tasks=(TASK,), **changes)
+        alone = {"batch_size": "1"} if model.endswith("-tiny") else None
+        return prepared(model, model_options or alone, tasks=(TASK,), **changes)
 
     return make
 

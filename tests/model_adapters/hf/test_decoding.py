@@ -1,4 +1,4 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import pytest
@@ -39,7 +39,7 @@ def _writing(
 
 
 def _written(reply: ReplyState, logits: torch.Tensor, step: Feed = _counting) -> list[int]:
-    decode_replies(logits[None], lambda tokens: torch.stack([step(token) for token in tokens]), [reply])
+    decode_replies(logits[None], lambda tokens: torch.stack([*map(step, tokens.values())]), [reply])
     return reply.ids
 
 
@@ -72,15 +72,15 @@ def test_no_token_is_fed_in_vain() -> None:
 
 def test_replies_are_written_in_step_each_to_its_own_end() -> None:
     replies = [_writing(up_to(50)), _writing(up_to(2)), _writing(up_to(50), Generation(frozenset({3})))]
-    fed: list[Sequence[int]] = []
+    fed: list[dict[int, int]] = []
 
-    def step(tokens: Sequence[int]) -> torch.Tensor:
-        fed.append(tokens)
-        return torch.stack([_counting(token) for token in tokens])
+    def step(tokens: Mapping[int, int]) -> torch.Tensor:
+        fed.append(dict(tokens))
+        return torch.stack([_counting(token) for token in tokens.values()])
 
     decode_replies(torch.stack([_points_at(6), _points_at(1), _points_at(1)]), step, replies)
     assert [reply.ids for reply in replies] == [[6, 7, 8], [1, 2], [1, 2]]
-    assert fed == [[6, 1, 1], [7, 0, 2], [8, 0, 0]]
+    assert fed == [{0: 6, 1: 1, 2: 1}, {0: 7, 2: 2}, {0: 8}]
 
 
 def test_the_penalty_is_for_tokens_of_context_and_reply() -> None:

@@ -19,10 +19,10 @@ from ..checkpoints import FAMILIES
 NEW = 5
 ADAPTERS = {family: family for family in FAMILIES} | dict.fromkeys(("llava", "idefics3", "deepseek-vl-1.3b"), "hf-vlm")
 MODES: dict[str, dict[str, str]] = {
-    "shared": {},
-    "chunked": {"chunk_tokens": "50"},
+    "shared": {"batch_size": "1"},
+    "chunked": {"batch_size": "1", "chunk_tokens": "50"},
     "offloaded": {"kv_offload": "true"},
-    "batched": {"batch_size": "3"},
+    "batched": {"batch_size": "3", "chunk_tokens": "20"},
 }
 
 
