@@ -18,7 +18,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -35,6 +34,8 @@ MODEL = "checkpoint"
 WAYS = ("ours", "ours one by one", "vLLM", "vLLM uncached", "vLLM's server", "lm-eval hf-multimodal")
 SLOW = {"vLLM uncached", "lm-eval hf-multimodal"}
 REFERENCE = "ours one by one"
+_COMMAND = ["-c", "from infthor_eval.cli import main; main()"]
+_LM_EVAL = ["-c", "from lm_eval.__main__ import cli_evaluate; cli_evaluate()"]
 _PIXELS = {"shortest_edge": 56 * 56, "longest_edge": 84 * 84}  # 9 tokens a frame
 
 
@@ -68,8 +69,8 @@ class Cost:
 def main() -> None:
     """Run all rounds and print a table of each."""
     options = _arguments()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
         write_checkpoint(folder / MODEL)
         write_set(folder / "long", options.frames, options.questions)
         sets = {"mini": ("nieh_mini_full", None), "long": ("nieh_full", folder / "long")}
@@ -112,7 +113,8 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
 def run_race(race: Race, folder: Path, options: argparse.Namespace) -> None:
     """Run every way on one question and on more, and print what they took."""
     print(f"\n{race.task}, {race.dtype}, {race.threads} thread(s); processor seconds (seconds by the clock)")
-    print(f"{'':22}{'one question':>18}{'whole run':>20}{'asked':>6}{'each further':>18}{'encoded':>9}{'cached':>8}  equal")
+    heads = f"{'one question':>18}{'whole run':>20}{'asked':>6}{'each further':>18}{'encoded':>9}{'cached':>8}"
+    print(f"{'':22}{heads}  equal")
     expected: Mapping[str, str] = {}
     for way in sorted(options.ways, key=lambda way: way != REFERENCE):
         limit = options.slow_questions if way in SLOW else None
@@ -137,40 +139,45 @@ def _row(way: str, one: Cost, whole: Cost, expected: Mapping[str, str]) -> str:
 
 def run_way(way: str, race: Race, folder: Path, limit: int | None) -> Cost:
     """Return what a way takes for the first questions, or all."""
-    with tempfile.TemporaryDirectory(dir=folder) as output, ExitStack() as stack:
-        tasks = ["--tasks", race.task, *([] if limit is None else ["--limit", str(limit)])]
+    tasks = ["--tasks", race.task, *([] if limit is None else ["--limit", str(limit)])]
+    with tempfile.TemporaryDirectory(dir=folder) as name:
+        output = Path(name)
         if way == "lm-eval hf-multimodal":
-            return _run_lm_eval(race, folder / MODEL, tasks, Path(output))
-        served = stack.enter_context(serve_vllm(folder / MODEL, race.dtype, race.environment, n_frames=500))\
-            if way == "vLLM's server" else None
-        model = _model(way, race, folder / MODEL) if served is None else served.model
-        command = ["-m", "infthor_eval", *model, *tasks, "--output", output]
-        command += [] if race.data is None else ["--data", str(race.data)]
-        wall, processor = _time(command, race.environment)
-        if served is not None:
-            processor += served.processor_seconds()
-        return _cost(wall, processor, Path(output))
+            return _run_lm_eval(race, folder / MODEL, tasks, output)
+        data = [] if race.data is None else ["--data", str(race.data)]
+        if way != "vLLM's server":
+            wall, processor = _time([*_COMMAND, *_model(way, race, folder / MODEL), *tasks, *data, *_to(output)], race)
+            return _cost(wall, processor, output)
+        start = time.perf_counter()
+        with serve_vllm(folder / MODEL, race.dtype, race.environment, most_frames=512) as served:
+            given = ["--model", "openai", "--model-args", f"base_url={served.url},model={folder / MODEL}"]
+            _, processor = _time([*_COMMAND, *given, *tasks, *data, *_to(output)], race)
+        return _cost(time.perf_counter() - start, processor + served.processor_seconds, output)
+
+
+def _to(output: Path) -> list[str]:
+    return ["--output", str(output)]
 
 
 def _model(way: str, race: Race, checkpoint: Path) -> list[str]:
     given = {"pretrained": str(checkpoint), "dtype": race.dtype}
-    engine = []
+    engine: list[str] = []
     if way.startswith("vLLM"):
         engine = ["--engine", "vllm"]
         given |= {"enforce_eager": "true", "max_model_len": "16384"}
         if way == "vLLM uncached":
             given |= {"prefix_caching": "false", "max_num_seqs": "1"}
     else:
-        given |= {"device": "cpu"} | ({"batch_size": "1"} if way == "ours one by one" else {})
+        given |= {"device": "cpu"} | ({"batch_size": "1"} if way == REFERENCE else {})
     return ["--model", "qwen2.5-vl", *engine, "--model-args", ",".join(f"{key}={given[key]}" for key in given)]
 
 
 def _run_lm_eval(race: Race, checkpoint: Path, tasks: Sequence[str], output: Path) -> Cost:
-    command = ["-m", "lm_eval", "run", "--model", "hf-multimodal", *tasks, "--device", "cpu", "--batch_size", "1"]
+    command = [*_LM_EVAL, "run", "--model", "hf-multimodal", *tasks, "--device", "cpu", "--batch_size", "1"]
     command += ["--model_args", f"pretrained={checkpoint},dtype={race.dtype}", "--apply_chat_template"]
     command += ["--include_path", str(packaged_folder("tasks")), "--log_samples", "--output_path", str(output)]
     command += [] if race.data is None else ["--metadata", json.dumps({"data": str(race.data)})]
-    wall, processor = _time(command, race.environment)
+    wall, processor = _time(command, race)
     (path,) = output.rglob("samples_*.jsonl")
     samples = [json.loads(line) for line in path.read_text().splitlines()]
     return Cost(wall, processor, {sample["doc"]["question_id"]: sample["resps"][0][0] for sample in samples})
@@ -184,14 +191,14 @@ def _cost(wall: float, processor: float, output: Path) -> Cost:
         sys.exit(f"{len(failed)} questions failed: {failed[0]}")
     read = sum(record.tokens.context or 0 for record in records)
     cached = sum(record.tokens.cached or 0 for record in records)
-    return Cost(wall, processor, {record.key.item: record.payload.reply for record in records}, read, cached)
+    return Cost(wall, processor, {record.key.id: record.payload.reply for record in records}, read, cached)
 
 
-def _time(arguments: Sequence[str], environment: Mapping[str, str]) -> tuple[float, float]:
+def _time(arguments: Sequence[str], race: Race) -> tuple[float, float]:
     """Return the seconds by the clock and the processor seconds of a process and its children."""
     start = time.perf_counter()
     with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen([sys.executable, *arguments], env=environment, stdout=said, stderr=said)
+        process = subprocess.Popen([sys.executable, *arguments], env=race.environment, stdout=said, stderr=said)
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         if process.returncode:

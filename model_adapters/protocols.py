@@ -132,6 +132,7 @@ class Capabilities:
         choices: replies can be restricted to given texts.
         video_input: conversations take videos; if false, a video is refused, and its frames can be given as images.
         batch_size: continuations of a conversation that the model answers together.
+        batch_contexts: continuations that have no frames in common are worth answering together, too.
         max_in_flight: conversations that may be asked at the same time, each from its own thread.
         max_tokens: limit of context and reply together, in tokens, or None if there is none or it is unknown.
         max_tokens_before_extension: the checkpoint's own limit if `max_tokens` extends it, else None.
@@ -144,6 +145,7 @@ class Capabilities:
     choices: bool = False
     video_input: bool = False
     batch_size: int = 1
+    batch_contexts: bool = False
     max_in_flight: int = 1
     max_tokens: int | None = None
     max_tokens_before_extension: int | None = None

@@ -111,6 +111,10 @@ class Answerer(Protocol):
     def batch_size(self) -> int:
         """Number of units worth answering at once."""
 
+    @property
+    def batch_contexts(self) -> bool:
+        """True if these may have different contexts."""
+
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
         """Return a context as the model is given it: its notes as text, missing ones are taken now; films as images.
 
@@ -122,7 +126,7 @@ class Answerer(Protocol):
         """
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
-        """Return the replies to units that share their context and decoding.
+        """Return the replies to units that share their decoding, and their context unless contexts are batched.
 
         Raises:
             DataError: a frame cannot be read; nothing is answered then.
@@ -138,6 +142,7 @@ class ModelAnswerer:
 
     def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self.batch_size = model.capabilities.batch_size
+        self.batch_contexts = model.capabilities.batch_contexts
         self._name = model.name
         self._video_input = model.capabilities.video_input
         self._notebook = Notebook(model, session)
@@ -154,15 +159,22 @@ class ModelAnswerer:
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
-        context = requests[0].shown
+        context, decoding = requests[0].shown, requests[0].prepared.decoding
         with wrap_request_errors(self._name):
-            if context != self._context:
-                self._conversation.rewind(self._start)
-                self._context = None
-                self._conversation.append(*context)
-                self._context, self._after_context = context, self._conversation.mark()
-            self._conversation.rewind(self._after_context)
-            return self._conversation.replies([[item.text] for item in requests], requests[0].prepared.decoding)
+            if any(item.shown != context for item in requests[1:]):
+                self._go_to(())
+                return self._conversation.replies([[*item.shown, item.text] for item in requests], decoding)
+            self._go_to(context)
+            return self._conversation.replies([[item.text] for item in requests], decoding)
+
+    def _go_to(self, context: tuple[Part, ...]) -> None:
+        """Let the conversation be this context."""
+        if context != self._context:
+            self._conversation.rewind(self._start)
+            self._context = None
+            self._conversation.append(*context)
+            self._context, self._after_context = context, self._conversation.mark()
+        self._conversation.rewind(self._after_context)
 
     def usage(self, reply: Reply) -> Usage:
         """See `Answerer`."""
@@ -173,6 +185,7 @@ class BaselineAnswerer:
     """A baseline, which reads no context and takes no notes."""
 
     batch_size = 1
+    batch_contexts = False
 
     def __init__(self, predict: Predict) -> None:
         self._predict = predict
@@ -193,8 +206,9 @@ class BaselineAnswerer:
 def answer_units(
     units: Sequence[NiehUnit], prepared: PreparedTask, answerer: Answerer, session: Session[NiehAnswer]
 ) -> Iterator[UnitRecord[NiehAnswer]]:
-    """Yield the records of units on one trajectory, answered together if they share their context.
+    """Yield the records of units on one trajectory.
 
+    Those with one context are answered together, and all of them if the answerer batches contexts.
     Neighbours share as long a prefix as there is, which a model's conversation encodes once. The order depends on the
     units alone, so it is the same when a run is resumed.
     """
@@ -204,8 +218,15 @@ def answer_units(
             requests.append(_UnitRequest.of(unit, prepared))
         except DataError as error:
             yield unit.record_failure(session.describe_failure(unit, error))
+    waiting: list[_UnitRequest] = []
     for _, in_one_context in groupby(sorted(requests, key=_names), key=_names):
-        yield from _in_context(list(in_one_context), answerer, session)
+        readable, failed = _read(list(in_one_context), answerer, session)
+        yield from failed
+        waiting += readable
+        if not answerer.batch_contexts:
+            yield from _answer_in_batches(waiting, answerer, session)
+            waiting = []
+    yield from _answer_in_batches(waiting, answerer, session)
 
 
 def _content(part: Part) -> Any:
@@ -227,19 +248,24 @@ def _names_in(part: ContextPart) -> list[str]:
     return [part.path.name if isinstance(part, FrameRef) else part]
 
 
-def _in_context(
+def _read(
     requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer]
-) -> Iterator[UnitRecord[NiehAnswer]]:
+) -> tuple[list[_UnitRequest], list[UnitRecord[NiehAnswer]]]:
+    """Return the requests with their common context as the model is given it, or else their records as failed."""
     try:
         context = answerer.read(requests[0].context)
     except (DataError, ModelError) as error:
-        yield from [item.unit.record_failure(session.describe_failure(item.unit, error)) for item in requests]
-        return
-    asked = [replace(item, context=context) for item in requests]
+        return [], [item.unit.record_failure(session.describe_failure(item.unit, error)) for item in requests]
+    return [replace(item, context=context) for item in requests], []
+
+
+def _answer_in_batches(
+    requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer]
+) -> Iterator[UnitRecord[NiehAnswer]]:
     # A batch has the same requests when a run is resumed, as replies can differ by rounding with those beside them.
-    for at in range(0, len(asked), answerer.batch_size):
+    for at in range(0, len(requests), answerer.batch_size):
         waiting = []
-        for item in asked[at : at + answerer.batch_size]:
+        for item in requests[at : at + answerer.batch_size]:
             record = _find_record(item, session)
             if record is None:
                 waiting.append(item)

@@ -38,6 +38,7 @@ def engine_arguments(folder: Path, options: EngineOptions) -> dict[str, Any]:
         "enforce_eager": options.enforce_eager,
         "enable_prefix_caching": options.prefix_caching,
         **{name: value for name, value in optional.items() if value is not None},
+        **options.throughput(),
     }
 
 

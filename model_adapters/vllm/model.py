@@ -59,6 +59,7 @@ class VllmModel(CheckpointModel):
             sampling=True,
             choices=True,
             batch_size=_BATCH,
+            batch_contexts=True,
             max_tokens=self._max_tokens,
             max_tokens_before_extension=None if self._options.rope is None else text.max_position_embeddings,
         )
@@ -80,6 +81,7 @@ class VllmModel(CheckpointModel):
             "parallel": [options.tensor_parallel_size, options.pipeline_parallel_size, options.data_parallel_size],
             "enforce_eager": options.enforce_eager,
             "prefix_caching": options.prefix_caching,
+            "throughput": options.throughput(),
             "batch_invariant": self._engine.batch_invariant,
             "seed": options.seed,
             "generation": {"repetition_penalty": loaded.generation.repetition_penalty, "end_ids": sorted(self._ends)},
@@ -93,27 +95,32 @@ class VllmModel(CheckpointModel):
     def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
         """Answer several conversations; see `Conversation.replies`.
 
-        If they share a prefix that is not in vLLM's cache, the first is sent alone and fills it: sent together, all of
-        them would compute the prefix.
+        Those with a long prefix that is not in vLLM's cache are sent first, one for each prefix, and fill it: sent
+        together with the others, all of them would compute the prefix.
         """
         with wrap_model_errors(self.name):
             prompts = [self.pieces(turns) for turns in conversations]
         for prompt in prompts:
             self._check_size(prompt, decoding)
         settings, requests = self._settings(decoding), self._requests(prompts)
-        n_first = 1 if self._share_uncached_prefix(prompts) else 0
-        outputs = [
-            *self._engine.generate(requests[:n_first], settings, decoding.choices),
-            *self._engine.generate(requests[n_first:], settings, decoding.choices),
-        ]
+        first = self._new_prefixes(prompts)
+        outputs: dict[int, EngineOutput] = {}
+        for wave in (first, [at for at in range(len(prompts)) if at not in first]):
+            sent = self._engine.generate([requests[at] for at in wave], settings, decoding.choices)
+            outputs |= zip(wave, sent, strict=True)
         self._last_prompt = prompts[-1] if prompts else self._last_prompt
-        return [self._reply(prompt, output, decoding) for prompt, output in zip(prompts, outputs, strict=True)]
+        return [self._reply(prompt, outputs[at], decoding) for at, prompt in enumerate(prompts)]
 
-    def _share_uncached_prefix(self, prompts: Sequence[Sequence[Piece]]) -> bool:
-        if len(prompts) < 2 or not self._options.prefix_caching:
-            return False
-        common = n_common(prompts)
-        return list(self._last_prompt[:common]) != list(prompts[0][:common])
+    def _new_prefixes(self, prompts: Sequence[Sequence[Piece]]) -> list[int]:
+        """Return the prompts that share less than half of their tokens with the one before them."""
+        if not self._options.prefix_caching:
+            return list(range(len(prompts)))
+        before = [self._last_prompt, *prompts]
+        return [
+            at
+            for at, (last, prompt) in enumerate(zip(before, prompts, strict=False))
+            if not last or 2 * n_tokens(prompt[: n_common([last, prompt])]) < n_tokens(prompt)
+        ]
 
     def _check_size(self, prompt: Sequence[Piece], decoding: Decoding) -> None:
         check_limit(self.name, n_tokens(prompt), decoding.max_new_tokens, self._max_tokens, "max_model_len")

@@ -1,6 +1,7 @@
 """Options of models that vLLM runs; docs/vllm.md lists the corresponding arguments of vLLM."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 from model_adapters.options.checkpoints import CheckpointReading, CheckpointSource
 from model_adapters.options.families import (
@@ -19,6 +20,7 @@ __all__ = [
     "OpenVLAOnVllmOptions",
     "PixtralOnVllmOptions",
     "Qwen25VLOnVllmOptions",
+    "Throughput",
     "VllmOptions",
     "VllmPolicyOptions",
 ]
@@ -33,13 +35,54 @@ _RANGES = {
     "seed": (0, 2**32 - 1),
     "frame_size": (1, 100_000),
     "max_frames": (1, 2**31 - 1),
+    "max_num_seqs": (1, 2**20),
+    "max_num_batched_tokens": (1, 2**31 - 1),
+    "block_size": (1, 2**20),
+    "kv_offloading_size": (0, 2**20),
+    "decode_context_parallel_size": (1, 1024),
+    "prefill_context_parallel_size": (1, 1024),
 }
+_ENCODER_SPLITS = ("weights", "data")
 _LAUNCHED = "external_launcher"
 _IMAGE_BACKENDS = ("pil", "torchvision")
 
 
 @dataclass(frozen=True, kw_only=True)
-class EngineOptions:
+class Throughput:
+    """How vLLM stores long contexts and divides the work on them; all under vLLM's names, its own choice where None.
+
+    Attributes:
+        max_num_seqs: most requests that run at the same time.
+        max_num_batched_tokens: most tokens of a step: the size of the chunks in which long prompts are encoded.
+        enable_chunked_prefill: encode long prompts in chunks, between which other requests are decoded.
+        block_size: tokens of a block of keys and values, of which the prefix cache shares whole ones.
+        kv_cache_dtype: type of keys and values (fp8 halves their memory and changes replies).
+        kv_offloading_size: CPU memory for keys and values that do not fit on the GPU, in GiB.
+        decode_context_parallel_size: GPUs that split the keys and values of each context while decoding.
+        prefill_context_parallel_size: GPUs that split each prompt while it is encoded.
+        mm_encoder_tp_mode: weights splits the vision tower over the GPUs, data splits the frames.
+        mm_encoder_attn_backend: vLLM's name of the vision tower's attention kernel.
+    """
+
+    max_num_seqs: int | None = None
+    max_num_batched_tokens: int | None = None
+    enable_chunked_prefill: bool | None = None
+    block_size: int | None = None
+    kv_cache_dtype: str | None = None
+    kv_offloading_size: float | None = None
+    decode_context_parallel_size: int | None = None
+    prefill_context_parallel_size: int | None = None
+    mm_encoder_tp_mode: str | None = None
+    mm_encoder_attn_backend: str | None = None
+
+    def throughput(self) -> dict[str, Any]:
+        """Return what is chosen, by vLLM's names."""
+        chosen = {field.name: getattr(self, field.name) for field in fields(Throughput)}
+        return {name: value for name, value in chosen.items() if value is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineOptions(Throughput):
     """Options of vLLM for models and policies.
 
     Attributes:
@@ -81,6 +124,8 @@ class EngineOptions:
             value = getattr(self, name, None)
             if value is not None and not least <= value <= most:
                 raise ValueError(f"{name}={value} is not from {least:,} to {most:,}")
+        if self.mm_encoder_tp_mode not in (None, *_ENCODER_SPLITS):
+            raise ValueError(f"mm_encoder_tp_mode={self.mm_encoder_tp_mode} is not {' or '.join(_ENCODER_SPLITS)}")
         if self.data_parallel_size > 1 and self.distributed_executor_backend != _LAUNCHED:
             raise ValueError(
                 f"data_parallel_size={self.data_parallel_size} needs distributed_executor_backend={_LAUNCHED} in vLLM; "

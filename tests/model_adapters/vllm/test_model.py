@@ -205,6 +205,19 @@ def test_what_was_just_read_is_warm_already(start: Start, vllm: Double, frames: 
     assert all(reply.n_cached_tokens > 0 for reply in more)
 
 
+def test_the_first_of_each_context_go_together_and_then_the_others(
+    start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
+) -> None:
+    contexts = [frames[:3], frames[:3], frames[3:], frames[3:]]
+    asked = [[*context, f"\nQuestion {number}?"] for number, context in enumerate(contexts)]
+    asked.append([frames[0], "\nAlone?"])
+    replies = start().conversation().replies(asked, up_to(4))
+    assert [len(call.prompts) for call in vllm.calls] == [3, 2]
+    assert min(replies[1].n_cached_tokens, replies[3].n_cached_tokens) > 40
+    theirs = [in_process("qwen2.5-vl").conversation().replies([parts], up_to(4))[0] for parts in asked]
+    assert [facts(reply) for reply in replies] == [facts(reply) for reply in theirs]
+
+
 def test_without_a_cache_all_go_together(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
     replies = _talk(start(prefix_caching=False), *frames).replies([["\nOne?"], ["\nTwo?"]], up_to(2))
     assert [len(call.prompts) for call in vllm.calls] == [2]

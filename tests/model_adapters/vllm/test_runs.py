@@ -19,13 +19,13 @@ from .double import Double
 
 @pytest.fixture
 def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run: Any) -> Any:
-    """Runs `nieh_full` on five questions about two trajectories."""
+    """Runs a task (`nieh_full`) on five questions about two trajectories."""
     data = make_nieh_set(size=56)
 
-    def ask(name: str, *options: object, **model_args: object) -> tuple[int, str, str]:
+    def ask(name: str, *options: object, task: str = "nieh_full", **model_args: object) -> tuple[int, str, str]:
         given = {"pretrained": checkpoints["qwen2.5-vl"], "dtype": "float32", **model_args}
         typed = ",".join(f"{option}={value}" for option, value in given.items())
-        arguments = ["--model", "qwen2.5-vl", "--model-args", typed, "--tasks", "nieh_full", "--data", data]
+        arguments = ["--model", "qwen2.5-vl", "--model-args", typed, "--tasks", task, "--data", data]
         return run(*arguments, "--name", name, "--output", tmp_path / "out", *options)
 
     return ask
@@ -73,12 +73,22 @@ def test_the_order_of_the_requests_makes_the_hits(
     ask: Any, vllm: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert ask("one first", "--engine", "vllm")[0] == 0
-    monkeypatch.setattr("model_adapters.vllm.model.VllmModel._share_uncached_prefix", lambda *_: False)
+    monkeypatch.setattr("model_adapters.vllm.model.VllmModel._new_prefixes", lambda _, prompts: [*range(len(prompts))])
     assert ask("all at once", "--engine", "vllm", "--fresh")[0] == 0
     kept, lost = (_found(tmp_path / "out" / name)[2]["hit_rate"] for name in ("one first", "all at once"))
     assert kept > 0.4
     assert lost < 0.1
     assert [len(call.prompts) for call in vllm.calls] == [1, 2, 1, 1, 3, 2]
+
+
+def test_questions_on_different_frames_of_a_trajectory_are_asked_together(
+    ask: Any, vllm: Double, tmp_path: Path
+) -> None:
+    assert ask("on vllm", "--engine", "vllm", task="nieh_gt")[0] == 0
+    assert [len(call.prompts) for call in vllm.calls] == [3, 2]
+    assert ask("here", "--engine", "transformers", task="nieh_gt", device="cpu")[0] == 0
+    ours, theirs = (_found(tmp_path / "out" / name)[0] for name in ("on vllm", "here"))
+    assert [record.payload for record in ours] == [record.payload for record in theirs]
 
 
 def test_plans_are_carried_out_alike(
