@@ -105,4 +105,5 @@ def _start(name: str, located: LocatedCheckpoint[Any], family: MakeFamily, proce
         per_frame = len(loaded.family.frame_ids((options.frame_size, options.frame_size)))
     max_frames = frame_limit(max_tokens, per_frame, options)
     arguments = model_arguments(located.folder, located.config, options, max_tokens=max_tokens, max_frames=max_frames)
-    return VllmModel(name, loaded, Engine(name, arguments), options, max_tokens=max_tokens, max_frames=max_frames)
+    engine = Engine(name, arguments, options.threads)
+    return VllmModel(name, loaded, engine, options, max_tokens=max_tokens, max_frames=max_frames)

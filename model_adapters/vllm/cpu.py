@@ -6,9 +6,11 @@ import sys
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
+import torch
+
 from infthor_eval.errors import ModelError
 
-__all__ = ["check_head_size", "prepare", "readable_globals", "runs_on_cpu"]
+__all__ = ["check_head_size", "prepare", "readable_globals", "runs_on_cpu", "set_threads"]
 
 # In one process an engine starts and ends in seconds, also in workers, which may not start processes. Threads that are
 # bound to cores would share one core with those of other workers. The memory for keys and values is in GiB; vLLM's own
@@ -29,6 +31,12 @@ def prepare() -> None:
     """Set what suits a machine that vLLM shares with others; what the user has set stays."""
     for name, value in _ENVIRONMENT.items():
         os.environ.setdefault(name, value)
+
+
+def set_threads(n_threads: int) -> None:
+    """Let vLLM in this process, and the processes that it starts, compute with this many threads."""
+    torch.set_num_threads(n_threads)
+    os.environ["OMP_NUM_THREADS"] = str(n_threads)
 
 
 def readable_globals() -> AbstractContextManager[Any]:

@@ -84,6 +84,7 @@ class Engine:
     Args:
         name: name in the registry, for messages.
         arguments: arguments of `vllm.LLM`.
+        threads: processor threads on a CPU; torch's default where None.
 
     Attributes:
         version: version of vLLM.
@@ -93,9 +94,11 @@ class Engine:
         ModelError: vLLM is not installed, or does not start.
     """
 
-    def __init__(self, name: str, arguments: Mapping[str, Any]) -> None:
+    def __init__(self, name: str, arguments: Mapping[str, Any], threads: int | None = None) -> None:
         self._name = name
         self._vllm = import_vllm(name)
+        if threads is not None and cpu.runs_on_cpu():
+            cpu.set_threads(threads)
         self.version = str(self._vllm.__version__)
         self.batch_invariant = os.environ.get("VLLM_BATCH_INVARIANT", "0") not in ("", "0")
         hint = "see its output above; if memory is short, set a smaller max_model_len or max_frames"

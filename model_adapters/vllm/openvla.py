@@ -39,7 +39,8 @@ class OpenVLAOnVllm:
         checkpoint = find_policy_checkpoint(options.pretrained, options.revision)
         description = describe_openvla(checkpoint, options.unnorm_key)
         _check_begin_token(name, checkpoint)
-        engine = Engine(name, engine_arguments(checkpoint.folder, options) | {"limit_mm_per_prompt": {"image": 1}})
+        arguments = engine_arguments(checkpoint.folder, options) | {"limit_mm_per_prompt": {"image": 1}}
+        engine = Engine(name, arguments, options.threads)
         identity = checkpoint.origin | {
             "engine": "vllm",
             "versions": {**versions(), "vllm": engine.version},

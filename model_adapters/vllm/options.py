@@ -35,6 +35,7 @@ _RANGES = {
     "seed": (0, 2**32 - 1),
     "frame_size": (1, 100_000),
     "max_frames": (1, 2**31 - 1),
+    "threads": (1, 1024),
     "max_num_seqs": (1, 2**20),
     "max_num_batched_tokens": (1, 2**31 - 1),
     "block_size": (1, 2**20),
@@ -99,6 +100,7 @@ class EngineOptions(Throughput):
         prefix_caching: cache keys and values for requests with a common prefix.
         mm_processor_cache_gb: memory for processed frames, in GiB; vLLM's default where None.
         seed: seed of the engine; each request has its own in addition.
+        threads: processor threads of vLLM on a CPU; those of OMP_NUM_THREADS, else all, where None.
     """
 
     dtype: str = "auto"
@@ -113,6 +115,7 @@ class EngineOptions(Throughput):
     prefix_caching: bool = True
     mm_processor_cache_gb: float | None = None
     seed: int = 0
+    threads: int | None = None
 
     def __post_init__(self) -> None:
         """Raise `ValueError` for values that vLLM would refuse only after minutes of loading."""

@@ -79,6 +79,7 @@ def checks() -> Iterator[Check]:
     """Run all checks, one after the other; the hub has two seconds to answer."""
     yield Check("Python", "ok", f"{platform.python_version()}, {sys.executable}")
     yield _torch()
+    yield _threads()
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     yield Check("memory", "ok", f"{total / _GB:.0f} GB")
     yield _embedded_simulator()
@@ -102,6 +103,12 @@ def _torch() -> Check:
         return Check("torch", "ok", f"{torch.__version__}, {properties.name}, {properties.total_memory / _GB:.0f} GB")
     hint = "large models need a GPU and a torch built for it; tiny models, baselines and served ones do not"
     return Check("torch", "optional", f"{torch.__version__}, no GPU: models run on {os.cpu_count()} processors", hint)
+
+
+def _threads() -> Check:
+    given = os.environ.get("OMP_NUM_THREADS")
+    default = f"OMP_NUM_THREADS={given}" if given else f"all {os.cpu_count()} processors"
+    return Check("threads", "ok", f"{default} for a model on a CPU, one for models with -tiny or -nano (`--threads N`)")
 
 
 def _embedded_simulator() -> Check:

@@ -1,7 +1,7 @@
 """The options of a run, for every command that takes them, and the runs that they ask for."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.runs import Catalog, RunRequest, Suite, TaskRequest
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite, suite_code
 from infthor_eval.workers import WorkerSettings
-from model_adapters import is_known, name_on_engine
+from model_adapters import has_option, is_known, name_on_engine
 
 __all__ = ["RunOptions", "run_options"]
 
@@ -56,6 +56,12 @@ _OPTIONS = (
     ),
     click.option(
         "--rope", metavar="TYPE:FACTOR", help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8."
+    ),
+    click.option(
+        "--threads",
+        type=WholeNumber(1),
+        metavar="N",
+        help="Processor threads of each model on a CPU; default: all, and one for models with -tiny or -nano.",
     ),
     click.option(
         "--max-tokens-total",
@@ -136,9 +142,12 @@ class RunOptions:
             UsageError: an engine that does not run the model.
         """
         for_all, engine = _options_of_all_models(given), given["engine"]
-        models = tuple(
-            ModelSpec(name_on_engine(name, engine) if engine else name, {**for_all, **options})
-            for name, options in given["models"]
+        models = _with_threads(
+            given["threads"],
+            [
+                ModelSpec(name_on_engine(name, engine) if engine else name, {**for_all, **options})
+                for name, options in given["models"]
+            ],
         )
         workers = parse_worker_settings(given["workers"], given["ray_address"], given["gpus_per_worker"])
         capped = next((cap for cap in _CAPS if any(cap in model.options for model in models)), None)
@@ -196,6 +205,21 @@ def _refuse_baseline_of_others(model: str, suite: str, task: str) -> None:
         raise UsageError(
             f"{model} is a baseline of {', '.join(suites)}, and {task} is a task of {suite}; see `ls models`"
         )
+
+
+def _with_threads(threads: int | None, models: Sequence[ModelSpec]) -> tuple[ModelSpec, ...]:
+    """Give the number of threads to the models that compute here, unless they have their own.
+
+    Raises:
+        UsageError: none of them does.
+    """
+    if threads is None:
+        return tuple(models)
+    computing = {model.name for model in models if is_known(model.name) and has_option(model.name, "threads")}
+    if not computing:
+        raise UsageError(f"--threads {threads}: {models[0].name} takes no threads, as it computes nothing here")
+    own = {"threads": str(threads)}
+    return tuple(ModelSpec(model.name, own | model.options) if model.name in computing else model for model in models)
 
 
 def _options_of_all_models(given: Mapping[str, Any]) -> dict[str, str]:

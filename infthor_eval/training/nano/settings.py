@@ -77,9 +77,9 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     scenes: SceneSettings = SceneSettings()
     hidden: int = 128
     layers: int = 4
-    vision_steps: int = 400
+    vision_steps: int = 600
     text_steps: int = 200
-    joint_steps: int = 600
+    joint_steps: int = 800
     frames_per_step: int = 64
     text_plans_per_step: int = 96
     questions_per_step: int = 40

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.cli.options.run import RunOptions, run_options
 from infthor_eval.cli.options.values import ModelList
+from infthor_eval.errors import UsageError
 from infthor_eval.runs import RunRequest, Suite, read_stored_command
 from tests.faults.told import said_in_one_line
 
@@ -122,6 +123,17 @@ def requests():
         return [request for request, _ in command.main(list(map(str, arguments)), standalone_mode=False)]
 
     return requests
+
+
+def test_threads_are_for_models_that_compute_here(config, requests):
+    file = config()
+    models = "oracle,qwen2.5-vl-tiny,qwen2.5-vl-tiny:threads=3,openai:model=m"
+    asked = requests("--config", file, "--model", models, "--threads", 2)
+    assert [request.model_options.get("threads") for request in asked] == [None, "2", "3", None]
+    (request,) = requests("--config", file, "--model", "qwen2.5-vl", "--engine", "vllm", "--threads", 2)
+    assert request.model_options == {"threads": "2"}
+    with pytest.raises(UsageError, match="--threads 2: oracle takes no threads"):
+        requests("--config", file, "--threads", 2)
 
 
 def test_the_command_line_overrides_the_same_option_of_the_file(config, requests):

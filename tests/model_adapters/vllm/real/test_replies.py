@@ -36,6 +36,16 @@ def test_replies_are_those_of_transformers(
         assert facts(replies[0]) == facts(replies[1])
 
 
+def test_replies_in_small_steps_and_blocks_are_the_same(
+    start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
+    small = {"max_num_seqs": 2, "max_num_batched_tokens": 256, "block_size": 32, "mm_encoder_tp_mode": "data"}
+    models = (start(**small, threads=2), in_process("qwen2.5-vl"))
+    asked = [[*parts] for parts in _prompts(frames)]
+    replies = [model.conversation().replies(asked, up_to(50)) for model in models]
+    assert [facts(reply) for reply in replies[0]] == [facts(reply) for reply in replies[1]]
+
+
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "pixtral", "llava"])
 def test_it_keeps_the_contract(family: str, start: Start) -> None:
     check_adapter(start(family, adapter_of(family)), (84, 84))
