@@ -1,10 +1,19 @@
 """The best guess at each question of a set, by which runs are measured above guessing."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
 
+import msgspec
+
+import infthor_eval.nieh
+from infthor_eval.formats.digests import digest_of_files, fingerprint
+from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.user_cache import user_cache
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.forms import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
@@ -29,8 +38,28 @@ def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
     """Return by id of a question what can be guessed of it by guessers that know no more than that.
 
     Of each file and form the guesser with the highest mean counts, for each scorer of its own; so the guess is rather
-    too good than too bad.
+    too good than too bad. They are kept in the user's cache, as learning takes seconds before the first question.
     """
+    path = user_cache("guesses") / f"{_key(data, knowledge)}.json"
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=dict[str, Guess])
+    except (OSError, msgspec.DecodeError):  # not there yet
+        guesses = _learn_guesses(data, knowledge)
+    with suppress(OSError):  # a cache that cannot be written costs only time
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with write_atomically(path) as temporary:
+            temporary.write_bytes(msgspec.json.encode(guesses))
+    return guesses
+
+
+def _key(data: NiehSet, knowledge: Knowledge) -> str:
+    """Return a hash of all that guesses depend on: the questions, and this code with its library."""
+    code = digest_of_files(sorted(Path(infthor_eval.nieh.__file__).parent.rglob("*.py")))
+    learner = {"knowledge": knowledge.value, "code": code, "library": version("scikit-learn")}
+    return fingerprint(learner | {"questions": list(map(repr, data.questions))})
+
+
+def _learn_guesses(data: NiehSet, knowledge: Knowledge) -> dict[str, Guess]:
     guesses: dict[str, Guess] = {}
     for questions in questions_by_file(data).values():
         samples = [sample_on_clues(question) for question in questions]

@@ -4,7 +4,9 @@ import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
+from infthor_eval.formats.user_cache import user_cache
 from infthor_eval.nieh.above_guessing import above_guessing
+from infthor_eval.nieh.guessing import guesses
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
 from infthor_eval.nieh.guessing.guesses import find_guesses, questions_by_file, sample_on_clues, visible_knowledge
 
@@ -36,18 +38,31 @@ def test_on_the_clue_frames_their_number_is_told_and_elsewhere_the_words_alone()
 def test_a_form_has_the_score_of_its_best_guesser(make_set):
     # Held out, the majority of four yes and a no is always yes; "no" is right for a single other question alone.
     data = make_set(test=[*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))])
-    guesses = find_guesses(data, Knowledge.WORDS)
-    by_question = [guesses[question.id] for question in data.questions]
+    by_id = find_guesses(data, Knowledge.WORDS)
+    by_question = [by_id[question.id] for question in data.questions]
     assert [guess.form for guess in by_question] == ["Is {} in/on {}?"] * 5 + ["Was {} open?"] * 2
     assert [guess.scores["strict"] for guess in by_question] == [1, 1, 1, 1, 0, 1, 1]
     assert [guess.form_scores["strict"] for guess in by_question] == [pytest.approx(0.8)] * 5 + [1] * 2
-    assert find_guesses(data, Knowledge.WORDS) is guesses
+    assert find_guesses(data, Knowledge.WORDS) is by_id
+
+
+def test_guesses_are_learned_once_for_the_same_questions(make_set, monkeypatch):
+    questions = [*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))]
+    first = find_guesses(make_set(test=questions), Knowledge.WORDS)
+    with monkeypatch.context() as patch:
+        patch.setattr(guesses, "GUESSERS", ())  # nobody left to learn from
+        assert find_guesses(make_set(test=questions), Knowledge.WORDS) == first
+    others = make_set(test=questions[:-1])
+    assert len(find_guesses(others, Knowledge.WORDS)) == len(first) - 1
+    for path in user_cache("guesses").iterdir():
+        path.write_text("{")
+    assert find_guesses(make_set(test=questions), Knowledge.WORDS) == first
 
 
 def test_a_file_is_guessed_from_itself_alone(make_set):
     data = make_set(a=constant(PRESENCE, ("yes",) * 3, (1,)), b=constant(PRESENCE, ("no",) * 3, (2,)))
-    guesses = find_guesses(data, Knowledge.WORDS)
-    assert {guess.scores["strict"] for guess in guesses.values()} == {1.0}
+    found = find_guesses(data, Knowledge.WORDS)
+    assert {guess.scores["strict"] for guess in found.values()} == {1.0}
     assert {name: len(questions) for name, questions in questions_by_file(data).items()} == {
         "qa_set_a": 3,
         "qa_set_b": 3,
