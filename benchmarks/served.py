@@ -1,4 +1,4 @@
-"""vLLM's own server, for benchmarks."""
+"""Servers of others, for benchmarks."""
 
 import os
 import socket
@@ -8,12 +8,12 @@ import tempfile
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Served", "serve_vllm"]
+__all__ = ["Served", "serve_transformers", "serve_vllm"]
 
 _START_S = 600
 
@@ -31,17 +31,28 @@ class Served:
     processor_seconds: float = 0.0
 
 
+def serve_vllm(
+    checkpoint: Path, dtype: str, environment: Mapping[str, str], most_frames: int
+) -> AbstractContextManager[Served]:
+    """Serve a checkpoint in vLLM on a CPU within the context; requests have at most so many frames."""
+    options = ["--model", str(checkpoint), "--dtype", dtype, "--enforce-eager", "--max-model-len", "16384"]
+    options += ["--limit-mm-per-prompt", f'{{"image": {most_frames}, "video": 0}}']
+    options += ["--mm-processor-kwargs", '{"use_fast": false}', "--enable-prompt-tokens-details"]
+    return _serve(["-m", "vllm.entrypoints.openai.api_server", *options], environment)
+
+
+def serve_transformers(dtype: str, environment: Mapping[str, str]) -> AbstractContextManager[Served]:
+    """Serve whatever checkpoints are asked for in transformers on a CPU within the context."""
+    start = ["-c", "from transformers.cli.transformers import main; main()", "serve"]
+    return _serve([*start, "--device", "cpu", "--dtype", dtype], environment)
+
+
 @contextmanager
-def serve_vllm(checkpoint: Path, dtype: str, environment: Mapping[str, str], most_frames: int) -> Iterator[Served]:
-    """Serve a checkpoint on a CPU within the context; requests have at most so many frames."""
+def _serve(arguments: Sequence[str], environment: Mapping[str, str]) -> Iterator[Served]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = [sys.executable, "-m", "vllm.entrypoints.openai.api_server", "--model", str(checkpoint)]
-    command += ["--dtype", dtype, "--enforce-eager", "--max-model-len", "16384"]
-    command += ["--limit-mm-per-prompt", f'{{"image": {most_frames}, "video": 0}}']
-    command += ["--mm-processor-kwargs", '{"use_fast": false}', "--enable-prompt-tokens-details"]
-    command += ["--host", "127.0.0.1", "--port", str(port)]
+    command = [sys.executable, *arguments, "--host", "127.0.0.1", "--port", str(port)]
     served = Served(f"http://127.0.0.1:{port}/v1")
     with tempfile.TemporaryFile() as said:
         server = subprocess.Popen(command, stdout=said, stderr=said, env=dict(environment))
@@ -63,4 +74,4 @@ def _wait(url: str, server: "subprocess.Popen[bytes]") -> None:
                 return
         except (urllib.error.URLError, ConnectionError):
             time.sleep(0.2)
-    sys.exit("vLLM's server does not come up")
+    sys.exit(f"the server does not come up: {' '.join(map(str, server.args))}")

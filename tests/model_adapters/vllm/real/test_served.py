@@ -4,9 +4,11 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 
 from infthor_eval.errors import ModelError
@@ -16,32 +18,41 @@ from infthor_eval.runs import UnitRecord
 from model_adapters import load
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 from tests.plans.cut import CANDLE, FORK, cut, write
+from tests.waiting import PATIENCE_S, wait_until
 
 from ...asking import up_to
 from ...serving import free_port, records_in, wait_for_server
 
+OURS = "from infthor_eval.cli import main; main()"
 SERVER = "vllm.entrypoints.openai.api_server"
-MOST_FRAMES = 100  # more than a context of `nieh_mini_full` has
+MODEL = str(packaged_folder(FOLDER))
+MOST_FRAMES = 200  # more than a context of `nieh_mini_full` has
 
 
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
-    """The small trained model behind vLLM's server; the options of `--model openai` for it."""
-    log, folder = tmp_path_factory.mktemp("served") / "log", str(packaged_folder(FOLDER))
-    port = free_port()
+@contextmanager
+def _server(port: int, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    """vLLM's server with the small trained model, on a port."""
     limits = ["--max-model-len", "32768", "--limit-mm-per-prompt", f'{{"image": {MOST_FRAMES}, "video": 0}}']
     pixels = ["--mm-processor-kwargs", '{"use_fast": false}', "--enable-prompt-tokens-details"]
     where = ["--host", "127.0.0.1", "--port", str(port)]
-    command = [sys.executable, "-m", SERVER, "--model", folder, "--dtype", "float32", "--enforce-eager", *limits]
+    command = [sys.executable, "-m", SERVER, "--model", MODEL, "--dtype", "float32", "--enforce-eager", *limits]
     environment = os.environ | {"VLLM_CPU_KVCACHE_SPACE": "1", "VLLM_CPU_OMP_THREADS_BIND": "nobind"}
     with log.open("w") as said:
         server = subprocess.Popen([*command, *pixels, *where], stdout=said, stderr=said, env=environment)
         try:
             wait_for_server(f"http://127.0.0.1:{port}/health", server, log)
-            yield {"base_url": f"http://127.0.0.1:{port}/v1", "model": folder}
+            yield server
         finally:
             server.terminate()
             server.wait()
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+    """The small trained model behind vLLM's server; the options of `--model openai` for it."""
+    port = free_port()
+    with _server(port, tmp_path_factory.mktemp("served") / "log"):
+        yield {"base_url": f"http://127.0.0.1:{port}/v1", "model": MODEL}
 
 
 @pytest.fixture
@@ -92,3 +103,34 @@ def test_more_frames_than_the_server_takes_are_refused_with_its_option(
     with pytest.raises(ModelError, match=r"/v1 answers 400 Bad Request: .* --limit-mm-per-prompt .* fewer frames"):
         talk.reply(up_to(4))
     model.close()
+
+
+def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_is_back(
+    tmp_path: Path, run: Any
+) -> None:
+    port, output = free_port(), tmp_path / "out"
+    given = f"base_url=http://127.0.0.1:{port}/v1,model={MODEL},retries=1,max_in_flight=1"
+    words = ["--model", "openai", "--model-args", given, "--tasks", "nieh_mini_full", "--limit", "40"]
+    command = [sys.executable, "-c", OURS, *words, "--output", str(output)]
+
+    def n_answered() -> int:
+        lines = [line for path in output.rglob("worker-*.jsonl") for line in path.read_text().splitlines()]
+        return sum('"type":"unit"' in line.replace(" ", "") for line in lines)
+
+    with _server(port, tmp_path / "first") as server:
+        asking = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        wait_until(lambda: n_answered() >= 5)
+        for each in [*psutil.Process(server.pid).children(recursive=True), server]:
+            each.kill()
+        said = asking.communicate(timeout=PATIENCE_S)[0]
+    assert asking.returncode == 1, said
+    assert "Traceback" not in said
+    before = {record.key: record for record in records_in(output) if record.failure is None}
+    assert 5 <= len(before) < 40, "it did not die in the middle"
+    with _server(port, tmp_path / "second"):
+        code, _, err = run(*words, "--output", output)
+    assert code == 0, err
+    records = records_in(output)
+    assert len(records) == 40
+    assert [record.failure for record in records] == [None] * 40
+    assert all(record.payload == before[record.key].payload for record in records if record.key in before)
