@@ -74,4 +74,4 @@ def _wait(url: str, server: "subprocess.Popen[bytes]") -> None:
                 return
         except (urllib.error.URLError, ConnectionError):
             time.sleep(0.2)
-    sys.exit(f"the server does not come up: {' '.join(map(str, server.args))}")
+    sys.exit("the server does not come up")

@@ -5,6 +5,10 @@ behind vLLM's server and `transformers serve`, through `--model openai`, and in 
 
     make test-vllm                                  # once: the environment with vLLM
     .venv-vllm/bin/python benchmarks/servers.py
+    .venv/bin/python benchmarks/servers.py --engines "transformers serve" --pretrained FOLDER --adapter hf-vlm
+
+`transformers serve` wants all of torchvision or none of it. For a CPU there is but half of it, and a Qwen2.5-VL needs
+that: so it is asked in the ordinary environment, with a checkpoint of another family.
 """
 
 import argparse
@@ -41,11 +45,13 @@ def main() -> None:
     """Print for each engine how many replies and plans are equal."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--limit", type=int, help="questions, and trajectories of plans, of each task")
+    parser.add_argument("--pretrained", type=Path, default=packaged_folder(FOLDER), help="folder of a checkpoint")
+    parser.add_argument("--adapter", default="qwen2.5-vl", help="its model name here")
     parser.add_argument("--engines", nargs="+", choices=ENGINES, default=ENGINES)
     options = parser.parse_args()
     limit = options.limit
     more = [] if limit is None else ["--limit", str(limit)]
-    checkpoint = packaged_folder(FOLDER)
+    checkpoint = options.pretrained
     serving: dict[str, Callable[[], AbstractContextManager[Served | None]]] = {
         "vLLM's server": lambda: serve_vllm(checkpoint, "float32", ENVIRONMENT, most_frames=300),
         "transformers serve": lambda: serve_transformers("float32", ENVIRONMENT),
@@ -56,7 +62,7 @@ def main() -> None:
         cells = []
         with serving.get(name, nullcontext)() as served, tempfile.TemporaryDirectory() as output:
             for suite, task in TASKS.items():
-                given = _arguments(name, checkpoint, served, suite)
+                given = _arguments(name, options.adapter, checkpoint, served, suite)
                 replies, cached = _ask(suite, [*given, "--tasks", task, *more], Path(output) / suite)
                 known = expected.setdefault(suite, replies)
                 equal = sum(replies[key] == reply for key, reply in known.items())
@@ -64,7 +70,7 @@ def main() -> None:
         print(f"{name:20}{''.join(cells)}", flush=True)
 
 
-def _arguments(name: str, checkpoint: Path, served: Served | None, suite: str) -> list[str]:
+def _arguments(name: str, adapter: str, checkpoint: Path, served: Served | None, suite: str) -> list[str]:
     greedy = ["--greedy"] if suite == "plans" else []
     if served is not None:
         given = f"base_url={served.url},model={checkpoint}"
@@ -73,8 +79,8 @@ def _arguments(name: str, checkpoint: Path, served: Served | None, suite: str) -
         return ["--model", "openai", "--model-args", given, *greedy]
     given = f"pretrained={checkpoint},dtype=float32"
     if name == HERE:
-        return ["--model", "qwen2.5-vl", "--model-args", f"{given},device=cpu,batch_size=1", *greedy]
-    return ["--model", "qwen2.5-vl", "--engine", "vllm", "--model-args", f"{given},enforce_eager=true", *greedy]
+        return ["--model", adapter, "--model-args", f"{given},device=cpu,batch_size=1", *greedy]
+    return ["--model", adapter, "--engine", "vllm", "--model-args", f"{given},enforce_eager=true", *greedy]
 
 
 def _ask(suite: str, arguments: list[str], output: Path) -> tuple[dict[Any, Any], float]:
