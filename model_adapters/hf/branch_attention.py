@@ -44,7 +44,7 @@ class BranchAttention:
         self._branches = torch.empty(0, dtype=torch.long, device=device)  # branch of each token behind the prefix
         self._places = torch.empty(0, dtype=torch.long, device=device)  # place of each in prefix and branch
         self._n_new = 0
-        self._masks: dict[int | None, Tensor] = {}
+        self._masks: dict[tuple[int | None, torch.device], Tensor] = {}
         self._n_calls = 0
 
     @contextmanager
@@ -118,22 +118,25 @@ class BranchAttention:
             query.unflatten(1, shared)[0],
             key[0, :, None].expand(-1, shared[1], -1, -1),
             value[0, :, None].expand(-1, shared[1], -1, -1),
-            attn_mask=self._mask(sliding_window, query.dtype),
+            attn_mask=self._mask(sliding_window, query),
             scale=scaling,
         )
         return output.flatten(0, 1).transpose(0, 1)[None], None
 
-    def _mask(self, window: int | None, dtype: torch.dtype) -> Tensor:
-        """Return what is added to the scores, (new tokens, all tokens): 0 or minus infinity."""
-        if window not in self._masks:
-            new = slice(len(self._branches) - self._n_new, None)
-            own, at = self._branches[new, None], self._places[new, None]
-            seen = (self._branches == own) & (self._places <= at)
-            mask = torch.zeros(self._n_new, self._n_prefix + len(self._branches), dtype=dtype, device=seen.device)
-            mask[:, self._n_prefix :].masked_fill_(~seen, -torch.inf)
-            if window is not None:
-                prefix = torch.arange(self._n_prefix, device=seen.device)
-                places = torch.cat((prefix, self._places))
-                mask.masked_fill_(places <= at - window, -torch.inf)
-            self._masks[window] = mask
-        return self._masks[window]
+    def _mask(self, window: int | None, query: Tensor) -> Tensor:
+        """Return what is added to the scores, (new tokens, all tokens): 0 or minus infinity, beside the queries."""
+        key = (window, query.device)  # a model can be on several devices
+        if key not in self._masks:
+            self._masks[key] = self._new_mask(window, query.dtype).to(query.device)
+        return self._masks[key]
+
+    def _new_mask(self, window: int | None, dtype: torch.dtype) -> Tensor:
+        new = slice(len(self._branches) - self._n_new, None)
+        own, at = self._branches[new, None], self._places[new, None]
+        seen = (self._branches == own) & (self._places <= at)
+        mask = torch.zeros(self._n_new, self._n_prefix + len(self._branches), dtype=dtype, device=seen.device)
+        mask[:, self._n_prefix :].masked_fill_(~seen, -torch.inf)
+        if window is not None:
+            prefix = torch.arange(self._n_prefix, device=seen.device)
+            mask.masked_fill_(torch.cat((prefix, self._places)) <= at - window, -torch.inf)
+        return mask

@@ -61,6 +61,31 @@ def test_every_family_answers_in_batches(family: str, frames: list[FrameRef]) ->
     assert talk.reply(up_to(4)).token_ids == batched[0].token_ids
 
 
+def test_a_window_slides_over_the_prefix_and_each_continuation(frames: list[FrameRef]) -> None:
+    heard = []
+    for size, window in (("8", 20), ("1", 20), ("1", None)):
+        model: Any = load("pixtral-tiny", {"batch_size": size, "chunk_tokens": "30"}, seed=0)
+        model._loaded.model.get_decoder().config.sliding_window = window
+        talk = model.conversation()
+        talk.append(*frames[:2], "\nWhere was the mug before it was put into the sink of the kitchen?")
+        asked = [["\nOne."], ["\nOr was it the plate on the table, which is larger than the window is wide?"]]
+        heard.append([reply.token_ids for reply in talk.replies(asked, up_to(8))])
+    assert heard[0] == heard[1] != heard[2]
+
+
+def test_a_model_that_does_not_attend_by_the_interface_is_refused_or_asked_alone(frames: list[FrameRef]) -> None:
+    model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
+    talk = model.conversation()
+    talk.append(frames[0])
+    decoder = model._loaded.model.get_decoder()
+    decoder.config.num_hidden_layers += 1  # as if a layer did something else
+    with pytest.raises(ModelError, match="do not all attend by transformers' interface; set batch_size=1"):
+        talk.replies([["\nWhat?"], ["\nWho?"]], up_to(2))
+    decoder.config.num_hidden_layers -= 1
+    assert len(talk.replies([["\nWhat?"], ["\nWho?"]], up_to(2))) == 2
+    assert load("qwen2.5-vl-tiny", {"attn_implementation": "eager"}, seed=0).capabilities.batch_size == 1
+
+
 def test_the_prefix_is_encoded_once_for_all(batching: Any, frames: list[FrameRef]) -> None:
     talk = batching.conversation()
     talk.append(*frames[::-1])
