@@ -239,7 +239,7 @@ def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(tm
     assert [path.name for path in tmp_path.glob("*.json")] == ["kitchen-1-seed0.json"]
     assert [path.name for path in tmp_path.glob(".*partial")] == []
     code, out, err = run(*makes_more)
-    assert (code, "3 trajectories (1 made earlier)" in out) == (0, True), err
+    assert (code, "3 trajectories (1 generated earlier)" in out) == (0, True), err
     assert (tmp_path / "kitchen-1-seed0.json").read_bytes() == first
 
 
