@@ -219,7 +219,9 @@ def _with_threads(threads: int | None, models: Sequence[ModelSpec]) -> tuple[Mod
     if not computing:
         raise UsageError(f"--threads {threads}: {models[0].name} takes no threads, as it computes nothing here")
     own = {"threads": str(threads)}
-    return tuple(ModelSpec(model.name, own | model.options) if model.name in computing else model for model in models)
+    return tuple(
+        ModelSpec(model.name, {**own, **model.options}) if model.name in computing else model for model in models
+    )
 
 
 def _options_of_all_models(given: Mapping[str, Any]) -> dict[str, str]:
