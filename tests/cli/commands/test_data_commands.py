@@ -1,13 +1,34 @@
 """`generate`, `replay` and `questions`, one after the other, as a user types them."""
 
+import contextlib
 import gzip
+import io
 import json
 import shutil
 
 import pytest
 
+from infthor_eval.cli import main
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import read_questions
+
+
+def _print(*arguments: object) -> dict:
+    """What our command prints with --json, in a fixture of the module, which has no `run`."""
+    shown = io.TextIOWrapper(io.BytesIO())
+    with contextlib.redirect_stdout(shown), pytest.raises(SystemExit) as ended:
+        main([*map(str, arguments), "--json"])
+    assert ended.value.code == 0
+    shown.seek(0)
+    return json.load(shown)
+
+
+@pytest.fixture(scope="module")
+def printed(work):
+    """What `generate` and `replay` print when they make the set of this module."""
+    scene = ("--scene", "kitchen-5", "--min-steps", 60, "--min-subgoals", 2, "--seed", 1)
+    generated = _print("generate", *scene, "--out", work / "trajectories")
+    return generated, _print("replay", work / "trajectories", "--out", work / "set")
 
 
 @pytest.fixture(scope="module")
@@ -15,18 +36,18 @@ def work(tmp_path_factory):
     return tmp_path_factory.mktemp("work")
 
 
-def test_the_three_commands_make_a_set(work, run):
-    scene = ("--scene", "kitchen-5", "--min-steps", 60, "--min-subgoals", 2, "--seed", 1)
-    code, out, err = run("generate", *scene, "--out", work / "trajectories", "--json")
-    assert code == 0, err
-    assert json.loads(out)["trajectories"] == 1
+@pytest.fixture(scope="module")
+def made(printed, work):
+    """The folder of the trajectory and its set."""
+    return work
 
-    code, out, err = run("replay", work / "trajectories", "--out", work / "set", "--json")
-    document = json.loads(out)
-    assert code == 0, err
-    assert document["whole"] == document["trajectories"] == 1
-    assert document["actions"]["MoveAhead"]["refused"] == 0
-    assert {"iou", "seconds"} <= set(document)
+
+def test_the_three_commands_make_a_set(printed, work, run):
+    generated, replayed = printed
+    assert generated["trajectories"] == 1
+    assert replayed["whole"] == replayed["trajectories"] == 1
+    assert replayed["actions"]["MoveAhead"]["refused"] == 0
+    assert {"iou", "seconds"} <= set(replayed)
 
     csv = work / "set/qa_set_mine.csv"
     code, out, _ = run("questions", work / "set", "--out", csv, "--per-trajectory", 10)
@@ -38,8 +59,8 @@ def test_the_three_commands_make_a_set(work, run):
     assert csv.read_bytes() == first
 
 
-def test_what_they_print_for_people(work, tmp_path, run):
-    code, out, _ = run("replay", work / "trajectories", "--out", work / "set")
+def test_what_they_print_for_people(made, tmp_path, run):
+    code, out, _ = run("replay", made / "trajectories", "--out", made / "set")
     assert code == 0
     assert "1 trajectories on 1 floor plans (1 replayed earlier, 0 failed), 1 complete" in out
     assert "actions accepted, " in out and "MoveAhead" not in out and len(out.splitlines()) == 2
@@ -48,8 +69,8 @@ def test_what_they_print_for_people(work, tmp_path, run):
     assert "1 trajectories (0 generated earlier)" in out
 
 
-def test_a_truncated_trajectory_is_named_and_nothing_half_written(work, tmp_path, run):
-    source = next((work / "trajectories").glob("*.json"))
+def test_a_truncated_trajectory_is_named_and_nothing_half_written(made, tmp_path, run):
+    source = next((made / "trajectories").glob("*.json"))
     (tmp_path / "cut.json").write_bytes(source.read_bytes()[:-100])
     code, _, err = run("replay", tmp_path / "cut.json", "--out", tmp_path / "set")
     assert code == 1
@@ -76,8 +97,8 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch, run):
     assert "Traceback" not in err
 
 
-def test_an_action_on_a_missing_object_is_reported_with_its_step(work, tmp_path, run):
-    document = json.loads(next((work / "trajectories").glob("*.json")).read_text())
+def test_an_action_on_a_missing_object_is_reported_with_its_step(made, tmp_path, run):
+    document = json.loads(next((made / "trajectories").glob("*.json")).read_text())
     actions = document["plan"]["low_actions"]
     step = next(index for index, low in enumerate(actions) if low["api_action"]["action"] == "PickupObject")
     actions[step]["api_action"]["objectId"] = "Teapot|+00.00|+01.00|+00.00"
@@ -106,12 +127,12 @@ def test_a_scene_in_which_no_task_can_be_done_is_one_line_and_leaves_no_file(tmp
     assert not list((tmp_path / "out").iterdir())
 
 
-def test_a_set_of_another_version_is_neither_continued_nor_evaluated(work, tmp_path, run):
-    shutil.copytree(work / "set", tmp_path / "set")
+def test_a_set_of_another_version_is_neither_continued_nor_evaluated(made, tmp_path, run):
+    shutil.copytree(made / "set", tmp_path / "set")
     (tmp_path / "set/set.json").write_text('{"format": 2, "simulator": "embedded"}')
     before = sorted((tmp_path / "set").rglob("*"))
     for arguments in (
-        ("replay", work / "trajectories", "--out", tmp_path / "set"),
+        ("replay", made / "trajectories", "--out", tmp_path / "set"),
         ("questions", tmp_path / "set", "--out", tmp_path / "set/qa_set_new.csv"),
         ("--model", "oracle", "--tasks", "nieh_gt", "--data", tmp_path / "set", "--output", tmp_path / "runs"),
     ):
@@ -129,6 +150,6 @@ def test_bathrooms_are_left_out_of_test_sets(tmp_path, run):
     assert "bathrooms are left out" in err
 
 
-def test_a_replayed_set_is_an_nieh_set(work, run):
-    shutil.rmtree(work / "set/metadata/.nothing", ignore_errors=True)
-    assert NiehSet(work / "set")
+def test_a_replayed_set_is_an_nieh_set(made, run):
+    shutil.rmtree(made / "set/metadata/.nothing", ignore_errors=True)
+    assert NiehSet(made / "set")
