@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from infthor_eval.manipulation.evaluation import ArmUnit
     from infthor_eval.manipulation.records import ArmRecord
     from infthor_eval.manipulation.suite import ManipulationSuite
-    from infthor_eval.nieh.answering import NiehUnit
     from infthor_eval.nieh.records import NiehAnswer
     from infthor_eval.nieh.suite import NiehSuite
+    from infthor_eval.nieh.units import NiehUnit
     from infthor_eval.plans.evaluation import PlanUnit
     from infthor_eval.plans.records import PlanRecord
     from infthor_eval.plans.suite import PlansSuite

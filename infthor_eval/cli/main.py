@@ -47,6 +47,7 @@ _COMMANDS = {
     },
     "Own models": {
         "check-adapter": "Check a model adapter against the adapter contract.",
+        "check-memory": "Check a memory against the contract of memories.",
         "check-parity": "Compare a policy's actions with another implementation's.",
         "train": "Fine-tune a model on trajectories and questions.",
         "import-checkpoint": "Convert a checkpoint of the published trainer.",

@@ -16,6 +16,7 @@ from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.harness.requests import Doc
 from infthor_eval.nieh.docs import doc_of, doc_parts, doc_prompt, doc_target, sample_of, samples_of
 from infthor_eval.nieh.evaluation import PreparedEvaluation
+from infthor_eval.nieh.recalling import recall_all
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.nieh.scoring import scores
@@ -39,7 +40,7 @@ def dataset(**config: Any) -> dict[str, Any]:
         config: see `find_samples`; whatever else lm-eval passes to every task is ignored.
 
     Raises:
-        UsageError: nothing can be asked, the model would have to take notes, or as in `find_samples`.
+        UsageError: nothing can be asked, a memory would have to ask the model, or as in `find_samples`.
         DataError: the set cannot be read.
     """
     from datasets import Dataset
@@ -49,16 +50,12 @@ def dataset(**config: Any) -> dict[str, Any]:
         counts = Counter(item.reason for item in task_samples.skipped).most_common(3)
         reasons = "; ".join(f"{reason} ({n})" for reason, n in counts) or "its files are empty"
         raise UsageError(f"{task_samples.data.root}: no question of it can be asked: {reasons}")
-    if pixels and task_samples.samples[0].notes:
-        raise UsageError(
-            f"{config['context']}: shows notes that the model takes beforehand, which infthor-eval's models alone do; "
-            "run the task with `infthor-eval run`, or with --model infthor"
-        )
-    return {"test": Dataset.from_list([doc_of(task_samples, sample, pixels) for sample in task_samples.samples])}
+    samples = recall_all(task_samples) if pixels else task_samples.samples
+    return {"test": Dataset.from_list([doc_of(task_samples, sample, pixels) for sample in samples])}
 
 
 def doc_to_text(doc: Doc) -> str:
-    """Return the text of the request, with a placeholder for each frame and for the model's notes."""
+    """Return the text of the request, with a placeholder for each frame."""
     return doc_prompt(doc)
 
 

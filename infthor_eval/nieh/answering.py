@@ -10,63 +10,42 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any, Protocol
 
-from infthor_eval.errors import DataError, ModelError
+from msgspec.structs import replace as replace_fields
+
+from infthor_eval.errors import DataError, ModelError, UserCodeError
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.video import Video
+from infthor_eval.memory import Write
 from infthor_eval.nieh.baselines import Predict
-from infthor_eval.nieh.contexts import ContextPart, Sample
+from infthor_eval.nieh.contexts import ContextPart
 from infthor_eval.nieh.contexts.video import as_images
-from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.notebook import Notebook
-from infthor_eval.nieh.notes import Notes
-from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.nieh.recalling import Recaller, apply_recall
+from infthor_eval.nieh.records import NiehAnswer, NiehRecall
 from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.nieh.task import PreparedTask
-from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitKey, UnitRecord, Usage
+from infthor_eval.nieh.units import NiehUnit
+from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
 from model_adapters import Model, Part, Reply, wrap_request_errors
 
-__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "NiehUnit", "answer_units"]
-
-
-@dataclass(frozen=True)
-class NiehUnit(Unit[NiehAnswer]):
-    """A unit that asks the question of a sample."""
-
-    sample: Sample
-
-    @classmethod
-    def of(cls, task: str, task_samples: TaskSamples, sample: Sample) -> "NiehUnit":
-        """Return the unit of a task's sample, with what can be guessed of it and how much of its evidence is shown."""
-        question = sample.question
-        guesses = find_guesses(task_samples.data, visible_knowledge(task_samples.context_name))
-        payload = NiehAnswer.of(question, guesses.get(question.id), shown_clues(task_samples, sample))
-        return cls(UnitKey(task, question.id, sample.variant), question.traj_id, payload, sample)
+__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "answer_units"]
 
 
 @dataclass(frozen=True)
 class _UnitRequest:
-    """A unit with its request: the context, with notes that are still to be taken, and the text with the question."""
+    """A unit with its request: the context, and the text with the question."""
 
     unit: NiehUnit
     prepared: PreparedTask
-    context: tuple[ContextPart, ...]
+    context: tuple[Part, ...]
     text: str
 
     @classmethod
-    def of(cls, unit: NiehUnit, prepared: PreparedTask) -> "_UnitRequest":
+    def of(cls, unit: NiehUnit, prepared: PreparedTask, answerer: "Answerer") -> "_UnitRequest":
         context, text = prepared.task_samples.request(unit.sample)
-        return cls(unit, prepared, tuple(context), text)
-
-    @property
-    def shown(self) -> tuple[Part, ...]:
-        """The context for the model, once its notes are taken."""
-        shown = tuple(part for part in self.context if not isinstance(part, Notes))
-        if len(shown) < len(self.context):
-            raise ValueError("the context holds notes that are not taken yet")
-        return shown
+        return cls(unit, prepared, answerer.read(context), text)
 
     @cached_property
     def fingerprint(self) -> str:
@@ -77,7 +56,7 @@ class _UnitRequest:
         """
         return fingerprint(
             {
-                "context": [_content(part) for part in self.shown],
+                "context": [_content(part) for part in self.context],
                 "text": self.text,
                 "answers": list(self.unit.payload.answers),
                 "decoding": self.prepared.decoding.document(),
@@ -115,15 +94,12 @@ class Answerer(Protocol):
     def batch_contexts(self) -> bool:
         """True if these may have different contexts."""
 
+    @property
+    def write(self) -> Write | None:
+        """What asks the model for texts for its memory; None if it has no memory, as it reads no context."""
+
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
-        """Return a context as the model is given it: its notes as text, missing ones are taken now; films as images.
-
-        Films are left as they are for a model with a video input.
-
-        Raises:
-            DataError: a frame cannot be read.
-            ModelError: the model cannot take notes on so many frames.
-        """
+        """Return a context as the model is given it: films as images, unless it has a video input."""
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """Return the replies to units that share their decoding, and their context unless contexts are batched.
@@ -145,7 +121,7 @@ class ModelAnswerer:
         self.batch_contexts = model.capabilities.batch_contexts
         self._name = model.name
         self._video_input = model.capabilities.video_input
-        self._notebook = Notebook(model, session)
+        self.write: Write | None = Notebook(model, session).write
         self._conversation = model.conversation()
         self._start = self._conversation.mark()
         self._after_context = self._start
@@ -153,17 +129,15 @@ class ModelAnswerer:
 
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
         """See `Answerer`."""
-        shown = context if self._video_input else as_images(context)
-        with wrap_request_errors(self._name):
-            return tuple(self._notebook.text(part) if isinstance(part, Notes) else part for part in shown)
+        return tuple(context if self._video_input else as_images(context))
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
-        context, decoding = requests[0].shown, requests[0].prepared.decoding
+        context, decoding = requests[0].context, requests[0].prepared.decoding
         with wrap_request_errors(self._name):
-            if any(item.shown != context for item in requests[1:]):
+            if any(item.context != context for item in requests[1:]):
                 self._go_to(())
-                return self._conversation.replies([[*item.shown, item.text] for item in requests], decoding)
+                return self._conversation.replies([[*item.context, item.text] for item in requests], decoding)
             self._go_to(context)
             return self._conversation.replies([[item.text] for item in requests], decoding)
 
@@ -182,17 +156,18 @@ class ModelAnswerer:
 
 
 class BaselineAnswerer:
-    """A baseline, which reads no context and takes no notes."""
+    """A baseline, which reads no context and has no memory."""
 
     batch_size = 1
     batch_contexts = False
+    write = None
 
     def __init__(self, predict: Predict) -> None:
         self._predict = predict
 
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
         """See `Answerer`."""
-        return tuple(part for part in context if not isinstance(part, Notes))
+        return tuple(context)
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
@@ -213,16 +188,16 @@ def answer_units(
     units alone, so it is the same when a run is resumed.
     """
     requests = []
-    for unit in units:
+    for unit, recalled in _recall_all(units, prepared, answerer, session):
         try:
-            requests.append(_UnitRequest.of(unit, prepared))
-        except DataError as error:
+            if isinstance(recalled, Exception):
+                raise recalled
+            requests.append(_UnitRequest.of(recalled, prepared, answerer))
+        except (DataError, ModelError, UserCodeError) as error:
             yield unit.record_failure(session.describe_failure(unit, error))
     waiting: list[_UnitRequest] = []
     for _, in_one_context in groupby(sorted(requests, key=_names), key=_names):
-        readable, failed = _read(list(in_one_context), answerer, session)
-        yield from failed
-        waiting += readable
+        waiting += in_one_context
         if not answerer.batch_contexts:
             yield from _answer_in_batches(waiting, answerer, session)
             waiting = []
@@ -240,23 +215,36 @@ def _names(request: _UnitRequest) -> list[str]:
     return [name for part in request.context for name in _names_in(part)]
 
 
-def _names_in(part: ContextPart) -> list[str]:
-    if isinstance(part, Notes):
-        return [f"notes of {part.settings}", *(frame.path.name for frame in part.frames)]
+def _names_in(part: Part) -> list[str]:
     if isinstance(part, Video):
         return [f"video of {part.fps} fps", *(frame.path.name for frame in part.frames)]
     return [part.path.name if isinstance(part, FrameRef) else part]
 
 
-def _read(
-    requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer]
-) -> tuple[list[_UnitRequest], list[UnitRecord[NiehAnswer]]]:
-    """Return the requests with their common context as the model is given it, or else their records as failed."""
+def _recall_all(
+    units: Sequence[NiehUnit], prepared: PreparedTask, answerer: Answerer, session: Session[NiehAnswer]
+) -> list[tuple[NiehUnit, NiehUnit | Exception]]:
+    """Return each unit with what its memory recalled, or why that failed; as they are if there is nothing to recall."""
+    if answerer.write is None or not any(unit.sample.recall and unit.sample.recalled is None for unit in units):
+        return [(unit, unit) for unit in units]
+    recaller = Recaller(
+        prepared.task_samples,
+        answerer.write,
+        find=lambda inputs: session.find_artifact(inputs, NiehRecall),
+        keep=session.cache_artifact,
+    )
+    with recaller.in_use():
+        return [(unit, _recall(unit, recaller, prepared)) for unit in units]
+
+
+def _recall(unit: NiehUnit, recaller: Recaller, prepared: PreparedTask) -> NiehUnit | Exception:
     try:
-        context = answerer.read(requests[0].context)
-    except (DataError, ModelError) as error:
-        return [], [item.unit.record_failure(session.describe_failure(item.unit, error)) for item in requests]
-    return [replace(item, context=context) for item in requests], []
+        recall = recaller.recall(unit.sample)
+    except (DataError, ModelError, UserCodeError) as error:
+        return error
+    sample = apply_recall(unit.sample, recall)
+    payload = replace_fields(unit.payload, recall=recall, shown_clues=shown_clues(prepared.task_samples, sample))
+    return replace(unit, sample=sample, payload=payload)
 
 
 def _answer_in_batches(

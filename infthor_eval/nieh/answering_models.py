@@ -61,6 +61,8 @@ class _ConversationModel:
 
     def cost(self, prepared: PreparedTask) -> str | None:
         lines = [budget_of(prepared, self._model).description] if self._model.capabilities.counts_tokens else []
+        if any(sample.recall and sample.recalled is None for sample in prepared.task_samples.samples):
+            lines.append("what a memory recalls for each question is not counted yet")
         if prepared.task_samples.shows_films:
             name, as_video = self._model.name, "the film is given as a video"
             lines.append(as_video if self.video_input else f"{name} has no video input, the film is given as images")

@@ -4,9 +4,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.errors import DataError, ModelError
-from infthor_eval.nieh.contexts import ContextPart, Sample
+from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.contexts.video import as_images
-from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.task import PreparedTask
 from model_adapters import Model, Part
 
@@ -93,26 +92,12 @@ def _counts(model: Model, prepared: PreparedTask, samples: Sequence[Sample]) -> 
         context, text = prepared.task_samples.request(sample)
         context = context if model.capabilities.video_input else as_images(context)
         try:
-            counts.append(_most_tokens(model, [*context, text], prepared.decoding.max_new_tokens))
+            counts.append(_tokens(model, [*context, text]) + prepared.decoding.max_new_tokens)
         except ModelError as error:  # one question's text may be the reason; the run records it as failed
             refusals.append(error)
     if refusals and not counts:
         raise refusals[0]
     return counts + [0] * len(refusals)
-
-
-def _most_tokens(model: Model, parts: Sequence[ContextPart], max_new_tokens: int) -> int:
-    """Return the tokens of a request and its reply, or of the longest request for one of its notes, if that is longer.
-
-    Notes are not written yet; each counts as long as it may be.
-    """
-    notes = [part for part in parts if isinstance(part, Notes)]
-    empty = [part.text([""] * len(part.windows)) if isinstance(part, Notes) else part for part in parts]
-    room = sum(len(item.windows) * item.settings.max_new_tokens for item in notes)
-    reading = [
-        _tokens(model, window.request) + item.settings.max_new_tokens for item in notes for window in item.windows
-    ]
-    return max([_tokens(model, empty) + room + max_new_tokens, *reading])
 
 
 def _tokens(model: Model, parts: Sequence[Part]) -> int:

@@ -15,14 +15,14 @@ from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
-from infthor_eval.nieh.notes import Notes, NoteSettings
+from infthor_eval.nieh.recall_settings import RecallSettings
 from infthor_eval.nieh.samples import TaskSamples, open_set
 
 __all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "prompt_of", "sample_of", "samples_of"]
 
 Doc = dict[str, Any]
 # The first is lm-eval's own mark of an image in a text.
-_PLACEHOLDERS = {FrameRef: "<image>", Video: "<video>", Notes: "<notes>"}
+_PLACEHOLDERS = {FrameRef: "<image>", Video: "<video>"}
 
 
 def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
@@ -43,7 +43,8 @@ def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> D
         "variant": sample.variant,
         "frames": list(sample.frames),
         "fps": sample.fps,
-        "notes": [sample.notes.window, sample.notes.max_new_tokens] if sample.notes else [],
+        "recall": json.dumps(asdict(sample.recall)) if sample.recall else "",
+        "recalled": json.dumps(sample.recalled) if sample.recalled is not None else "",
         "set": str(task_samples.data.root),
         "frame_ablation": asdict(task_samples.frame_ablation),
         "trajectories": str(task_samples.data.trajectories or ""),
@@ -63,8 +64,14 @@ def sample_of(doc: Doc) -> Sample:
         published=PublishedColumns(**doc["published"]) if doc["published"] else None,
         file=doc["file"],
     )
-    notes = NoteSettings(*doc["notes"]) if doc["notes"] else None
-    return Sample(question, tuple(doc["frames"]), doc["variant"], notes=notes, fps=doc["fps"])
+    return Sample(
+        question,
+        tuple(doc["frames"]),
+        doc["variant"],
+        recall=RecallSettings.of(json.loads(doc["recall"])) if doc["recall"] else None,
+        recalled=tuple(json.loads(doc["recalled"])) if doc["recalled"] else None,
+        fps=doc["fps"],
+    )
 
 
 def samples_of(docs: Sequence[Doc]) -> TaskSamples:
@@ -83,12 +90,12 @@ def doc_parts(doc: Doc) -> list[ContextPart]:
 
 
 def doc_prompt(doc: Doc) -> str:
-    """Return the text of a doc's request, with placeholders for frames and notes."""
+    """Return the text of a doc's request, with placeholders for frames."""
     return prompt_of(samples_of([doc]), sample_of(doc))
 
 
 def prompt_of(task_samples: TaskSamples, sample: Sample, *, videos: bool = False) -> str:
-    """Return the text of a sample's request, with placeholders for frames and notes, and for videos if it has them."""
+    """Return the text of a sample's request, with placeholders for frames, and for videos if it has them."""
     context, text = task_samples.request(sample)
     shown = context if videos else as_images(context)
     return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*shown, text))

@@ -3,17 +3,20 @@
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import groupby
+from typing import Any
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.answering import NiehUnit, answer_units
+from infthor_eval.nieh.answering import answer_units
 from infthor_eval.nieh.answering_models import AnsweringModel, OpenAnswerer, answering_model
 from infthor_eval.nieh.baselines import Baseline
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
+from infthor_eval.nieh.recalling import apply_recall
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples, open_set
 from infthor_eval.nieh.task import NiehTask, PreparedTask
+from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import Cost, Group, Session, Skipped, TaskRequest, UnitKey, UnitRecord, UnitSample, Workload
 from model_adapters import Subject
 
@@ -61,6 +64,7 @@ class NiehEvaluation:
                 "k_tokens": self._options.k_tokens,
                 "tokens_per_frame": tokens,
                 "frames": self._options.frames,
+                **self._memory(),
             },
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
         )
@@ -73,6 +77,11 @@ class NiehEvaluation:
             return self._options.tokens_per_frame
         return _measure_frame(measured.data, model)
 
+    def _memory(self) -> dict[str, Any]:
+        """Return the options of the memory, as far as there are any, so that other runs are what they were."""
+        names = ("memory", "memory_args", "budget")
+        return {name: value for name in names if (value := getattr(self._options, name)) is not None}
+
     def _refuse_unused(self) -> None:
         """Refuse options without effect: they would only change the run's config, or mislead."""
         asked = ", ".join(task.name for task in self._tasks)
@@ -84,10 +93,16 @@ class NiehEvaluation:
                     f"--{name.replace('_', '-')} {value}: no context of {asked} has a size in tokens; leave it out, or "
                     "ask nieh_haystack or nieh_truncate_head"
                 )
+        for name, value in self._memory().items():
+            if not any(task.takes_memory for task in self._tasks):
+                raise UsageError(
+                    f"--{name.replace('_', '-')} {value}: no task of {asked} leaves its memory open; "
+                    "leave it out, or ask nieh_memory"
+                )
         if (self._options.retriever or self._options.retriever_revision) and not self._depends_on("retriever"):
             raise UsageError(
                 f"--retriever: no context of {asked} retrieves frames; "
-                "leave it out, or ask nieh_clip_retrieval or nieh_memory_frames"
+                "leave it out, or ask nieh_clip_retrieval or nieh_memory_frames, or --memory clip"
             )
         if self._options.trajectories and not self._depends_on("trajectories"):
             raise UsageError(
@@ -97,7 +112,7 @@ class NiehEvaluation:
 
     def _depends_on(self, source: str) -> bool:
         """Return whether a context of the tasks reads a source beside the set."""
-        return any(task.task_samples is not None and source in task.task_samples.sources for task in self._tasks)
+        return any(source in task.sources for task in self._tasks)
 
 
 class PreparedEvaluation:
@@ -146,6 +161,8 @@ class BoundNieh:
         prepared = self._prepared[record.task]
         number = self._numbers[record.key]
         sample = prepared.task_samples.samples[number]
+        if record.payload.recall is not None:
+            sample = apply_recall(sample, record.payload.recall)
         return UnitSample(
             number=number,
             doc=doc_of(prepared.task_samples, sample),

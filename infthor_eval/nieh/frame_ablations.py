@@ -10,7 +10,6 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import Context, ContextPart, Sample
-from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.options import SHOWN, check_frames
 
 __all__ = ["FrameAblation"]
@@ -80,14 +79,12 @@ def _trajectories(data: NiehSet) -> list[str]:
 
 
 def _frames_in(part: ContextPart) -> tuple[FrameRef, ...]:
-    if isinstance(part, Notes | Video):
+    if isinstance(part, Video):
         return part.frames
     return (part,) if isinstance(part, FrameRef) else ()
 
 
 def _with_frames(part: ContextPart, frames: Sequence[FrameRef]) -> ContextPart:
-    if isinstance(part, Notes):
-        return Notes(part.traj_id, tuple(frames), part.settings)
     if isinstance(part, Video):
         return Video(tuple(frames), part.fps)
     return frames[0] if frames else part

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from infthor_eval.errors import UsageError
+from infthor_eval.memory.budgets import read_budget
 
 __all__ = ["FRAMES", "SHOWN", "NiehOptions", "check_frames"]
 
@@ -21,6 +22,9 @@ class NiehOptions:
         retriever_revision: branch, tag or commit of it on the hub; None for the default branch.
         trajectories: folder of the set's trajectories (`--traj_dir` of the published scripts); None for the set's own.
         frames: the frames that are shown: the true ones, or a frame ablation.
+        memory: memory that recalls what is shown, a name or FILE.py:CLASS; for tasks that leave it open.
+        memory_args: its options, "k=v,k=v".
+        budget: most tokens of what it recalls ("4k" is 4,000); None for the memory's own limit.
     """
 
     k_tokens: int | None = field(
@@ -61,8 +65,29 @@ class NiehOptions:
         },
     )
 
+    memory: str | None = field(
+        default=None,
+        metadata={
+            "help": "Memories for tasks that need one (nieh_memory), a run with each; `ls memories`, or FILE.py:CLASS.",
+            "metavar": "NAME,...",
+            "each": True,
+        },
+    )
+    memory_args: str | None = field(
+        default=None, metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."}
+    )
+    budget: str | None = field(
+        default=None,
+        metadata={
+            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's own limit.",
+            "metavar": "TOKENS,...",
+            "each": True,
+        },
+    )
+
     def __post_init__(self) -> None:
-        """Raise UsageError if tokens_per_frame is below 1, or there is no such frame ablation."""
+        """Raise UsageError if a value is not valid."""
+        read_budget(self.budget)
         check_frames(self.frames)
         if self.tokens_per_frame is not None and self.tokens_per_frame < 1:
             raise UsageError(f"--tokens-per-frame {self.tokens_per_frame}: a frame has one token at least")

@@ -1,4 +1,4 @@
-"""Payloads of NIEH's records in the journal: replies to questions, a model's notes, and a judge's verdicts."""
+"""Payloads of NIEH's records in the journal: replies, what memories recalled and models wrote, a judge's verdicts."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.runs.records import RecordTypes
 
-__all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "NiehVerdict", "ShownClues"]
+__all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "NiehRecall", "NiehVerdict", "ShownClues"]
 
 
 class Guess(msgspec.Struct, frozen=True, kw_only=True):
@@ -39,6 +39,20 @@ class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
     n_after: int | None = None
 
 
+class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_recall"):
+    """What a memory recalled for a question.
+
+    Attributes:
+        recalled: positions of frames in the trajectory, and texts, in the order in which they are shown.
+        build_s: seconds that the memory took to observe the trajectory, for all questions on it.
+        recall_s: seconds that it took to recall this.
+    """
+
+    recalled: tuple[int | str, ...]
+    build_s: float
+    recall_s: float
+
+
 class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="nieh_answer"):
     """A question and the reply to it.
 
@@ -51,6 +65,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
         file: name of its file, in a set of several; empty elsewhere.
         guess: what can be guessed of the question; None if it is not known.
         shown_clues: clue frames among the shown ones; None if they are not known, or if no frame is evidence.
+        recall: what a memory recalled; None where the context has no memory.
         reply: the reply; None if the model failed.
         scores: scores of the reply by metric; empty if there is none.
     """
@@ -63,6 +78,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     file: str = ""
     guess: Guess | None = None
     shown_clues: ShownClues | None = None
+    recall: NiehRecall | None = None
     reply: str | None = None
     scores: dict[str, float] = {}
 
@@ -86,14 +102,13 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
 
 
 class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_note"):
-    """A model's note on some frames of a trajectory ("Steps 0-19"), shown to it later instead of them.
+    """A text that a model wrote for its memory, on some frames of a trajectory.
 
     The tokens of the request and of the note are None if the model does not count them.
     """
 
     note: str
-    traj_id: str
-    steps: str
+    n_frames: int
     n_context_tokens: int | None
     n_reply_tokens: int | None
     seconds: float
@@ -121,4 +136,4 @@ class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", t
     seconds: float
 
 
-RECORDS: RecordTypes[NiehAnswer] = RecordTypes(unit=NiehAnswer, artifact=NiehNote | NiehVerdict)
+RECORDS: RecordTypes[NiehAnswer] = RecordTypes(unit=NiehAnswer, artifact=NiehNote | NiehRecall | NiehVerdict)

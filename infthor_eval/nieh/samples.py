@@ -41,6 +41,18 @@ class TaskSamples:
         """True if the samples show films, which a model is given as a video or as images."""
         return any(sample.fps is not None for sample in self.samples)
 
+    def all_frames(self, sample: Sample) -> list[FrameRef]:
+        """Return all frames of a sample's trajectory as a memory observes them: ablated, but in their order.
+
+        Raises:
+            DataError: the trajectory cannot be read.
+        """
+        frames = self.data.frames(sample.question.traj_id)
+        if self.frame_ablation.frames == "shuffled":  # the shown ones are shuffled, once they are recalled
+            return list(frames)
+        shown = self.frame_ablation.apply(frames, self.data, self.context, sample)
+        return [part for part in shown if isinstance(part, FrameRef)]
+
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows it."""
         parts, text = self.context.request(self.data, sample)

@@ -1,6 +1,7 @@
 """The summary of a run of NIEH: a pure function of its journal.
 
-Times and cache hits are not in it: they differ between a run and the same run resumed.
+Cache hits are not in it: they differ between a run and the same run resumed. What a memory took is a field of its own,
+`took`, which results.json leaves out.
 """
 
 import math
@@ -15,6 +16,7 @@ import msgspec
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.above_guessing import AboveGuessing, above_guessing
 from infthor_eval.nieh.answer_form import YesNo, format_failures, yes_no
+from infthor_eval.nieh.memory_summary import MemorySummary, MemoryTimes, summarise_memory, time_memory
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.rates import Rate
@@ -125,6 +127,7 @@ class TaskSummary(msgspec.Struct, frozen=True):
         format_failures: number of replies that are not of the form asked for, by reason.
         below_full_marks: samples with a score below 1, by metric.
         scores: scores by metric and trajectory, in the order of the samples' keys, by which runs are paired.
+        memory: the memory that recalled what was shown; None if there is none.
     """
 
     n: int
@@ -144,19 +147,26 @@ class TaskSummary(msgspec.Struct, frozen=True):
     below_full_marks: dict[str, list[str]]
     scores: dict[str, dict[str, list[float]]]
     failures: list[Failure]
+    memory: MemorySummary | None = None
 
 
 class NiehSummary(msgspec.Struct, frozen=True):
-    """The summary of a run: its tasks by name."""
+    """The summary of a run: its tasks by name, and what their memories took, which differs from run to run."""
 
     tasks: dict[str, TaskSummary]
+    took: dict[str, MemoryTimes] = {}
 
 
 def summarise(config: Mapping[str, Any], records: Sequence[Record]) -> NiehSummary:
     """Summarise the run of a config by the records of its units; their order does not matter."""
     in_order = sorted(records, key=lambda record: record.key)
     tasks = config["tasks"].items()
-    return NiehSummary({task: _task([r for r in in_order if r.task == task], about) for task, about in tasks})
+    by_task = {task: [record for record in in_order if record.task == task] for task, _ in tasks}
+    times = {task: time_memory(of_task) for task, of_task in by_task.items()}
+    return NiehSummary(
+        {task: _task(by_task[task], about, config) for task, about in tasks},
+        {task: took for task, took in times.items() if took is not None},
+    )
 
 
 def main_metric(task: TaskSummary) -> str:
@@ -171,7 +181,7 @@ def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
     return {name: Rate(score.mean, score.low, score.high, n) for name, (score, n) in scores.items()}
 
 
-def _task(records: Sequence[Record], about: Mapping[str, Any]) -> TaskSummary:
+def _task(records: Sequence[Record], about: Mapping[str, Any], config: Mapping[str, Any]) -> TaskSummary:
     metrics = list(about["metrics"]["names"])
     names = sorted({record.payload.file for record in records} - {""})
     files = {name: [record for record in records if record.payload.file == name] for name in names}
@@ -195,6 +205,7 @@ def _task(records: Sequence[Record], about: Mapping[str, Any]) -> TaskSummary:
         },
         scores={name: _by_trajectory(records, name) for name in metrics},
         failures=[Failure(str(record.key), record.failure) for record in records if record.failure is not None],
+        memory=summarise_memory(config, about, records),
     )
 
 

@@ -12,6 +12,7 @@ from infthor_eval.nieh.evidence_tables import (
     short_name,
 )
 from infthor_eval.nieh.gains import Gain, find_gains, frames_of, name_of
+from infthor_eval.nieh.memory_tables import memory_tables
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.rescoring_report import sources_of
 from infthor_eval.nieh.scoring import SCORERS
@@ -39,8 +40,8 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
 
     Published rows by clues are below ours; a published table of other columns (question types, question files) is a
     table of its own beside runs in its context, with ours in it where they have its columns. The tables by depth and
-    of gains need a task with depths, and a pair of runs on true and on blank frames. Those of the evidence and of the
-    effective length are there if a task shows part of a trajectory.
+    of gains need a task with depths, and a pair of runs on true and on blank frames. Those of the evidence, of the
+    effective length and of memories are there if a task shows part of a trajectory.
     """
     contexts = {task.context for _, _, task in _tasks(runs)}
     others = [
@@ -55,12 +56,13 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
         *_gains_table(runs),
         *evidence_tables(runs),
         *effective_lengths(runs),
+        *memory_tables(runs),
         _replies_table(runs),
     ]
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the accuracy of each task with its intervals, and the gains over blank frames if there are any.
+    """Return the accuracy of each task with its intervals, and the tables of gains and memories if there are any.
 
     A task that asked nothing is a line below the table.
     """
@@ -73,7 +75,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
     notes = *dict.fromkeys(_nothing_asked(name, task) for _, name, task in tasks if not task.n), *_notes(runs)
     table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)
-    return [table, *_gains_table(runs)]
+    return [table, *_gains_table(runs), *memory_tables(runs)]
 
 
 def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:

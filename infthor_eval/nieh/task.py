@@ -3,12 +3,14 @@
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 from typing import Any
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
+from infthor_eval.memory import parse_options, read_budget
+from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, ContextSettings, Sample
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
@@ -38,6 +40,7 @@ class NiehTask:
     Attributes:
         settings: contents of its file.
         needs_size: True if the samples depend on the model's tokens per frame.
+        takes_memory: True if its memory is one of the run's options.
         task_samples: the samples; None if they depend on the model.
     """
 
@@ -57,8 +60,17 @@ class NiehTask:
         self.decoding: Decoding = decoding_of(file.settings["generation_kwargs"], request.seed, str(file.path))
         self.metrics: Metrics = metrics_of(file)
         self.data: NiehSet = find_set(**self._config)
-        self.needs_size = CONTEXTS[self._config["context"]].needs_model
+        # A budget of a memory is in tokens, too.
+        self.needs_size = CONTEXTS[self._config["context"]].needs_model or self._config.get("budget") is not None
+        self.takes_memory = self._config["context"] == MEMORY and "memory" not in file.settings["dataset_kwargs"]
         self.task_samples: TaskSamples | None = None if self.needs_size else find_samples(self._config, self._limit)
+
+    @cached_property
+    def sources(self) -> Mapping[str, Any]:
+        """Whatever the frames depend on besides the set and the settings (`Context.sources`)."""
+        if self.task_samples is not None:
+            return self.task_samples.sources
+        return CONTEXTS[self._config["context"]].sources(self.data, ContextSettings.read(self._config))
 
     def prepare(self, tokens_per_frame: int | None) -> PreparedTask:
         """Prepare the task for a model, given the tokens of a frame where the samples depend on them."""
@@ -132,4 +144,6 @@ def _check(file: TaskFile) -> None:
 def _run_settings(request: TaskRequest[NiehOptions]) -> dict[str, Any]:
     """Return the settings that a run gives to its tasks; those of their files go before them."""
     options = {"data": str(request.data) if request.data else None, **asdict(request.options)}
+    options["budget"] = read_budget(request.options.budget)
+    options["memory_args"] = parse_options(request.options.memory_args)
     return {"seed": request.seed} | {key: value for key, value in options.items() if value is not None}

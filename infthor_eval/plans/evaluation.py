@@ -53,7 +53,7 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         """Take the work, and what creates the subject's actors."""
         self._tasks, self._factory = evaluation.tasks, factory
         # Nothing is rendered that nobody looks at, and instance masks are needed for the state in words alone.
-        in_words = factory.sees and any(task.memory.needs_state for task in self._tasks.values())
+        in_words = factory.sees and any(task.history.needs_state for task in self._tasks.values())
         self._simulators = evaluation.simulators(image=factory.sees, instances=in_words)
         # A trajectory is a group: its plans share the expert's history, in the simulator and in the prefix cache.
         groups = groupby(evaluation.units, lambda unit: (unit.key.task, unit.cluster))

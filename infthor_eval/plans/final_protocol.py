@@ -18,7 +18,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.household.sequence_text import ACT, action_part, goal_part
-from infthor_eval.plans.memory import CountTokens, Memory, Past, StateInWords, TopFrames
+from infthor_eval.plans.history import CountTokens, History, Past, RecalledHistory, StateInWords
 from infthor_eval.plans.segments import Part
 from model_adapters import Decoding
 
@@ -35,14 +35,14 @@ class FinalForm:
 
     Attributes:
         system: text of the system's turn.
-        memory: what the agent is given before its first action.
+        history: what the agent is given before its first action.
         asks_anew: whether each action is asked for anew; else its actions and frames are added to the history.
         goes_on: whether later plans are tried after the first.
         ends: texts that end a reply.
     """
 
     system: str
-    memory: Memory
+    history: History
     asks_anew: bool = False
     goes_on: bool = False
     ends: tuple[str, ...] = ()
@@ -58,7 +58,7 @@ class GoalHistory:
     needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
-        """See `Memory`."""
+        """See `History`."""
         parts: list[Part] = []
         for segment in past.all:
             if segment.goal is not None:
@@ -76,7 +76,7 @@ class _TextMemory:
     needs_state: ClassVar[bool] = True
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
-        """See `Memory`."""
+        """See `History`."""
         return [_task_text(past) + f"State: You are in the middle of a room. {past.state};\n"]
 
 
@@ -84,30 +84,30 @@ class _TextMemory:
 class _FrameMemory:
     """The task, and the frames that are nearest to the present one."""
 
-    frames: TopFrames
+    frames: RecalledHistory
     needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
-        """See `Memory`."""
-        return [f"{_task_text(past)}Previous states: ", *self.frames.choose(past)]
+        """See `History`."""
+        return [f"{_task_text(past)}Previous states: ", *self.frames.choose(past, count)]
 
 
-def final_form(memory: Memory, history: str) -> FinalForm:
+def final_form(history: History, name: str) -> FinalForm:
     """Return the form of a value of `--history`, given what it stands for elsewhere.
 
     Raises:
         UsageError: the published scripts have no such form.
     """
     prompts = read_yaml(_PROMPTS, "install the package again")
-    if history in ("full", "published"):
+    if name in ("full", "published"):
         return FinalForm(prompts["interleaved"], GoalHistory(), ends=(ACT,))
-    if isinstance(memory, StateInWords):
+    if isinstance(history, StateInWords):
         system = prompts["memory"].format(given=prompts["given_text"])
         return FinalForm(system, _TextMemory(), asks_anew=True, goes_on=True)
-    if isinstance(memory, TopFrames):
+    if name.startswith("frames:") and isinstance(history, RecalledHistory):
         system = prompts["memory"].format(given=prompts["given_frames"])
-        return FinalForm(system, _FrameMemory(memory), asks_anew=True, goes_on=True)
-    raise UsageError(f"--protocol published has the histories full, text and frames:K, not {history}")
+        return FinalForm(system, _FrameMemory(history), asks_anew=True, goes_on=True)
+    raise UsageError(f"--protocol published has the histories full, text and frames:K, not {name}")
 
 
 def with_recorded_state(past: Past, trajectory: Trajectory, first: int) -> Past:

@@ -12,7 +12,7 @@ from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.actors import Act, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.plans.final_protocol import FinalForm, present_parts, with_recorded_state
-from infthor_eval.plans.memory import Memory
+from infthor_eval.plans.history import History
 from infthor_eval.plans.segments import Part
 from infthor_eval.thor.actions import applicable_actions
 from model_adapters import Decoding, Model, wrap_request_errors
@@ -27,7 +27,7 @@ class AgentConfig:
     """How a model is prompted, and how its actions are decoded, each draw with its own seed.
 
     Attributes:
-        memory: the part of the history that it is given.
+        history: the part of the history that it is given.
         words: words of actions.
         form: the published form of final tasks; None elsewhere.
         preamble: text before everything else; empty as published.
@@ -36,7 +36,7 @@ class AgentConfig:
     """
 
     decoding: Decoding
-    memory: Memory
+    history: History
     words: Words
     form: FinalForm | None = None
     preamble: str = ""
@@ -68,7 +68,7 @@ class ModelActor:
         if self._config.form is not None:
             past = with_recorded_state(past, environment.trajectory, situation.plan.low[0])
         with wrap_request_errors(self._model.name):
-            self._given = self._config.memory.recall(past, self._count)
+            self._given = self._config.history.recall(past, self._count)
             self._restart(self._given)
 
     def act(self) -> Act:

@@ -30,8 +30,27 @@ class PlansOptions(SimulatorOptions):
     history: str | None = field(
         default=None,
         metadata={
-            "help": "What a model is given of the past: full, published, last:TOKENS, text, frames:K.",
+            "help": "What a model is given of the past: full, published, last:TOKENS, text, frames:K, memory.",
             "metavar": "HOW",
+        },
+    )
+    memory: str | None = field(
+        default=None,
+        metadata={
+            "help": "Memories for --history memory, a run with each; `ls memories`, or FILE.py:CLASS.",
+            "metavar": "NAME,...",
+            "each": True,
+        },
+    )
+    memory_args: str | None = field(
+        default=None, metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."}
+    )
+    budget: str | None = field(
+        default=None,
+        metadata={
+            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's own limit.",
+            "metavar": "TOKENS,...",
+            "each": True,
         },
     )
     protocol: str | None = field(

@@ -64,7 +64,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
                 words=task.words,
                 max_steps=task.max_steps,
                 frames=frames,
-                in_words=factory.sees and task.memory.needs_state,
+                in_words=factory.sees and task.history.needs_state,
             ),
         )
         self._trajectory, self._actor = trajectory, factory.create(task, trajectory.data)

@@ -12,7 +12,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.environment import MAX_STEPS
 from infthor_eval.plans.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
 from infthor_eval.plans.final_protocol import FinalForm, final_form
-from infthor_eval.plans.memory import memory_named
+from infthor_eval.plans.history import MemoryChoice, RecalledHistory, history_named
 from infthor_eval.plans.model_actor import AgentConfig
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
@@ -68,7 +68,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
     Attributes:
         rules: the rules of rewards.
         words: the words of plans and actions.
-        memory: the part of the history that a model is given.
+        history: the part of the history that a model is given.
         final_form: the published form of final tasks; None for the default protocol.
         evaluated_trajectories: trajectories that are evaluated.
     """
@@ -91,7 +91,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         if self._options.greedy and isinstance(kwargs, Mapping):
             kwargs = {**kwargs, "do_sample": False, "temperature": 0.0}
         self.decoding = decoding_of(kwargs, request.seed, file.name)
-        self.memory = memory_named(settings.history, self._options.retriever)
+        self.history = history_named(settings.history, self._memory_choice())
         self.final_form = self._final_form(settings, request.seed)
         super().__init__(file, request, settings, partial(read_plan_trajectory, words=self.words))
         having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
@@ -99,14 +99,19 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         if not self.evaluated_trajectories:
             raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
 
+    def _memory_choice(self) -> MemoryChoice:
+        options = self._options
+        blank = options.frames == "blank"
+        return MemoryChoice(options.memory, options.memory_args, options.budget, options.retriever, blank)
+
     def _final_form(self, settings: PlanTaskSettings, seed: int) -> FinalForm | None:
-        """Return the published form of final tasks, and take its memory and decoding; None for the default protocol."""
+        """Return the published form of final tasks, and take its history and decoding; None without it."""
         if settings.protocol == "default":
             return None
         if settings.plans != "final":
             raise UsageError("--protocol published is for final tasks; take --tasks infthor_final")
-        form = final_form(self.memory, settings.history)
-        self.memory, self.decoding = form.memory, form.decoding(seed)
+        form = final_form(self.history, settings.history)
+        self.history, self.decoding = form.history, form.decoding(seed)
         return form
 
     def plans(self, trajectory: PlanTrajectory) -> list[Plan]:
@@ -123,7 +128,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         """Return how a model is prompted."""
         return AgentConfig(
             decoding=self.decoding,
-            memory=self.memory,
+            history=self.history,
             words=self.words,
             form=self.final_form,
             preamble=self.settings.preamble,
@@ -131,12 +136,17 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             blank=self._options.frames == "blank",
         )
 
+    def _recalling(self) -> dict[str, Any]:
+        """Return the identity of a memory of one's own choice; the published forms have theirs in their name."""
+        return {"recall": self.history.identity()} if isinstance(self.history, RecalledHistory) else {}
+
     def config(self) -> dict[str, Any]:
         """See `EpisodeTask`."""
         return self._config(
             self.evaluated_trajectories,
             words=self.settings.words,
             history=self.settings.history,
+            **self._recalling(),
             protocol=self.settings.protocol,
             after_failure=self.settings.after_failure,
             rewards=self.rules.document(),

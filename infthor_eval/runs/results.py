@@ -38,10 +38,16 @@ def results_document(run: RunSummary, suite: Suite[Any, Any], n_missing: int | N
         "config": header.config,
         "n_missing": n_missing,
         "primary_metrics": suite.primary_metrics(run.summary),
-        "summary": run.summary,
+        "summary": _reproducible(run.summary),
         # Without cached tokens: their number differs between a run and the same run resumed, or run by workers.
         "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
     }
+
+
+def _reproducible(summary: Any) -> dict[str, Any]:
+    """Return a summary without its field `took`, if it has one: times differ from run to run."""
+    document: dict[str, Any] = msgspec.to_builtins(summary)
+    return {name: value for name, value in document.items() if name != "took"}
 
 
 def write_run_files(

@@ -217,7 +217,11 @@ class Suite(Protocol[U, P]):
         """
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[P]]) -> msgspec.Struct:
-        """Summarise a run: a pure function of its journal, without times, equal for equal records."""
+        """Summarise a run: a pure function of its journal, equal for equal records.
+
+        What differs between a run and the same run resumed (times) is at most in a field `took`, which results.json
+        leaves out.
+        """
 
     def scores(self, record: UnitRecord[P]) -> Mapping[str, float]:
         """Return the metrics of one unit by name; a missing one counts as 0, as all do where the unit failed."""

@@ -6,7 +6,6 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
-from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 
@@ -22,7 +21,7 @@ def question_sequences(encoder: Encoder, task: TaskSamples, limit: int) -> Itera
         limit: most tokens of a sequence, frames expanded; longer ones are skipped.
 
     Raises:
-        UsageError: the context needs a model's notes.
+        UsageError: the context needs a memory.
         ModelError: the template refuses the turns.
     """
     for skipped in task.skipped:
@@ -40,10 +39,9 @@ def question_sequences(encoder: Encoder, task: TaskSamples, limit: int) -> Itera
 
 def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) -> TrainingSequence:
     context, text = task.request(sample)
-    parts = [part for part in as_images(context) if not isinstance(part, Notes)]  # training has no video input
-    if len(parts) < len(context):
-        raise UsageError("training has no notes of a model; use another context")
-    return encoder.answer(name, [*parts, text], doc_target(sample.question))
+    if sample.recall is not None and sample.recalled is None:
+        raise UsageError("training has no memory; use another context")
+    return encoder.answer(name, [*as_images(context), text], doc_target(sample.question))  # it has no video input
 
 
 def _name(question: str, variant: str) -> str:

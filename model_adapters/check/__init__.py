@@ -4,6 +4,7 @@ The checks use the protocols only, so they apply to every back end. A violated c
 """
 
 from model_adapters.check.clauses import ContractError
-from model_adapters.check.contract import CheckResult, check_adapter, run_checks
+from model_adapters.check.contract import check_adapter, run_checks
+from model_adapters.check.results import CheckResult
 
 __all__ = ["CheckResult", "ContractError", "check_adapter", "run_checks"]

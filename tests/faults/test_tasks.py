@@ -23,7 +23,7 @@ FILES = [
     (CLUES + ", depths: [2]}", f"{SETTING} depths is [2]; it is a list of numbers from 0 to 1"),
     (CLUES + ", depths: []}", f"{SETTING} depths is []; it is a list of numbers from 0 to 1"),
     (CLUES + ", top_k: true}", f"{SETTING} top_k is True; it is a whole number from 1"),
-    (CLUES + ", note_window: 0}", f"{SETTING} note_window is 0; it is a whole number from 1"),
+    (CLUES + ", budget: 0}", f"{SETTING} budget is 0; it is a whole number from 1, in tokens"),
     (CLUES + ", k_tokens: 1023}", f"{SETTING} k_tokens is 1023; it is 1000 or 1024"),
     (CLUES + ", seed: x}", f"{SETTING} seed is 'x'; it is a whole number"),
     (CLUES + ", frames: grey}", f"{SETTING} frames is 'grey'; it is one of shown, blank, shuffled, other"),

@@ -4,10 +4,8 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.docs import doc_of, doc_parts
-from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.samples import find_samples
 
 QUESTIONS = [
@@ -78,16 +76,6 @@ def test_other_frames_are_those_at_the_same_places_of_another_trajectory(request
         assert [name[1:] for name in names(others)] == [name[1:] for name in names(parts)]
     assert requests("other") == requests("other")
     assert any(requests("other", seed=seed) != requests("other") for seed in range(1, 9))
-
-
-@pytest.mark.parametrize("frames", ["blank", "shuffled", "other"])
-def test_notes_are_taken_on_what_stands_in(requests, frames):
-    (_, (notes, last), _), *_ = requests(frames, "memory_notes")
-    (_, (true_notes, true_last), _), *_ = requests("shown", "memory_notes")
-    assert isinstance(notes, Notes)
-    assert isinstance(last, FrameRef)
-    assert (notes.traj_id, notes.settings, len(notes.frames)) == ("a", true_notes.settings, 6)
-    assert [*notes.frames, last] != [*true_notes.frames, true_last]
 
 
 def test_what_cannot_be_is_refused(requests, make_nieh_set):

@@ -6,12 +6,11 @@ import pytest
 
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.video import Video
-from infthor_eval.nieh.notes import Notes
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import Catalog
 
-# By task: samples asked, samples skipped, digest of all requests (frames by name). Contexts that a CLIP model chooses
-# frames for are not among them.
+# By task: samples asked, samples skipped, digest of all requests (frames by name). Contexts that a CLIP model or a
+# memory chooses are not among them.
 EXPECTED = {
     "nieh_haystack_128k": (0, 679, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
     "nieh_haystack_16k": (61, 618, "ad745fc631fda7a9397efb727a42fbc0"),
@@ -23,7 +22,6 @@ EXPECTED = {
     "nieh_haystack_8k": (400, 279, "8d5f7a8b011595f0ab9f33bfa590099e"),
     "nieh_interleaved": (147, 0, "44df0f029b634401540af5abd2c77542"),
     "nieh_interleaved_plans": (147, 0, "9928243b774bb7338ab1bae2fdb881c2"),
-    "nieh_memory_notes": (147, 0, "c022851edaa5c40a81fbd6cc40c20e71"),
     "nieh_text_state": (147, 0, "4c6677eb853621bf163d66feb549d6e5"),
     "nieh_truncate_head_128k": (147, 0, "6198fc625078c68495aa339150f419ab"),
     "nieh_truncate_head_16k": (147, 0, "6198fc625078c68495aa339150f419ab"),
@@ -47,8 +45,6 @@ def as_text(part):
         return part
     if isinstance(part, Video):
         return f"video of {part.fps:.4f} fps {' '.join(map(as_text, part.frames))}"
-    if isinstance(part, Notes):
-        return f"notes {part.traj_id} {part.settings.window} {part.settings.max_new_tokens} {len(part.frames)}"
     return f"{part.path.parent.parent.name}/{part.path.name}"
 
 
@@ -65,6 +61,6 @@ def test_requests_are_what_they_were(task):
 
 
 def test_every_task_is_among_them():
-    chosen_by_clip = {"nieh_clip_retrieval", "nieh_memory_frames"}
+    by_others = {"nieh_clip_retrieval", "nieh_memory", "nieh_memory_frames", "nieh_memory_notes", "nieh_mini_memory"}
     ours = {name for name, task in Catalog.find_packaged().tasks.items() if task.suite == "nieh"}
-    assert set(EXPECTED) == ours - chosen_by_clip
+    assert set(EXPECTED) == ours - by_others

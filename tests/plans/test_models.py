@@ -10,7 +10,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.plans.habits import expert_texts
-from infthor_eval.plans.memory import LastTokens, memory_named
+from infthor_eval.plans.history import LastTokens, MemoryChoice, history_named
 from infthor_eval.plans.model_actor import ModelActor
 from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.runs import execute
@@ -295,15 +295,15 @@ def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(acting, d
 
 
 HISTORIES = {
-    "last:0": "there are full, published, last:TOKENS, text and frames:K",
-    "last:": "there are full, published, last:TOKENS, text and frames:K",
-    "last:-5": "there are full, published, last:TOKENS, text and frames:K",
-    "last:many": "there are full, published, last:TOKENS, text and frames:K",
-    "last:²": "there are full, published, last:TOKENS, text and frames:K",
-    "frames:0": "there are full, published, last:TOKENS, text and frames:K",
-    "all": "there are full, published, last:TOKENS, text and frames:K",
-    "full:3": "there are full, published, last:TOKENS, text and frames:K",
-    "text:3": "there are full, published, last:TOKENS, text and frames:K",
+    "last:0": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "last:": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "last:-5": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "last:many": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "last:²": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "frames:0": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "all": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "full:3": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "text:3": "there are full, published, last:TOKENS, text, frames:K and memory",
 }
 
 
@@ -319,7 +319,7 @@ def test_a_retriever_is_for_frames_alone_and_must_be_there(prepared):
         prepared("random", retriever="somewhere")
     with pytest.raises(UsageError, match=r"--retriever \./nowhere: there is no such folder"):
         prepared("random", history="frames:2", retriever="./nowhere")
-    assert isinstance(memory_named("last:7"), LastTokens)
+    assert isinstance(history_named("last:7", MemoryChoice()), LastTokens)
 
 
 # -- tiny models
@@ -425,6 +425,6 @@ def test_a_model_that_loses_its_conversation_is_an_error(acting, monkeypatch):
     def full(*_):
         raise ModelError("too long")
 
-    monkeypatch.setattr("infthor_eval.plans.memory.FullHistory.recall", full)
+    monkeypatch.setattr("infthor_eval.plans.history.FullHistory.recall", full)
     outcome, _ = acting(lambda *_: "")
     assert {record.failure for record in outcome.records} == {"too long"}

@@ -11,8 +11,8 @@ from infthor_eval.training.starting_model import load_starting_model
 from model_adapters import Turn
 
 
-def build(encoder, root, context="clues", limit=100_000):
-    return list(question_sequences(encoder, find_samples({"data": str(root), "context": context}), limit))
+def build(encoder, root, context="clues", limit=100_000, **settings):
+    return list(question_sequences(encoder, find_samples({"data": str(root), "context": context, **settings}), limit))
 
 
 @pytest.fixture(scope="session")
@@ -45,6 +45,6 @@ def test_what_cannot_be_asked_is_told(make_nieh_set, encoder):
     assert "longer than 100 tokens" in {short.reason, *(item.reason for item in build(encoder, root, limit=100))}
 
 
-def test_notes_cannot_be_trained_on(make_nieh_set, encoder):
-    with pytest.raises(UsageError, match="training has no notes of a model"):
-        build(encoder, make_nieh_set(), "memory_notes")
+def test_a_memory_cannot_be_trained_on(make_nieh_set, encoder):
+    with pytest.raises(UsageError, match="training has no memory"):
+        build(encoder, make_nieh_set(), "memory", memory="notes")

@@ -17,19 +17,13 @@ def command(model: str, model_args: str) -> int:
     The model gets a few dozen short requests with frames of one colour. Each clause of the contract has a line of
     output; docs/own-models.md explains them. Exit code 1 if a clause is broken.
     """
-    from infthor_eval.terminal import print_line
+    from infthor_eval.cli.options.checks import print_checks
     from model_adapters import run_checks
     from model_adapters.registry import build
 
-    n_broken = 0
     adapter = build(model, parse_model_args(model_args), seed=0)
     try:
-        for result in run_checks(adapter):
-            verdict = "holds" if result.violation is None else "broken"
-            print_line(f"{verdict:8}{result.name:16}{result.violation or ''}".rstrip())
-            n_broken += result.violation is not None
+        return print_checks(model, run_checks(adapter))
     finally:
         if hasattr(adapter, "close"):  # an adapter without it has been reported as broken
             adapter.close()
-    print_line(f"{model}: {f'{n_broken} broken' if n_broken else 'keeps the contract'}")
-    return int(n_broken > 0)

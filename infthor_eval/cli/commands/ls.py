@@ -1,5 +1,6 @@
-"""`infthor-eval ls`: models, tasks, scenes, and runs."""
+"""`infthor-eval ls`: models, memories, tasks, scenes, and runs."""
 
+import inspect
 import time
 from pathlib import Path
 
@@ -10,7 +11,8 @@ from rich.table import Table as RichTable
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import PATH, SCENE_KINDS, floor_plans_option, include_option
 from infthor_eval.cli.progress.notes import print_note
-from infthor_eval.errors import ModelError
+from infthor_eval.errors import InfthorError, ModelError
+from infthor_eval.memory import MEMORIES, accepted_options, memory_class
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.catalog import Catalog
 from infthor_eval.runs.run_labels import label_runs
@@ -31,7 +33,7 @@ _COUNTS = ("done", "missing", "failed")
 @click.group("ls", cls=ExampleGroup, invoke_without_command=True, example="infthor-eval ls models")
 @click.pass_context
 def command(context: click.Context) -> None:
-    """List the models with their options, the tasks, the scenes, or the runs in a folder."""
+    """List the models with their options, the memories, the tasks, the scenes, or the runs in a folder."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
@@ -48,6 +50,21 @@ def _models() -> None:
             table.add_row(name, f"{note}; {options(name)}" if note else options(name))
         except ModelError as error:  # an installed package's model that does not import: say so, list the others
             table.add_row(name, f"not usable: {error}", style="red")
+    console().print(table, soft_wrap=False)
+
+
+@command.command("memories", cls=ExampleCommand, example="infthor-eval ls memories")
+def _memories() -> None:
+    """Memories for `--memory`, with their options and defaults."""
+    table = RichTable("memory", "what it recalls", "options and defaults (--memory-args)", box=box.SIMPLE_HEAD)
+    for name in MEMORIES.names:
+        try:
+            shown = ", ".join(f"{key}={item.default}" for key, item in accepted_options(name).items())
+            about = (inspect.getdoc(memory_class(name)) or "").partition("\n")[0]
+        except InfthorError as error:  # an installed package's memory that does not import
+            table.add_row(name, f"not usable: {error}", "", style="red")
+        else:
+            table.add_row(name, about, shown or "-")
     console().print(table, soft_wrap=False)
 
 

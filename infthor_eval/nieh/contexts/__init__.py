@@ -5,8 +5,9 @@ from infthor_eval.nieh.contexts import interleaved, memory, plans, retrieval, te
 from infthor_eval.nieh.contexts.base import Context, ContextPart, ContextSettings, Sample, trajectories_identity
 from infthor_eval.nieh.contexts.haystack import haystack
 
-__all__ = ["CONTEXTS", "Context", "ContextPart", "ContextSettings", "Sample", "context_named"]
+__all__ = ["CONTEXTS", "MEMORY", "Context", "ContextPart", "ContextSettings", "Sample", "context_named"]
 
+MEMORY = "memory"  # the context that a memory recalls
 _INTERLEAVED = "Answer the question given the state and action sequence of the embodied agent."
 
 CONTEXTS = {
@@ -33,12 +34,7 @@ CONTEXTS = {
         positions=video.video_positions,
         sources=video.video_identity,
     ),
-    "memory_frames": Context(retrieval.memory_frames, sources=retrieval.retriever_identity),
-    "memory_notes": Context(
-        memory.memory_notes,
-        intro="Answer the question given your notes on the agent's views in time order and its last view (the image).",
-        parts=memory.notes_parts,
-    ),
+    MEMORY: Context(memory.memory, parts=memory.recalled_parts, sources=memory.memory_sources),
 }
 
 

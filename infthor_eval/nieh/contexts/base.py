@@ -12,15 +12,15 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.video import FILM_FPS, Video
-from infthor_eval.nieh.notes import Notes, NoteSettings
 from infthor_eval.nieh.options import FRAMES
 from infthor_eval.nieh.prompts import question_text
+from infthor_eval.nieh.recall_settings import RecallSettings
 
 __all__ = ["Context", "ContextPart", "ContextSettings", "Sample", "clue_positions", "trajectories_identity"]
 
 _LARGEST = 1e9  # kilo-tokens; more is a typing error
 _COUNT = "a whole number from 1"
-ContextPart = str | FrameRef | Video | Notes
+ContextPart = str | FrameRef | Video
 
 
 def _is_positive(value: Any) -> bool:
@@ -34,8 +34,9 @@ _VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
     "depths": (lambda value: value and all(0 <= depth <= 1 for depth in value), "a list of numbers from 0 to 1"),
     "tokens_per_frame": (_is_positive, _COUNT),
     "top_k": (_is_positive, _COUNT),
-    "note_window": (_is_positive, _COUNT),
-    "note_tokens": (_is_positive, _COUNT),
+    "memory": (None, "the name of a memory"),
+    "memory_args": (None, "a mapping of the memory's options"),
+    "budget": (_is_positive, f"{_COUNT}, in tokens"),
     "fps": (lambda value: 0 < value <= FILM_FPS, f"a number of frames per second above 0, at most {FILM_FPS}"),
     "seed": (None, "a whole number"),
     "retriever": (None, "a text"),
@@ -52,7 +53,9 @@ class Sample:
         frames: positions of the shown frames in the trajectory's time order.
         variant: variant of the context ("depth=0.4"); empty if there is only one.
         n_cut: number of frames that are cut off to keep the context's size.
-        notes: settings of the model's notes on the frames, if it is shown notes instead of frames.
+        recall: how frames and texts are recalled; None if the context shows what it says.
+        recalled: what was recalled, positions of frames and texts in order; None before. `frames` are all frames
+            before, and then the recalled ones and the last.
         fps: rate at which the frames are sampled from a film, per second, if they are shown as a video.
     """
 
@@ -60,7 +63,8 @@ class Sample:
     frames: tuple[int, ...]
     variant: str = ""
     n_cut: int = 0
-    notes: NoteSettings | None = None
+    recall: RecallSettings | None = None
+    recalled: tuple[int | str, ...] | None = None
     fps: float | None = None
 
 
@@ -76,8 +80,9 @@ class ContextSettings:
         top_k: number of retrieved frames.
         retriever: CLIP model that retrieves them, a hub id or a folder.
         retriever_revision: branch, tag or commit on the hub; None for the default branch.
-        note_window: number of frames that the model reads for one note.
-        note_tokens: limit of a note in tokens.
+        memory: memory that recalls what is shown, a name or FILE.py:CLASS.
+        memory_args: options of the memory.
+        budget: most tokens of what is recalled; None for the memory's own limit.
         fps: frames per second that are sampled from a trajectory's film.
         seed: seed of everything sampled.
         frames: the frames that are shown (`infthor_eval.nieh.frame_ablations`).
@@ -90,8 +95,9 @@ class ContextSettings:
     top_k: int = 10
     retriever: str = "openai/clip-vit-large-patch14"
     retriever_revision: str | None = None
-    note_window: int = 20
-    note_tokens: int = 64
+    memory: str | None = None
+    memory_args: dict[str, Any] = field(default_factory=dict)
+    budget: int | None = None
     fps: float = 1.0
     seed: int = 0
     frames: str = "shown"
@@ -155,6 +161,7 @@ class Context:
         samples: returns the samples of a question, one for each variant, or the reasons why it cannot be asked.
         needs_model: True if the frames depend on the model's tokens per frame.
         intro: the sentence that says what the model sees; the published one where the context is published.
+        text_intro: the sentence where texts were recalled.
         parts: returns what the model sees before that sentence, given the frames of a sample.
         frames: returns the frames of a trajectory that the positions of a sample refer to, given its `fps`.
         positions: returns where in the trajectory's time order the frames of a sample are.
@@ -164,6 +171,10 @@ class Context:
     samples: Callable[[NiehSet, Question, ContextSettings], list[Sample | SkippedQuestion]]
     needs_model: bool = False
     intro: str = "Answer the question given the agent's views in time order."
+    text_intro: str = (
+        "Answer the question given what was recalled of the agent's views, in time order, and its last view (the last "
+        "image)."
+    )
     parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(default=_only_frames)
     frames: Callable[[NiehSet, str, float | None], Sequence[FrameRef]] = field(default=_all_frames)
     positions: Callable[[NiehSet, Sample], Sequence[int]] = field(default=_frames_of)
@@ -179,7 +190,8 @@ class Context:
     def request(self, data: NiehSet, sample: Sample) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows it."""
         parts = self.parts(data, sample, self.select_frames(data, sample))
-        return parts, question_text(self.intro, sample.question)
+        has_texts = any(isinstance(item, str) for item in sample.recalled or ())
+        return parts, question_text(self.text_intro if has_texts else self.intro, sample.question)
 
 
 def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:

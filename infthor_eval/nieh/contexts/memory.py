@@ -1,28 +1,53 @@
-"""Memory in words: the model's own notes on the trajectory, and the agent's current view."""
+"""What a memory recalls of the trajectory, and the agent's current view.
+
+A memory is opened for a task's identity, but it recalls only when a question is asked: that can take long, and some ask
+the model under test (`infthor_eval.nieh.recalling`).
+"""
 
 from collections.abc import Sequence
+from typing import Any
 
+from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
+from infthor_eval.memory import accepted_options, memory_identity
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
-from infthor_eval.nieh.notes import Notes, NoteSettings
+from infthor_eval.nieh.recall_settings import RecallSettings
 
-__all__ = ["memory_notes", "notes_parts"]
+__all__ = ["memory", "memory_sources", "recalled_parts"]
 
-
-def memory_notes(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """Ask on the model's notes: on every window of `note_window` frames it writes a note of up to `note_tokens` tokens.
-
-    A note depends on the frames of its window only, not on earlier notes. The paper reports a memory in text
-    (long-horizon tasks), but not how the text is written.
-    """
-    note_settings = NoteSettings(settings.note_window, settings.note_tokens)
-    return [Sample(question, tuple(range(len(data.frames(question.traj_id)))), notes=note_settings)]
+_UNRECALLED = "<memory>"  # the place of what will be recalled, in prompts of samples that no model was asked
+_OF_RETRIEVER = ("retriever", "retriever_revision")
 
 
-def notes_parts(_data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
-    """Return the notes, then the last frame."""
-    if sample.notes is None:
-        raise ValueError("a sample of memory_notes lacks the settings of its notes")
-    return [Notes(sample.question.traj_id, tuple(frames), sample.notes), frames[-1]]
+def memory(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+    """Ask on what a memory recalls of the frames before the last, and on that one, the agent's current view."""
+    return [Sample(question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings))]
+
+
+def memory_sources(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
+    """Return the identity of the memory: another one recalls other things."""
+    recall = _recall(settings)
+    return memory_identity(recall.memory, recall.options)
+
+
+def recalled_parts(_data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+    """Return what was recalled in its order, then the last frame; a mark in its place if nothing was recalled yet."""
+    if sample.recalled is None:
+        return [_UNRECALLED, *frames[-1:]]
+    left = iter(frames)
+    return [*(item if isinstance(item, str) else next(left) for item in sample.recalled), *left]
+
+
+def _recall(settings: ContextSettings) -> RecallSettings:
+    if settings.memory is None:
+        raise UsageError("this task needs a memory: give --memory NAME; `infthor-eval ls memories` lists them")
+    options = dict(settings.memory_args)
+    for name in _OF_RETRIEVER:
+        value = getattr(settings, name)
+        if value is not None and name in accepted_options(settings.memory):
+            options.setdefault(name, value)
+    # Without a budget the size of a frame decides nothing, and recalls are the same for every model.
+    size = settings.tokens_per_frame if settings.budget is not None else None
+    return RecallSettings(settings.memory, tuple(sorted(options.items())), settings.budget, size, settings.seed)

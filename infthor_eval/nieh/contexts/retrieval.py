@@ -1,4 +1,4 @@
-"""Contexts that show the frames that a CLIP model finds nearest, to the question or to the agent's current view.
+"""The frames that a CLIP model finds nearest to the question.
 
 The retriever is imported where it is needed: that takes seconds, which other tasks need not wait.
 """
@@ -13,7 +13,7 @@ from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 if TYPE_CHECKING:
     from model_adapters.hf.retrieval import Retriever
 
-__all__ = ["clip_retrieval", "memory_frames", "retriever_identity"]
+__all__ = ["clip_retrieval", "retriever_identity"]
 
 
 def clip_retrieval(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
@@ -29,21 +29,6 @@ def clip_retrieval(data: NiehSet, question: Question, settings: ContextSettings)
     except DataError as error:
         return [SkippedQuestion(question, str(error))]
     return [Sample(question, nearest(vectors, retriever.text(question.text), settings.top_k))]
-
-
-def memory_frames(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
-    """Ask on the `top_k` earlier frames most similar to the last one, the agent's current view, then on that one.
-
-    The paper reports such a memory with the top 20 images (long-horizon tasks). The current view is shown beside the
-    k, not counted among them.
-    """
-    from model_adapters.hf.vectors import nearest
-
-    try:
-        vectors = _retriever(settings).frames(data.frames(question.traj_id))
-    except DataError as error:
-        return [SkippedQuestion(question, str(error))]
-    return [Sample(question, (*nearest(vectors[:-1], vectors[-1], settings.top_k), len(vectors) - 1))]
 
 
 def retriever_identity(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:

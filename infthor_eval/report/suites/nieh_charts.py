@@ -14,6 +14,7 @@ from infthor_eval.nieh.gains import find_gains, name_of
 from infthor_eval.nieh.summary import CLUE_COLUMNS, DISTANCES, SHOWN_CLUES, Cell, Score, TaskSummary, main_metric
 from infthor_eval.report.figures.style import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.suites.memory_chart import memory_charts
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.statistics import MeanEstimate
 from infthor_eval.terminal import printable
@@ -53,7 +54,8 @@ def nieh_charts(runs: Sequence[ReportRun]) -> list[Chart]:
             charts += [_by_clues(task, lines), _by_type(task, lines), *_by_evidence(task, lines)]
     summaries = [_gains_chart(runs), _above_guessing_chart(runs)]
     heat_maps = [_heat_map(run) for run in runs]
-    return [*charts, *(chart for chart in (*summaries, *heat_maps) if chart is not None)]
+    drawn = [chart for chart in (*summaries, *heat_maps) if chart is not None]
+    return [*charts, *memory_charts(runs), *drawn]
 
 
 def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:

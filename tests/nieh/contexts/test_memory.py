@@ -1,67 +1,213 @@
+"""Questions on what a memory recalls: what is observed, recalled, shown and kept."""
+
+import json
+
+import msgspec
 import pytest
 
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import Question
 from infthor_eval.harness import registration
 from infthor_eval.harness.nieh_task import dataset, doc_to_image, doc_to_text
-from infthor_eval.nieh.contexts import CONTEXTS
-from infthor_eval.nieh.docs import doc_parts, sample_of
-from infthor_eval.nieh.notes import Notes, NoteSettings
-from infthor_eval.nieh.samples import find_samples
+from infthor_eval.nieh.docs import doc_of, doc_parts, sample_of
+from infthor_eval.nieh.recalling import Recaller, recall_all
+from infthor_eval.nieh.records import NiehRecall
+from infthor_eval.nieh.samples import find_samples, open_set
 
-QUESTION = Question("t", "Is there a mug?", (1,), ("yes",))
-
-
-def notes(n_frames, window):
-    frames = tuple(FrameRef(f"{index}.png") for index in range(n_frames))
-    return Notes("t", frames, NoteSettings(window, 8))
-
-
-def test_windows_hold_every_frame_once_and_the_last_one_what_is_left():
-    windows = notes(45, 20).windows
-    assert [window.steps for window in windows] == ["Steps 0-19", "Steps 20-39", "Steps 40-44"]
-    assert tuple(frame for window in windows for frame in window.frames) == notes(45, 20).frames
-    assert [window.steps for window in notes(21, 20).windows] == ["Steps 0-19", "Step 20"]
-    *frames, text = windows[2].request
-    assert frames == [FrameRef(f"{index}.png") for index in range(40, 45)]
-    assert text.startswith("\nSteps 40-44 of an embodied agent's trajectory")
-
-
-def test_the_notes_are_a_line_each_in_time_order():
-    text = notes(5, 2).text(["a mug\non the  table", "", "the sink "])
-    assert text == "Steps 0-1: a mug on the table\nSteps 2-3: \nStep 4: the sink\n"
-
-
-def test_the_context_is_the_notes_the_last_frame_and_the_question(make_nieh_set):
-    root = make_nieh_set([QUESTION], n_frames=5, size=56)
-    found = find_samples({"context": "memory_notes", "data": str(root), "note_window": 3, "note_tokens": 7})
-    (sample,) = found.samples
-    frames = found.data.frames("t")
-    context, text = CONTEXTS["memory_notes"].request(found.data, sample)
-    assert context == [Notes("t", frames, NoteSettings(3, 7)), frames[-1]]
-    assert text.endswith("Question: Is there a mug?")
+QUESTIONS = [
+    Question("t", "Is there a mug?", (1,), ("yes",)),
+    Question("t", "Where was the plate?", (0, 5), ("Sink",)),
+    Question("u", "Is there a mug?", (2,), ("no",)),
+]
 
 
 @pytest.fixture
-def references(monkeypatch):
-    """As when lm-eval's model is ours, which has notes taken."""
-    monkeypatch.setattr(registration, "_references", True)
+def found(make_nieh_set):
+    root = make_nieh_set(QUESTIONS, n_frames=6, size=56)
+
+    def find(memory="last", **settings):
+        return find_samples({"context": "memory", "memory": memory, "data": str(root), **settings})
+
+    return find
 
 
-def test_a_doc_carries_how_notes_are_taken(make_nieh_set, references):
-    root = make_nieh_set([QUESTION], n_frames=5, size=56)
-    config = {"context": "memory_notes", "data": str(root), "note_window": 3, "note_tokens": 7}
-    (doc,) = dataset(**config)["test"]
-    assert doc_parts(doc)[0].settings == NoteSettings(3, 7)
-    assert doc_to_text(doc).startswith("<notes><image>\nAnswer the question given your notes")
-    assert doc_to_image(doc) == []
-    assert sample_of(doc) == find_samples(config).samples[0]
+def shown(task_samples):
+    """Names of the frames, and the texts, of each request."""
+    requests = [task_samples.request(sample) for sample in recall_all(task_samples)]
+    return [[part if isinstance(part, str) else int(part.path.stem) for part in parts] for parts, _ in requests]
 
 
-def test_a_runner_that_has_no_notes_taken_is_told_so(make_nieh_set, monkeypatch):
-    monkeypatch.setattr(registration, "_references", False)
-    root = make_nieh_set([QUESTION], size=56)
-    with pytest.raises(UsageError, match="run the task with `infthor-eval run`") as caught:
-        dataset(context="memory_notes", data=str(root))
+def test_the_last_view_is_shown_after_what_is_recalled_of_those_before(found):
+    assert shown(found(memory_args={"k": 2})) == [[3, 4, 5]] * 3
+    assert shown(found(memory_args={"k": 99})) == [[0, 1, 2, 3, 4, 5]] * 3
+    assert shown(found(budget=30, tokens_per_frame=10)) == [[2, 3, 4, 5]] * 3
+    assert shown(found(budget=9, tokens_per_frame=10)) == [[5]] * 3
+    assert shown(found("oracle", memory_args={"k": 1})) == [[1, 5], [0, 5], [2, 5]]
+
+
+def test_words_tell_of_views_alone_or_of_what_was_recalled(found, own):
+    frames, texts = found(), found(own(recalled='"a mug"'))
+    (_, of_frames), (parts, of_texts) = (item.request(recall_all(item)[0]) for item in (frames, texts))
+    assert "\nAnswer the question given the agent's views in time order. " in of_frames
+    assert of_texts.startswith("\nAnswer the question given what was recalled of the agent's views, in time order, and")
+    assert (parts[0], len(parts)) == ("a mug", 2)
+
+
+def test_a_sample_that_nothing_was_recalled_for_has_a_mark(found):
+    task_samples = found()
+    parts, _ = task_samples.request(task_samples.samples[0])
+    assert (parts[0], len(parts)) == ("<memory>", 2)
+
+
+OBSERVES = """
+from infthor_eval.memory import MemoryCapabilities
+
+SEEN = []
+
+
+class Observes:
+    capabilities = MemoryCapabilities(privileged={privileged})
+
+    def identity(self):
+        return {{}}
+
+    def begin(self, facts):
+        SEEN.append(("begin", facts.name))
+
+    def observe(self, step):
+        SEEN.append((step.number, step.frame.path.stem, step.log is not None))
+
+    def recall(self, query, budget):
+        SEEN.append((query.text, query.present.number, query.clues, query.present.log is not None))
+        return [{recalled}]
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    """Writes a memory that tells what it is given; returns its name and the list that it fills."""
+
+    def write(privileged=False, recalled=""):
+        path = tmp_path / f"observes_{privileged}_{len(recalled)}.py"
+        path.write_text(OBSERVES.format(privileged=privileged, recalled=recalled))
+        return f"{path}:Observes"
+
+    return write
+
+
+@pytest.mark.parametrize("privileged", [False, True])
+def test_a_memory_sees_the_steps_before_the_question_and_metadata_only_if_privileged(found, own, privileged):
+    from model_adapters.own_file import load_from_file
+
+    name = own(privileged)
+    recall_all(found(name))
+    seen = load_from_file(name).begin.__globals__["SEEN"]
+    steps = [(number, f"{number:09d}", privileged) for number in range(5)]
+    asked = [(question.text, 5, question.clues if privileged else None, privileged) for question in QUESTIONS]
+    assert seen == [("begin", "t"), *steps, *asked[:2], ("begin", "u"), *steps, asked[2]]
+
+
+@pytest.mark.parametrize(
+    ("recalled", "words"),
+    [
+        ("query.present", "which is neither a text nor a step that it has observed"),
+        ("3", "recalls 3, which is neither a text nor a step"),
+        ('" "', "recalls an empty text"),
+        ("1 / 0", "fails (division by zero); fix it"),
+        ('"x" * 400', "recalls 100 tokens where the budget is 50"),
+    ],
+)
+def test_a_wrong_recall_is_one_line(found, own, recalled, words):
+    with pytest.raises(UsageError) as caught:
+        recall_all(found(own(recalled=recalled), budget=50, tokens_per_frame=10))
+    assert words in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_what_was_recalled_is_found_again_by_its_inputs(found):
+    kept = {}
+
+    def recall(task_samples):
+        recaller = Recaller(task_samples, None, kept.get, kept.__setitem__)
+        return [recaller.recall(sample) for sample in task_samples.samples]
+
+    first = recall(found())
+    assert len(kept) == 3
+    assert recall(found()) == first
+    assert len(kept) == 3
+    recall(found(memory_args={"k": 2}))
+    assert len(kept) == 6
+    assert all(isinstance(item, NiehRecall) and item.build_s >= 0 for item in kept.values())
+
+
+@pytest.mark.parametrize(("frames", "same"), [("blank", False), ("other", False), ("shuffled", True), ("shown", True)])
+def test_an_ablation_is_what_a_memory_observes(found, own, frames, same):
+    task_samples = found(own(recalled="str(query.present.frame.path)"), frames=frames)
+    true = str(task_samples.data.frames("t")[-1].path)
+    for sample in recall_all(task_samples)[:2]:
+        parts, _ = task_samples.request(sample)
+        assert (parts[0] == true) == same
+
+
+def test_blank_frames_are_shown_in_place_of_those_recalled(found):
+    task_samples = found(frames="blank")
+    parts, _ = task_samples.request(recall_all(task_samples)[0])
+    assert len(parts) == 6
+    assert {part.path.name for part in parts} == {"56x56.png"}
+
+
+def test_docs_carry_what_was_recalled_and_how(found):
+    task_samples = found("oracle", memory_args={"k": 2}, budget=40, tokens_per_frame=10)
+    for sample in (task_samples.samples[0], *recall_all(task_samples)):
+        doc = json.loads(json.dumps(doc_of(task_samples, sample)))
+        assert sample_of(doc) == sample
+        parts, text = task_samples.request(sample)
+        assert doc_parts(doc) == [*parts, text]
+
+
+def test_another_host_gets_docs_with_what_was_recalled(found, monkeypatch):
+    monkeypatch.setattr(registration, "_references", False)
+    root = found().data.root
+    docs = dataset(context="memory", memory="last", memory_args={"k": 2}, data=str(root))["test"]
+    assert [doc["frames"] for doc in docs] == [[3, 4, 5]] * 3
+    assert len(doc_to_image(docs[0])) == 3
+    assert doc_to_text(docs[0]).startswith("<image><image><image>\nAnswer")
+
+
+def test_another_host_is_told_that_it_cannot_write_notes(found, monkeypatch):
+    monkeypatch.setattr(registration, "_references", False)
+    root = found().data.root
+    with pytest.raises(UsageError, match="run the task with `infthor-eval run`") as caught:
+        dataset(context="memory", memory="notes", data=str(root))
+    assert "\n" not in str(caught.value)
+
+
+def test_our_model_under_another_host_recalls_itself(found, monkeypatch):
+    monkeypatch.setattr(registration, "_references", True)
+    root = found().data.root
+    (doc, *_) = dataset(context="memory", memory="notes", data=str(root))["test"]
+    assert doc_to_text(doc).startswith("<memory><image>\nAnswer the question")
+    assert sample_of(doc).recalled is None
+
+
+def test_a_task_without_a_memory_says_how_to_give_one(make_nieh_set):
+    with pytest.raises(UsageError, match="needs a memory: give --memory NAME"):
+        find_samples({"context": "memory", "data": str(make_nieh_set(QUESTIONS))})
+
+
+def test_actions_and_goals_come_from_log_and_trajectory(found):
+    open_set.cache_clear()
+    task_samples = find_samples({"context": "memory", "memory": "text-log", "bundled": "nieh_mini"}, limit=1)
+    (sample,) = recall_all(task_samples)
+    (text,) = (item for item in sample.recalled if isinstance(item, str))
+    lines = text.splitlines()
+    steps = task_samples.data.frames(sample.question.traj_id)
+    assert lines[0].startswith("Step 0: goal: ")
+    assert sum(": goal: " in line for line in lines) >= 2
+    assert any("PickupObject" in line and "; holds " in line for line in lines)
+    assert int(lines[-1].split()[1].rstrip(":")) == len(steps) - 1
+
+
+def test_a_recall_is_as_it_was_after_the_journal():
+    recall = NiehRecall(recalled=(3, "a mug", 1), build_s=0.5, recall_s=0.1)
+    assert msgspec.json.decode(msgspec.json.encode(recall), type=NiehRecall) == recall

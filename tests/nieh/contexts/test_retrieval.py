@@ -11,6 +11,8 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
+from infthor_eval.nieh.recalling import recall_all
+from infthor_eval.nieh.samples import find_samples
 from model_adapters.hf.retrieval import open_retriever
 
 TEXTS = ("Is there a mug?", "Where was the plate?", "What did you put on the table?")
@@ -41,6 +43,14 @@ def shown(context, root, question=QUESTIONS[0], **settings):
     return found if isinstance(found, SkippedQuestion) else list(found.frames)
 
 
+def recalled(root, k, clip, question=QUESTIONS[0], memory="clip-view"):
+    """The frames that a memory has shown."""
+    config = {"context": "memory", "memory": memory, "memory_args": {"k": k}, "retriever": str(clip)}
+    task_samples = find_samples({**config, "data": str(root)})
+    by_text = {sample.question.text: sample for sample in recall_all(task_samples)}
+    return list(by_text[question.text].frames)
+
+
 @torch.inference_mode()
 def similarities(clip, root):
     """Cosines of (texts, frames) and (frames, frames), by transformers alone, all frames in one batch."""
@@ -69,17 +79,18 @@ def test_the_frames_nearest_to_each_question_are_those_of_plain_transformers(noi
     assert shown("clip_retrieval", root, retriever=str(clip), top_k=3) == largest(to_texts[0], 3)
 
 
-def test_memory_frames_are_those_nearest_to_the_last_view_which_comes_after_them(noise, clip):
+def test_a_memory_recalls_those_nearest_to_the_question_or_to_the_last_view_which_comes_after_them(noise, clip):
     root = noise(40)
-    _, between = similarities(clip, root)
-    assert shown("memory_frames", root, retriever=str(clip), top_k=20) == [*largest(between[-1, :-1], 20), 39]
+    to_texts, between = similarities(clip, root)
+    assert recalled(root, 10, clip, memory="clip") == [*largest(to_texts[0, :-1], 10), 39]
+    assert recalled(root, 20, clip) == [*largest(between[-1, :-1], 20), 39]
 
 
 def test_a_short_trajectory_is_shown_whole(noise, clip):
     root = noise(4)
     assert shown("clip_retrieval", root, retriever=str(clip)) == [0, 1, 2, 3]
-    assert shown("memory_frames", root, retriever=str(clip)) == [0, 1, 2, 3]
-    assert shown("memory_frames", root, retriever=str(clip), top_k=2)[-1] == 3
+    assert recalled(root, 10, clip) == [0, 1, 2, 3]
+    assert recalled(root, 2, clip)[-1] == 3
 
 
 def test_of_equal_frames_the_earlier_are_taken(noise, clip):
@@ -88,7 +99,7 @@ def test_of_equal_frames_the_earlier_are_taken(noise, clip):
     for path in images[1:]:
         shutil.copy(images[0], path)
     assert shown("clip_retrieval", root, retriever=str(clip), top_k=5) == [0, 1, 2, 3, 4]
-    assert shown("memory_frames", root, retriever=str(clip), top_k=3) == [0, 1, 2, 39]
+    assert recalled(root, 3, clip) == [0, 1, 2, 39]
 
 
 def test_each_frame_is_decoded_once_and_few_at_a_time(noise, make_clip, monkeypatch):
@@ -105,7 +116,7 @@ def test_each_frame_is_decoded_once_and_few_at_a_time(noise, make_clip, monkeypa
     for question in QUESTIONS:
         first = shown("clip_retrieval", root, question, retriever=str(clip))
         assert shown("clip_retrieval", root, question, retriever=str(clip)) == first
-        shown("memory_frames", root, question, retriever=str(clip))
+        recalled(root, 10, clip, question)
     assert loaded == [f"{index:09d}.png" for index in range(70)]
     assert batches == [32, 32, 6]
     open_retriever.cache_clear()  # as in the next process
@@ -117,8 +128,9 @@ def test_a_frame_that_cannot_be_decoded_has_the_question_skipped(noise, clip):
     root = noise(12)
     broken = root / "metadata" / "t" / "img" / "000000007.png"
     broken.write_bytes(broken.read_bytes()[:60])
-    for context in ("clip_retrieval", "memory_frames"):
-        assert f"{broken}: not a readable image" in shown(context, root, retriever=str(clip)).reason
+    assert f"{broken}: not a readable image" in shown("clip_retrieval", root, retriever=str(clip)).reason
+    with pytest.raises(UsageError, match=f"{broken}: not a readable image"):
+        recalled(root, 10, clip)
 
 
 def test_a_question_beyond_clips_limit_is_cut(noise, clip):
@@ -163,7 +175,7 @@ def test_a_checkpoint_of_another_kind_is_refused(noise, tmp_path):
 
 
 def test_so_many_frames_cannot_be():
-    for name in ("top_k", "note_window", "note_tokens"):
+    for name in ("top_k", "budget"):
         for value in (0, -1, 2.5, "ten"):
             with pytest.raises(UsageError, match=f"{name} is .*whole number|Expected `int`.*{name}"):
                 ContextSettings.read({name: value})

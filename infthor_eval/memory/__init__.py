@@ -1,0 +1,42 @@
+"""What may be remembered of a trajectory, and at what cost: the protocol of memories, and those built in."""
+
+from infthor_eval.memory.budgets import check_recalled, read_budget
+from infthor_eval.memory.protocol import (
+    Memory,
+    MemoryCapabilities,
+    Observation,
+    Query,
+    Recalled,
+    TrajectoryFacts,
+    Write,
+    tokens_of,
+)
+from infthor_eval.memory.registry import (
+    MEMORIES,
+    accepted_options,
+    memory_class,
+    memory_identity,
+    open_memory,
+    parse_options,
+    wrap_memory_errors,
+)
+
+__all__ = [
+    "MEMORIES",
+    "Memory",
+    "MemoryCapabilities",
+    "Observation",
+    "Query",
+    "Recalled",
+    "TrajectoryFacts",
+    "Write",
+    "accepted_options",
+    "check_recalled",
+    "memory_class",
+    "memory_identity",
+    "open_memory",
+    "parse_options",
+    "read_budget",
+    "tokens_of",
+    "wrap_memory_errors",
+]

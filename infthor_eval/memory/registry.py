@@ -1,0 +1,153 @@
+"""Memories by name: those built in, those of other packages (entry points), and classes in a user's own file."""
+
+import inspect
+import typing
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+
+from infthor_eval.errors import UsageError, UserCodeError, in_one_line, unknown_name, wrap_errors
+from infthor_eval.memory.protocol import Memory
+from infthor_eval.plugins import PluginTable
+from model_adapters.adapter_identity import package_identity
+from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
+
+__all__ = [
+    "MEMORIES",
+    "accepted_options",
+    "memory_class",
+    "memory_identity",
+    "open_memory",
+    "parse_options",
+    "wrap_memory_errors",
+]
+
+_FRAMES, _RETRIEVAL, _TEXTS = (f"infthor_eval.memory.{module}" for module in ("frames", "retrieval", "texts"))
+MEMORIES = PluginTable(
+    "memory",
+    "infthor_eval.memories",
+    {
+        "last": f"{_FRAMES}:Last",
+        "uniform": f"{_FRAMES}:Uniform",
+        "clip": f"{_RETRIEVAL}:Clip",
+        "clip-view": f"{_RETRIEVAL}:ClipView",
+        "notes": f"{_TEXTS}:Notes",
+        "text-log": f"{_TEXTS}:TextLog",
+        "oracle": f"{_FRAMES}:Oracle",
+        "random": f"{_FRAMES}:Random",
+    },
+    "docs/memories.md",
+)
+Options = tuple[tuple[str, Any], ...]  # sorted pairs
+
+
+@lru_cache(maxsize=8)
+def open_memory(name: str, options: Options = ()) -> Memory:
+    """Return a memory, the same object each time.
+
+    Args:
+        name: a name of the table, or FILE.py:CLASS.
+        options: options of its class; texts are converted to the types of its constructor.
+
+    Raises:
+        UsageError: there is no such memory or option, a value is not valid, or it lacks a member of the protocol.
+        ModelError: the file of a memory of one's own does not define it, or cannot be imported.
+    """
+    return _build(name, options)
+
+
+def accepted_options(name: str) -> Mapping[str, inspect.Parameter]:
+    """Return the options of a memory by name: the parameters of its class.
+
+    Raises:
+        UsageError: there is no such memory.
+        ModelError: its file does not define it, or cannot be imported.
+    """
+    return inspect.signature(memory_class(name)).parameters
+
+
+def memory_identity(name: str, options: Options = ()) -> dict[str, Any]:
+    """Return everything that can change what a memory recalls, as JSON values.
+
+    Raises:
+        UsageError: it cannot be opened.
+        ModelError: its source cannot be read.
+    """
+    memory = open_memory(name, options)
+    with wrap_memory_errors(name):
+        identity = dict(memory.identity())
+    own = name_in_file(name) if names_a_file(name) else name
+    about = {"name": own, "options": dict(options), "privileged": memory.capabilities.privileged}
+    return {"memory": {**about, **_code(name)}} | identity
+
+
+def parse_options(text: str | None) -> dict[str, str] | None:
+    """Return the options of a memory, written as `k=v,k=v`; None if none are given.
+
+    Raises:
+        UsageError: an item is not `k=v`.
+    """
+    if text is None:
+        return None
+    options = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        key, equals, value = item.partition("=")
+        if not equals or not key.strip():
+            raise UsageError(f"--memory-args: {item!r} is not of the form key=value")
+        options[key.strip()] = value.strip()
+    return options
+
+
+def wrap_memory_errors(name: str) -> AbstractContextManager[None]:
+    """Turn whatever a memory raises into an error of one line; ours pass unchanged."""
+    return wrap_errors(f"the memory {name} fails", "fix it", catch=Exception, raise_as=UserCodeError)
+
+
+def _build(name: str, options: Options) -> Memory:
+    kind = memory_class(name)
+    values = _converted(name, kind, dict(options))
+    try:
+        memory = kind(**values)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"the memory {name} cannot be made ({in_one_line(error)}); see docs/memories.md") from error
+    if not isinstance(memory, Memory):
+        members = [member for member in vars(Memory) if not member.startswith("_") and not hasattr(memory, member)]
+        raise UsageError(f"the memory {name} lacks {', '.join(members)}; see docs/memories.md")
+    return memory
+
+
+def memory_class(name: str) -> Any:
+    """Return the class of a memory.
+
+    Raises:
+        UsageError: there is none of this name.
+        ModelError: its file does not define it, or cannot be imported.
+    """
+    if names_a_file(name):
+        return load_from_file(name)
+    if name not in MEMORIES.names:
+        raise unknown_name("memory", name, MEMORIES.names)
+    return MEMORIES.load(name, Memory)
+
+
+def _code(name: str) -> dict[str, Any]:
+    if names_a_file(name):
+        return file_identity(name)
+    return {} if name in MEMORIES.built_in else package_identity(MEMORIES.entry_points()[name])
+
+
+def _converted(name: str, kind: Any, options: Mapping[str, Any]) -> dict[str, Any]:
+    known = inspect.signature(kind).parameters
+    hints = typing.get_type_hints(kind.__init__)
+    values = {}
+    for key, value in options.items():
+        if key not in known:
+            raise UsageError(f"the memory {name} has no option {key}; it has {', '.join(known) or 'none'}")
+        try:
+            values[key] = msgspec.convert(value, hints.get(key, Any), strict=False)
+        except msgspec.ValidationError as error:
+            raise UsageError(f"the memory {name}: {key} is {value!r:.60} ({in_one_line(error)})") from error
+    return values

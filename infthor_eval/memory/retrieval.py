@@ -1,0 +1,72 @@
+"""Memories that recall the frames nearest by CLIP.
+
+The retriever is imported where it is needed: that takes seconds, which other memories need not wait.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from infthor_eval.memory.frames import PUBLISHED_K, FrameMemory
+from infthor_eval.memory.protocol import Query
+
+if TYPE_CHECKING:
+    from model_adapters.hf.retrieval import Retriever
+
+__all__ = ["PUBLISHED_RETRIEVER", "Clip", "ClipView"]
+
+PUBLISHED_RETRIEVER = "openai/clip-vit-large-patch14"
+
+
+class _Nearest(FrameMemory):
+    """Base: frames by their similarity to something."""
+
+    def __init__(
+        self, k: int = PUBLISHED_K, retriever: str = PUBLISHED_RETRIEVER, retriever_revision: str | None = None
+    ) -> None:
+        """Set the number of frames where there is no budget, and the CLIP model: a hub id or a folder."""
+        super().__init__(k)
+        self._source = retriever, retriever_revision
+
+    def identity(self) -> Mapping[str, Any]:
+        """See `Memory`; another retriever finds other frames."""
+        return {"retriever": self.retriever.identity()}
+
+    @cached_property
+    def retriever(self) -> "Retriever":
+        """The CLIP model, loaded when it is first needed.
+
+        Raises:
+            UsageError: there is no such model.
+        """
+        from model_adapters.hf.retrieval import open_retriever
+
+        return open_retriever(*self._source)
+
+    def choose(self, query: Query, n_frames: int) -> Sequence[int]:
+        """See `FrameMemory`; of equally similar frames the earlier ones."""
+        from model_adapters.hf.vectors import nearest
+
+        if not n_frames:
+            return ()
+        return nearest(self.retriever.frames([item.frame for item in self.past]), self.vector(query), n_frames)
+
+    def vector(self, query: Query) -> Any:
+        """Return the vector that frames are compared with, (dimensions,)."""
+        raise NotImplementedError
+
+
+class Clip(_Nearest):
+    """The frames nearest to the question's text (the published retrieval, k = 10)."""
+
+    def vector(self, query: Query) -> Any:
+        """See `_Nearest`."""
+        return self.retriever.text(query.text)
+
+
+class ClipView(_Nearest):
+    """The frames nearest to the current view (the paper's image memory for long-horizon tasks, k = 20)."""
+
+    def vector(self, query: Query) -> Any:
+        """See `_Nearest`."""
+        return self.retriever.frames([query.present.frame])[0]

@@ -1,0 +1,139 @@
+"""Memories that recall texts: what an exact observer would write down, and the model's own notes."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar
+
+from infthor_eval.formats.step_log import ObjectLog
+from infthor_eval.memory.protocol import (
+    CHARACTERS_PER_TOKEN,
+    MemoryCapabilities,
+    Observation,
+    Query,
+    Recalled,
+    TrajectoryFacts,
+)
+
+__all__ = ["Notes", "TextLog", "note_request"]
+
+
+class _Texts:
+    """Base of memories of texts: they keep all steps."""
+
+    capabilities: ClassVar[MemoryCapabilities]
+
+    def __init__(self) -> None:
+        self.facts = TrajectoryFacts(name="")
+        self.past: list[Observation] = []
+
+    def identity(self) -> Mapping[str, Any]:
+        """See `Memory`."""
+        return {}
+
+    def begin(self, facts: TrajectoryFacts) -> None:
+        """See `Memory`."""
+        self.facts, self.past = facts, []
+
+    def observe(self, observation: Observation) -> None:
+        """See `Memory`."""
+        self.past.append(observation)
+
+
+class TextLog(_Texts):
+    """A log that an exact observer would write: each goal and action, and the objects seen, from the metadata.
+
+    A line says what is new: the types that come into view, what is open, in the hand, and in or on what is seen. Of a
+    log beyond the budget the last lines are recalled.
+    """
+
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(privileged=True)
+
+    def recall(self, query: Query, budget: int | None) -> Recalled:
+        """See `Memory`; one text."""
+        lines = list(_lines([*self.past, query.present]))
+        kept = _last_that_fit(lines, budget)
+        return ["".join(kept)] if kept else []
+
+
+class Notes(_Texts):
+    """The model's own notes: on every window of frames it writes a short text.
+
+    A note depends on the frames of its window alone. The paper reports a memory in text (long-horizon tasks), but not
+    how the text is written. Of notes beyond the budget the last are recalled.
+    """
+
+    capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(writes=True)
+
+    def __init__(self, window: int = 20, tokens: int = 64) -> None:
+        """Set the number of frames of a note and the limit of a note in tokens."""
+        super().__init__()
+        if window < 1 or tokens < 1:
+            raise ValueError("window and tokens are whole numbers from 1")
+        self._window, self._tokens = window, tokens
+
+    def recall(self, query: Query, budget: int | None) -> Recalled:
+        """See `Memory`; one text, a line for each window."""
+        steps = [*self.past, query.present]
+        lines = [self._line(steps[at : at + self._window]) for at in range(0, len(steps), self._window)]
+        kept = _last_that_fit(lines, budget)
+        return ["".join(kept)] if kept else []
+
+    def _line(self, window: Sequence[Observation]) -> str:
+        if self.facts.write is None:
+            raise ValueError("notes need a model that writes them")
+        steps = _steps(window[0].number, window[-1].number)
+        note = self.facts.write([*(item.frame for item in window), note_request(steps)], self._tokens)
+        return f"{steps}: {' '.join(note.split())}\n"
+
+
+def note_request(steps: str) -> str:
+    """Return the text that follows the frames of a window ("Steps 0-19") and asks for a note on them."""
+    return (
+        f"\n{steps} of an embodied agent's trajectory, one view per step in time order. You will be asked about them "
+        "later without seeing them. Note in a few short phrases which room it is, which objects are where, how many of "
+        "them and in which state, and what the agent does with them.\nNote: "
+    )
+
+
+def _steps(first: int, last: int) -> str:
+    return f"Step {last}" if last == first else f"Steps {first}-{last}"
+
+
+def _last_that_fit(lines: Sequence[str], budget: int | None) -> Sequence[str]:
+    """Return as many of the last lines as a budget in tokens holds."""
+    if budget is None:
+        return lines
+    room = budget * CHARACTERS_PER_TOKEN
+    for number, line in enumerate(reversed(lines)):
+        room -= len(line)
+        if room < 0:
+            return lines[len(lines) - number :]
+    return lines
+
+
+def _lines(steps: Sequence[Observation]) -> Iterator[str]:
+    """Yield a line for each step that tells anything new."""
+    goal, before = None, ObjectLog()
+    for step in steps:
+        said = [f"goal: {step.goal}"] if step.goal != goal and step.goal else []
+        said += [step.action] if step.action else []
+        log = step.log or ObjectLog()
+        said += _news(before, log)
+        if said:
+            yield f"Step {step.number}: {'; '.join(said)}.\n"
+        goal, before = step.goal, log
+
+
+def _news(before: ObjectLog, now: ObjectLog) -> list[str]:
+    news = []
+    seen = sorted(set(now.visible) - set(before.visible))
+    if seen:
+        news.append(f"sees {', '.join(seen)}")
+    for receptacle, objects in sorted(now.recep_objs.items()):
+        if objects and objects != before.recep_objs.get(receptacle):
+            news.append(f"{receptacle} has {', '.join(objects)}")
+    opened = sorted(set(now.is_open) - set(before.is_open))
+    if opened:
+        news.append(f"open: {', '.join(opened)}")
+    if now.inven_obj != before.inven_obj:
+        news.append(f"holds {', '.join(now.inven_obj) or 'nothing'}")
+    return news

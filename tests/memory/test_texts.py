@@ -1,0 +1,68 @@
+"""Memories that recall texts."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from infthor_eval.formats.step_log import ObjectLog
+from infthor_eval.memory import tokens_of
+from infthor_eval.memory.texts import Notes, TextLog
+
+LOGS = [
+    ObjectLog(visible=["Sink"]),
+    ObjectLog(visible=["Sink", "Mug"], recep_objs={"Sink": ["Mug"]}),
+    ObjectLog(visible=["Sink", "Mug"], recep_objs={"Sink": ["Mug"]}),
+    ObjectLog(visible=["Fridge"], inven_obj=["Mug"], is_open=["Fridge"]),
+    ObjectLog(visible=["Fridge"]),
+]
+
+
+def test_the_log_says_what_is_new_at_each_step(observed):
+    (text,) = observed(TextLog(), 4, logs=LOGS)()
+    assert text.splitlines() == [
+        "Step 0: goal: Wash a mug; sees Sink.",
+        "Step 1: Action1; sees Mug; Sink has Mug.",
+        "Step 2: Action2.",
+        "Step 3: goal: Cook an egg; Action3; sees Fridge; open: Fridge; holds Mug.",
+        "Step 4: Action4; holds nothing.",
+    ]
+
+
+@given(budget=st.integers(0, 80))
+def test_the_last_lines_that_fit_the_budget_are_recalled(observed, budget):
+    ask = observed(TextLog(), 4, logs=LOGS)
+    lines = ask()[0].splitlines(keepends=True)
+    recalled = ask(budget=budget)
+    assert tokens_of(recalled, 10) <= budget
+    fitting = [n for n in range(len(lines) + 1) if math.ceil(len("".join(lines[len(lines) - n :])) / 4) <= budget]
+    assert "".join(recalled) == "".join(lines[len(lines) - fitting[-1] :])
+
+
+def test_notes_are_written_on_every_window_with_the_current_view_in_the_last(observed):
+    asked = []
+
+    def write(parts, max_new_tokens):
+        asked.append(([part.path.stem for part in parts[:-1]], parts[-1], max_new_tokens))
+        return " a mug\non the  table"
+
+    (text,) = observed(Notes(window=2, tokens=7), 4, write=write)()
+    assert text == "".join(f"{at}: a mug on the table\n" for at in ("Steps 0-1", "Steps 2-3", "Step 4"))
+    assert [frames for frames, _, _ in asked] == [["0", "1"], ["2", "3"], ["4"]]
+    assert {limit for _, _, limit in asked} == {7}
+    assert asked[0][1].startswith("\nSteps 0-1 of an embodied agent's trajectory")
+
+
+def test_of_notes_beyond_the_budget_the_last_are_recalled(observed):
+    ask = observed(Notes(window=2), 4, write=lambda parts, limit: "x" * 10)
+    line = len("Steps 2-3: " + "x" * 10 + "\n") + len("Step 4: " + "x" * 10 + "\n")
+    (text,) = ask(budget=math.ceil(line / 4))
+    assert [row.partition(":")[0] for row in text.splitlines()] == ["Steps 2-3", "Step 4"]
+    assert ask(budget=0) == []
+
+
+@pytest.mark.parametrize("options", [{"window": 0}, {"tokens": 0}])
+def test_windows_and_notes_are_not_empty(options):
+    with pytest.raises(ValueError, match="whole numbers from 1"):
+        Notes(**options)
