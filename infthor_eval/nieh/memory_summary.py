@@ -1,5 +1,6 @@
 """What a run's memory recalled, at which cost."""
 
+import re
 from collections.abc import Mapping, Sequence
 from statistics import fmean
 from typing import Any
@@ -10,7 +11,9 @@ from infthor_eval.memory import read_budget
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["MemorySummary", "MemoryTimes", "summarise_memory", "time_memory"]
+__all__ = ["MemorySummary", "MemoryTimes", "subject_of", "summarise_memory", "time_memory"]
+
+_OF_MEMORY = re.compile(r"(?:, )?\b(?:memory|memory_args|budget)=[^,)]*")
 
 Record = UnitRecord[NiehAnswer]
 
@@ -38,6 +41,11 @@ class MemoryTimes(msgspec.Struct, frozen=True):
 
     build_s: float
     recall_s: float
+
+
+def subject_of(label: str) -> str:
+    """Return the label of a run without its memory: "nano (budget=1k, seed=2)" is "nano (seed=2)"."""
+    return _OF_MEMORY.sub("", label).replace("(, ", "(").replace(" ()", "")
 
 
 def summarise_memory(

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from infthor_eval.nieh.gains import name_of
+from infthor_eval.nieh.memory_summary import subject_of
 from infthor_eval.nieh.summary import SHOWN_CLUES, NiehSummary, TaskSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
@@ -44,7 +45,7 @@ def _rows(runs: Sequence[RunSummary]) -> Iterator[Row]:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
             if task.memory is not None:
-                yield Row((name_of(run), name, *_cells(run.summary, name, task)))
+                yield Row((subject_of(name_of(run)), name, *_cells(run.summary, name, task)))
 
 
 def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ import inspect
 import re
 import types
 import typing
-from dataclasses import fields
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
 
 PAGE = Path(__file__).parents[2] / "docs" / "own-tasks.md"
@@ -16,6 +16,7 @@ _KINDS = {
     str: "text",
     bool: "true or false",
     tuple[float, ...]: "list of numbers",
+    dict[str, typing.Any]: "mapping",
 }
 
 
@@ -29,8 +30,12 @@ def _table(module: str, name: str) -> str:
     hints, said = typing.get_type_hints(settings), _attributes(settings)
     lines = ["| setting | is a | default | |", "|---|---|---|---|"]
     for item in fields(settings):
-        lines.append(f"| `{item.name}` | {_kind(hints[item.name])} | {_shown(item.default)} | {said[item.name]} |")
+        lines.append(f"| `{item.name}` | {_kind(hints[item.name])} | {_shown(_default(item))} | {said[item.name]} |")
     return "\n".join(lines) + "\n"
+
+
+def _default(item: Field[typing.Any]) -> typing.Any:
+    return item.default if item.default_factory is MISSING else item.default_factory()
 
 
 def _kind(hint: typing.Any) -> str:

@@ -8,7 +8,7 @@ from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.nieh.summary import NiehSummary, summarise
 from infthor_eval.runs import RunHeader, RunSummary, Tokens, UnitRecord
 
-_PAYLOAD = ("question", "question_type", "file", "guess", "shown_clues")
+_PAYLOAD = ("question", "question_type", "file", "guess", "shown_clues", "recall")
 
 
 def record(

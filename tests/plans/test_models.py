@@ -428,3 +428,17 @@ def test_a_model_that_loses_its_conversation_is_an_error(acting, monkeypatch):
     monkeypatch.setattr("infthor_eval.plans.history.FullHistory.recall", full)
     outcome, _ = acting(lambda *_: "")
     assert {record.failure for record in outcome.records} == {"too long"}
+
+
+def test_a_memory_stands_in_for_the_history(acting, data):
+    _, full = acting(as_expert(data))
+    _, model = acting(as_expert(data), history="memory", memory="last", memory_args="k=2")
+    histories, beginnings = (
+        [parts for parts, _ in asked if not done_so_far(parts)] for asked in (full.asked, model.asked)
+    )
+    for history, given in zip(histories, beginnings, strict=True):
+        seen = [frame.digest for frame in frames(history)]
+        shown = [frame.digest for frame in frames(given)]
+        assert shown[-1] == seen[-1]
+        assert len(shown) <= 3
+        assert set(shown) <= set(seen)

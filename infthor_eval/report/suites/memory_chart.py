@@ -40,9 +40,8 @@ def _curves(runs: Sequence[ReportRun], task: str) -> dict[str, list[_Point]]:
         if of_task is None or of_task.memory is None or of_task.memory.n_tokens is None:
             continue
         memory = f"{of_task.memory.name}{'*' if of_task.memory.privileged else ''}"
-        subject = run.summary.header.name.partition(" (")[0]
         point = _Point(of_task.memory.n_tokens, of_task.by_clues["total"].scores[main_metric(of_task)])
-        found.setdefault((subject, memory), []).append(point)
+        found.setdefault((run.model, memory), []).append(point)
     several = len({subject for subject, _ in found}) > 1
     return {
         f"{subject}, {memory}" if several else memory: sorted(points, key=lambda point: point.n_tokens)

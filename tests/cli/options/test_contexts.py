@@ -155,14 +155,15 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     journal = only(tmp_path / "killed", "worker-0.jsonl")
-    before = journal.read_bytes().count(b'\n{"type":"artifact"')
+    before = journal.read_bytes().count(b'"type":"nieh_note"')
     assert 0 < before < 6  # three windows of twenty frames in each of two trajectories
 
     for name in ("killed", "whole"):
         process = start(tmp_path / name)
         _, said = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, said
-    assert journal.read_bytes().count(b'\n{"type":"artifact"') == 6
+    assert journal.read_bytes().count(b'"type":"nieh_note"') == 6
+    assert journal.read_bytes().count(b'\n{"type":"artifact","') == 6 + 6  # and what was recalled for each question
     results = [only(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")]
     assert results[0] == results[1]
     records = [read_run(only(tmp_path / name, "journal").parent, RECORDS)[1] for name in ("killed", "whole")]
