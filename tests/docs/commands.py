@@ -13,7 +13,7 @@ CANNOT_RUN = {
     r" fetch nieh": "downloads the published set",
     r"--model openai ": "needs a server, and a key",
     r"check-parity ": "needs a server",
-    r"MyModel|my_task$": "names files of the reader's",
+    r"MyModel|my_task$|=PATH\b": "names files of the reader's",
     r"thumbnails": "needs the example package installed; tests/examples does that",
     r"/RUN\b|-ID\b|RUN\.\.\.": "names a run of the reader's",
     r"DATA\b|FOLDER|FloorPlan": FLOOR_PLANS,

@@ -272,7 +272,7 @@ def test_the_state_in_words_takes_the_place_of_the_history(acting, tmp_path):
     beginnings = [parts for parts, _ in model.asked if not done_so_far(parts)]
     assert [len(frames(parts)) for parts in beginnings] == [1] * 6
     assert text(beginnings[0]).startswith(f"{FIRST} State: ")
-    for parts, plan in zip(beginnings, ("go to the cabinet", "pick up the fork"), strict=False):
+    for parts, plan in zip(beginnings, ("go to the cabinet", "pick up the Fork"), strict=False):
         assert text(parts).endswith(f"; Last agent's view: <image><|plan|>Plan: {plan}<|plan|><|act|>")
     assert "fork" in text(beginnings[3]).partition("State: ")[2].lower()  # it is in the hand
     assert text(beginnings[4]).startswith("<|goal|>Your main goal: put two slices of tomato")
@@ -404,7 +404,7 @@ def test_histories_of_a_tiny_model(prepared, tmp_path, watched, make_clip):
         outcome = execute(prepared(QWEN, data=data, greedy=True, history=history, **more))
         assert not any(record.failure for record in outcome.records)
         firsts = [reply.n_context_tokens for parts, reply in watched if not done_so_far(parts)]
-        assert len(firsts) == 5
+        assert len(firsts) == len(outcome.records) == 4  # one of five belongs to no task
         if history == "full":
             whole = firsts
         if history == "last:700":
