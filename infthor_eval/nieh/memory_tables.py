@@ -35,17 +35,20 @@ _NOTES = (
 
 def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return the table of the tasks that have a memory, if there are any."""
-    rows = tuple(_rows(runs))
+    rows = tuple(row for _, row in sorted(_rows(runs), key=lambda item: item[0]))
     columns = (*(Column(name, False) for name in _NAMES), *map(Column, _NUMBERS))
     return [Table("Memories", columns, rows, _NOTES)] if rows else []
 
 
-def _rows(runs: Sequence[RunSummary]) -> Iterator[Row]:
+def _rows(runs: Sequence[RunSummary]) -> Iterator[tuple[tuple[str | int, ...], Row]]:
+    """Yield rows with their place: by subject and task, the budgets of a memory below each other."""
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
             if task.memory is not None:
-                yield Row((subject_of(name_of(run)), name, *_cells(run.summary, name, task)))
+                subject = subject_of(name_of(run))
+                place = subject, name, task.memory.name, task.memory.budget or 0
+                yield place, Row((subject, name, *_cells(run.summary, name, task)))
 
 
 def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...]:
