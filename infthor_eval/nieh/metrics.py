@@ -18,7 +18,7 @@ from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import Doc, doc_of
 from infthor_eval.nieh.samples import TaskSamples
-from infthor_eval.nieh.scoring import SCORERS, scores
+from infthor_eval.nieh.scoring import SCORERS, STRICT_RULES, scores
 from infthor_eval.runs.catalog import TaskFile
 
 __all__ = ["PUBLISHED", "MetricError", "Metrics", "finite", "metrics_of", "wrap_metric_errors"]
@@ -37,7 +37,8 @@ class Metrics:
 
     Attributes:
         process: the task's own function; None for both scorers.
-        code: name and digest of that function's source, as JSON values.
+        code: what tells these metrics from others of their names: the version of the strict scorer's rules, or name and
+            digest of the function's source.
     """
 
     names: tuple[str, ...]
@@ -85,7 +86,7 @@ def finite(name: str, value: Any) -> float:
     return number
 
 
-PUBLISHED = Metrics(SCORERS)
+PUBLISHED = Metrics(SCORERS, code={"strict": STRICT_RULES})
 
 
 def metrics_of(task: TaskFile) -> Metrics:

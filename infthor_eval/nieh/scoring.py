@@ -3,11 +3,14 @@
 `reference` equals the published scorer on every pair, faults included: its numbers are what the paper reports.
 `strict` keeps its idea (normalise, compare, allow near misses and synonyms) and fixes the faults:
 
-* each gold answer is matched at most once, so "mug, mug, mug" against [mug, plate] scores 0.5, not 1.5;
+* of several answers the score is F1, so that naming everything does not score: each gold answer and each answer of the
+  response is matched at most once, and seven answers of which two are the two gold ones score 0.44, not 1. "mug, mug,
+  mug" against [mug, plate] scores 0.4, not 1.5;
 * "and" separates answers only as a whole word, so "hand towel" stays one answer;
 * yes and no must be the first word said ("not sure", "none", "notebook" are not "no"; "yesterday" is not "yes"),
   and an answer that says both counts as neither;
-* numbers must be equal: "100" is not nearly "10".
+* numbers must be equal: "100" is not nearly "10";
+* a slice is its food: "lettuce slice", "sliced lettuce", "lettucesliced" and "lettuce" are one thing, in keys too.
 """
 
 import re
@@ -24,17 +27,30 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Answer
 from infthor_eval.nieh.prompts import last_line
 
-__all__ = ["SCORERS", "Scorer", "pieces_of", "plain_form", "says_number", "says_yes_or_no", "score", "scores"]
+__all__ = [
+    "SCORERS",
+    "STRICT_RULES",
+    "Scorer",
+    "pieces_of",
+    "plain_form",
+    "says_number",
+    "says_yes_or_no",
+    "score",
+    "scores",
+]
 
+# Part of a run's identity: scores of other rules are another run's. 2: F1 of several answers; slices.
+STRICT_RULES = "2"
 Scorer = Literal["reference", "strict"]
 SCORERS: tuple[Scorer, ...] = ("reference", "strict")
 
 _NEAR = 80  # similarity in percent from which two normalised strings count as equal
 _YES_NO = ("yes", "no")
+_SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")
 
 
 def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference") -> float:
-    """Return the share of gold answers that a response gives; 1.0 or 0.0 for a single gold answer.
+    """Return how many of the gold answers a response gives, as a share or F1; 1.0 or 0.0 for a single gold answer.
 
     Only the reference scorer can exceed 1.0, when one gold answer is repeated.
 
@@ -85,7 +101,8 @@ def _reference(response: str, answers: Sequence[Answer]) -> float:
 def _strict(response: str, answers: Sequence[Answer]) -> float:
     if len(answers) == 1:
         return float(_matches_strict(response, answers[0]))
-    return _largest_matching(answers, pieces_of(response), _matches_strict) / len(answers)
+    pieces = pieces_of(response)
+    return 2 * _largest_matching(answers, pieces, _matches_strict) / (len(answers) + len(pieces))
 
 
 def _largest_matching(answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]) -> int:
@@ -124,8 +141,13 @@ def _matches_strict(response: str, gold: Answer) -> bool:
     if _is_number(wanted):
         said = _normalise(response)
         return _is_number(said) and float(said) == float(wanted)
-    said = plain_form(response.lower().strip())
+    said, wanted = _without_slice(plain_form(response.lower().strip())), _without_slice(wanted)
     return _near(said, wanted) or _synonymous(said, wanted)
+
+
+def _without_slice(text: str) -> str:
+    """Return the food of a slice; another text, and one that is nothing but "slice", as it is."""
+    return " ".join(_SLICE.sub(" ", text).split()) or text if _SLICE.search(text) else text
 
 
 def _is_number(text: str) -> bool:

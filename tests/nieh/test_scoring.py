@@ -84,7 +84,7 @@ def test_reference_keeps_each_rule_of_the_published_scorer(rule):
 @pytest.mark.parametrize(
     ("response", "gold", "reference", "strict"),
     [
-        ("mug, mug, mug", ["mug", "plate"], 1.5, 0.5),
+        ("mug, mug, mug", ["mug", "plate"], 1.5, 0.4),
         ("candle, hand towel", ["candle", "hand towel"], 0.5, 1.0),
         ("not sure", ["no"], 1.0, 0.0),
         ("none", ["no"], 1.0, 0.0),
@@ -101,6 +101,16 @@ def test_reference_keeps_each_rule_of_the_published_scorer(rule):
         ("", ["mug"], 0.0, 0.0),
         ("", ["mug", "cup"], 0.0, 0.0),
         ("mug, mug", ["mug", "mug"], 2.0, 1.0),
+        ("mug", ["mug", "plate"], 0.5, 2 / 3),
+        ("mug, plate, cup, pan, pot, fork, bowl", ["mug", "plate"], 1.0, 4 / 9),
+        ("mug, plate", ["mug"], 0.0, 0.0),
+        ("lettuce slice", ["lettucesliced"], 1.0, 1.0),
+        ("sliced lettuce", ["LettuceSliced"], 0.0, 1.0),
+        ("a slice of lettuce", ["lettuce slice"], 0.0, 1.0),
+        ("lettuce", ["lettuce slice"], 0.0, 1.0),
+        ("bread slices, knife", ["bread", "knife"], 0.5, 1.0),
+        ("slice", ["bread slice"], 0.0, 0.0),
+        ("sliced tomato", ["potato"], 0.0, 0.0),
     ],
 )
 def test_known_faults_stay_in_reference_and_are_mended_in_strict(response, gold, reference, strict):
@@ -116,6 +126,18 @@ def test_strict_gives_the_gold_answers_full_marks(gold):
 @given(st.text(max_size=60), answers)
 def test_strict_stays_within_zero_and_one(response, gold):
     assert 0.0 <= score(response, gold, "strict") <= 1.0
+
+
+@given(answers.filter(lambda gold: len(gold) > 1), names)
+def test_one_answer_more_than_there_are_costs_something(gold, more):
+    assert score(", ".join([*gold, more]), gold, "strict") < 1.0
+
+
+@given(st.lists(names, max_size=5), answers, names)
+def test_a_wrong_answer_more_never_gains(said, gold, wrong):
+    if score(wrong, [gold[0]], "strict") or any(score(wrong, [item], "strict") for item in gold):
+        return
+    assert score(", ".join([*said, wrong]), gold, "strict") <= score(", ".join(said), gold, "strict")
 
 
 @given(answers, st.randoms())

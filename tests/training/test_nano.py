@@ -121,7 +121,7 @@ def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answe
     from infthor_eval.household.wording import noun
 
     words = {noun(name): at for at, name in enumerate(dataset.types)}
-    for sequence in sampler.questions(200, synthetic_share=1.0):
+    for sequence in sampler.questions(200, synthetic_share=1.0, recalled_share=0.0, n_others=0):
         (frame,) = sequence.frames
         text = loaded.tokenizer.decode([piece for piece in sequence.pieces if isinstance(piece, int)])
         answer = text.rpartition("?")[2].removesuffix("<|im_end|>")
@@ -131,6 +131,26 @@ def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answe
         assert bool(dataset.shown[here, words[about]]) == (answer == "yes")
         assert answer == "yes" or not dataset.present[here, words[about]]
     assert min(counts.values()) > 70
+
+
+def test_recalled_questions_have_their_clues_among_other_frames_and_end_with_the_last_view(small_set, blank):
+    loaded, dataset = blank
+    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0)
+    data = NiehSet(small_set)
+    clues = {question.text: {frame.digest for frame in data.clue_frames(question)} for question in data.questions}
+    absences = {question.text for question in data.questions if question.absence}
+    lasts = {data.frames(question.traj_id)[-1].digest for question in data.questions}
+    n_others = set()
+    for sequence in sampler.questions(60, synthetic_share=0.0, recalled_share=1.0, n_others=4):
+        digests = [frame.digest for frame in sequence.frames]
+        text = loaded.tokenizer.decode([piece for piece in sequence.pieces if isinstance(piece, int)])
+        asked = max((known for known in clues if known in text), key=len)
+        assert digests[-1] in lasts
+        if asked not in absences:
+            assert clues[asked] <= set(digests)
+            n_others.add(len(set(digests) - clues[asked] - lasts))
+    assert n_others <= set(range(5))
+    assert len(n_others) > 2
 
 
 def test_synthetic_plans_replace_objects_in_plan_and_actions():

@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from infthor_eval.errors import DataError
@@ -10,7 +11,9 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.question import Question
 from infthor_eval.household.sequence_text import MARKS
 from infthor_eval.household.wording import noun, with_article
-from infthor_eval.nieh.contexts import CONTEXTS
+from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, Sample
+from infthor_eval.nieh.contexts.video import as_images
+from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.plans.segments import PlanSegment
@@ -85,6 +88,7 @@ class SequenceSampler:
         self._limit, self._words = window_tokens, words
         self._rng = random.Random(seed)
         self._questions: list[TrainingSequence] = []
+        self._samples: list[tuple[NiehSet, Sample]] = []  # of the questions on their clue frames
         self._windows: list[TrainingSequence] = []
         self._single_plans: list[TrainingSequence] = []
         self.skipped: list[SkippedItem] = []
@@ -92,6 +96,7 @@ class SequenceSampler:
         for folder in folders:
             samples = find_samples({"data": str(folder), "context": "clues"})
             self._questions += self._without_skipped(question_sequences(encoder, samples, window_tokens))
+            self._samples += [(samples.data, sample) for sample in samples.samples]
             for segments in self._read_histories(NiehSet(folder)):
                 recorded += [(segment.plan, [action for action, _ in segment.steps]) for segment in segments]
         self._synthetic = SyntheticPlans(recorded)
@@ -123,12 +128,34 @@ class SequenceSampler:
             else:
                 self.skipped.append(item)
 
-    def questions(self, n: int, synthetic_share: float) -> list[TrainingSequence]:
-        """Return random questions with their answers; each is synthetic with the probability `synthetic_share`."""
-        return [
-            self._presence_question() if self._rng.random() < synthetic_share else self._rng.choice(self._questions)
-            for _ in range(n)
-        ]
+    def questions(self, n: int, synthetic_share: float, recalled_share: float, n_others: int) -> list[TrainingSequence]:
+        """Return random questions with their answers.
+
+        Args:
+            n: number of questions.
+            synthetic_share: probability of a synthetic one.
+            recalled_share: probability of another one to be asked as behind a memory instead of on its clue frames.
+            n_others: most frames that do not matter among those that a memory recalls.
+        """
+        return [self._question(synthetic_share, recalled_share, n_others) for _ in range(n)]
+
+    def _question(self, synthetic_share: float, recalled_share: float, n_others: int) -> TrainingSequence:
+        if self._rng.random() < synthetic_share:
+            return self._presence_question()
+        if self._rng.random() < recalled_share:
+            return self._recalled_question(n_others)
+        return self._rng.choice(self._questions)
+
+    def _recalled_question(self, n_others: int) -> TrainingSequence:
+        """Return a question on its clue frames among others, and the last view, as the evaluation of memories asks."""
+        data, sample = self._rng.choice(self._samples)
+        last = len(data.frames(sample.question.traj_id)) - 1
+        clues = set() if sample.question.absence else set(sample.frames)
+        others = self._rng.sample(range(last), min(self._rng.randint(0, n_others), last))
+        recalled = tuple(sorted((clues | set(others)) - {last}))
+        shown = replace(sample, frames=(*recalled, last), recalled=recalled)
+        context, text = CONTEXTS[MEMORY].request(data, shown)
+        return self._encoder.answer("recalled", [*as_images(context), text], doc_target(sample.question))
 
     def histories(self, n_windows: int, n_plans: int, single_plan_share: float) -> list[TrainingSequence]:
         """Return random histories with their actions: either windows or single plans.

@@ -13,6 +13,7 @@ _COUNTS = (
     "frames_per_step",
     "text_plans_per_step",
     "questions_per_step",
+    "recalled_frames",
     "windows_per_step",
     "plans_per_step",
     "joint_text_plans_per_step",
@@ -58,6 +59,9 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         text_plans_per_step: synthetic plans in each step of the second stage.
         questions_per_step: questions in each step of the third stage.
         synthetic_questions: share of these that are synthetic questions for the presence of an object in any frame.
+        recalled_questions: share of the others that are asked as behind a memory: the clue frames among frames that do
+            not matter, and the last view.
+        recalled_frames: most frames among those that do not matter.
         windows_per_step: windows of histories in a step of the third stage.
         window_tokens: most tokens of a window.
         single_plan_share: share of the steps of the third stage with single plans of histories instead of windows.
@@ -84,6 +88,8 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     text_plans_per_step: int = 96
     questions_per_step: int = 40
     synthetic_questions: float = 0.4
+    recalled_questions: float = 0.5
+    recalled_frames: int = 12
     windows_per_step: int = 1
     window_tokens: int = 2048
     single_plan_share: float = 0.5
@@ -108,6 +114,6 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
                 raise ValueError(f"{name} is {getattr(self, name)}; use 1 or more")
         if self.hidden % 32:
             raise ValueError(f"hidden is {self.hidden}; use a multiple of 32")
-        for name in ("synthetic_questions", "single_plan_share"):
+        for name in ("synthetic_questions", "recalled_questions", "single_plan_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; use a number between 0 and 1")

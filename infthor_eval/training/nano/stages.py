@@ -147,7 +147,11 @@ class _StageTrainer:
         Answers and actions have the same weight, though most tokens are actions.
         """
         recipe = self._recipe
-        answers = self._token_loss(self._sampler.questions(recipe.questions_per_step, recipe.synthetic_questions))
+        answers = self._token_loss(
+            self._sampler.questions(
+                recipe.questions_per_step, recipe.synthetic_questions, recipe.recalled_questions, recipe.recalled_frames
+            )
+        )
         indices, features = self._network.last_frames
         histories = self._sampler.histories(recipe.windows_per_step, recipe.plans_per_step, recipe.single_plan_share)
         actions = self._token_loss(histories)
