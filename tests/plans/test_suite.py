@@ -292,8 +292,12 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
     task = summary(outcome, "infthor_final")
     assert (task.n_plans, task.n_trajectories, task.success["total"].mean) == (2, 1, 1)
     (table, *_) = outcome.run.suite.tables([outcome.summary])
+    assert not any(row.is_published for row in table.rows)
+    assert any(note.startswith("Published rows stand beside runs with --protocol published") for note in table.notes)
+    theirs = execute(prepared(tasks=("infthor_final",), data=data, protocol="published", rewards="published"))
+    (table, *_) = theirs.run.suite.tables([theirs.summary])
     (published,) = [row for row in table.rows if row.is_published]
-    assert published.cells == ("a paper's model", "published, Table 5", "10.0", "20.0", "30.0", "25.0")
+    assert published.cells == ("a paper's model", "published, Table 5", "10.0", "20.0", "30.0*", "25.0")
     plain = execute(prepared(data=data))
     assert len(plain.records) == 8
     assert not any(row.is_published for row in plain.run.suite.tables([plain.summary])[0].rows)

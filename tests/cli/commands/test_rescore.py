@@ -27,7 +27,7 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run):
     assert "7 replies scored; 1 without a reply stay failed; 2 were never asked" in said
     assert "nieh_gt, strict: 1 of 7 scores differ from those in the journal" in said
     assert "  q0: 0, now 1: 'Sofa'" in said
-    assert row(said, "nieh_gt", "strict", "our", "strict", "scorer") == ["7", "38.10", "52.38", "1"]
+    assert row(said, "nieh_gt", "strict", "our", "strict", "scorer") == ["7", "40.00", "54.29", "1"]
     header, records = read_run(new, RECORDS)
     assert (header.name, new.parent.name, new.name) == ("m-rescored",) * 2 + (f"nieh_gt-{fingerprint(header.config)}",)
     assert header.config["rescored"] == {

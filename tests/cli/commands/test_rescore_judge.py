@@ -91,7 +91,7 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
     assert row(said, "are", "wrong", "by", "the", "rules", "(sample)") == ["1", "0", "1", "0", "0"]
     assert "Judge and rules agree on 100.00 % of the sample." in said
     by = "strict, and Judge where the rules are unsure"
-    assert row(said, "nieh_gt", "judged", *by.split()) == ["7", "-", "66.67", "-"]
+    assert row(said, "nieh_gt", "judged", *by.split()) == ["7", "-", "68.57", "-"]
     assert f"judged: {by}." in run("show", new)[1]
     assert json.loads((new / "results.json").read_text())["usage"]["requests"] == 5
     judge = read_run(new, RECORDS)[0].config["rescored"]["judge"]

@@ -59,7 +59,7 @@ def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path
     page = make_page(*sorted((tmp_path / "oracle").iterdir()))
     (questions,) = (section for section in page.sections if section.key == "nieh")
     (chart,) = (chart for chart in questions.charts if chart.title == "Gain over blank frames")
-    assert chart.description == "oracle, nieh_mini_gt +0.0 points"
+    assert chart.description == "oracle, nieh_mini_gt +0.0"
     assert "95 % interval" in chart.svg
 
 
