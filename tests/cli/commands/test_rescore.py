@@ -37,7 +37,7 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run):
     }
     assert header.config["model"] == {"name": "m"}
     assert {name: scores_in(new, "strict")[name] for name in FOUR} == FOUR
-    assert scores_in(new, "strict")["q7"] == pytest.approx(2 / 3)
+    assert scores_in(new, "strict")["q7"] == pytest.approx(0.8)
     assert {one.id: one.failure for one in records if one.failure} == {"q6": "m fails"}
     results = json.loads((new / "results.json").read_text())
     assert (results["n_missing"], results["usage"]["requests"]) == (2, 0)
