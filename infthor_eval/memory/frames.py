@@ -1,6 +1,7 @@
 """Memories that recall frames, by their place in the trajectory alone."""
 
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -17,7 +18,7 @@ __all__ = ["FrameMemory", "Last", "Oracle", "Random", "Uniform"]
 PUBLISHED_K = 10  # frames that the published retrieval shows
 
 
-class FrameMemory:
+class FrameMemory(ABC):
     """Base of memories that keep all frames and choose some; a class says which."""
 
     capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities()
@@ -47,9 +48,9 @@ class FrameMemory:
         n_frames = min(self._room(budget), len(self.past))
         return [self.past[place] for place in sorted(self.choose(query, n_frames))]
 
+    @abstractmethod
     def choose(self, query: Query, n_frames: int) -> Sequence[int]:
         """Return the places of at most so many frames in `past`, which has as many."""
-        raise NotImplementedError
 
     def _room(self, budget: int | None) -> int:
         if budget is None or self.facts.tokens_per_frame is None:

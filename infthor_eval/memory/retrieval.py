@@ -3,6 +3,7 @@
 The retriever is imported where it is needed: that takes seconds, which other memories need not wait.
 """
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -51,9 +52,9 @@ class _Nearest(FrameMemory):
             return ()
         return nearest(self.retriever.frames([item.frame for item in self.past]), self.vector(query), n_frames)
 
+    @abstractmethod
     def vector(self, query: Query) -> Any:
         """Return the vector that frames are compared with, (dimensions,)."""
-        raise NotImplementedError
 
 
 class Clip(_Nearest):

@@ -14,7 +14,7 @@ from infthor_eval.household.navigation import Grid
 from infthor_eval.household.scout import HORIZON_STEP, grid_pose_of, reachable_grid
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.expert import Expert, ExpertAction
-from infthor_eval.plans.history import Past
+from infthor_eval.plans.past import Past
 from infthor_eval.plans.plan import Plan, PlanKind, plans_of, tasks_of
 from infthor_eval.plans.published_script import PublishedReward, PublishedScript
 from infthor_eval.plans.reward_rules import RewardRules, reward_rules

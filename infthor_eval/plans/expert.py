@@ -12,7 +12,7 @@ from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.sequence_text import action_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.household.treatments import Treatments
-from infthor_eval.plans.history import Past
+from infthor_eval.plans.past import Past
 from infthor_eval.plans.plan import Plan, TrajectoryTask
 from infthor_eval.plans.segments import PlanSegment
 from infthor_eval.thor.frames import FrameKeeper

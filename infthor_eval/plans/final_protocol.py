@@ -18,7 +18,9 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.household.sequence_text import ACT, action_part, goal_part
-from infthor_eval.plans.history import CountTokens, History, Past, RecalledHistory, StateInWords
+from infthor_eval.plans.history import StateInWords
+from infthor_eval.plans.past import CountTokens, History, Past
+from infthor_eval.plans.recalled_history import RecalledHistory
 from infthor_eval.plans.segments import Part
 from model_adapters import Decoding
 

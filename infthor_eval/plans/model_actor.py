@@ -12,7 +12,7 @@ from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.actors import Act, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.plans.final_protocol import FinalForm, present_parts, with_recorded_state
-from infthor_eval.plans.history import History
+from infthor_eval.plans.past import History
 from infthor_eval.plans.segments import Part
 from infthor_eval.thor.actions import applicable_actions
 from model_adapters import Decoding, Model, wrap_request_errors

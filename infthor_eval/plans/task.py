@@ -12,10 +12,11 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.environment import MAX_STEPS
 from infthor_eval.plans.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
 from infthor_eval.plans.final_protocol import FinalForm, final_form
-from infthor_eval.plans.history import MemoryChoice, RecalledHistory, history_named
+from infthor_eval.plans.history import history_named
 from infthor_eval.plans.model_actor import AgentConfig
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
+from infthor_eval.plans.recalled_history import MemoryChoice, RecalledHistory
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest

@@ -10,9 +10,10 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.plans.habits import expert_texts
-from infthor_eval.plans.history import LastTokens, MemoryChoice, history_named
+from infthor_eval.plans.history import LastTokens, history_named
 from infthor_eval.plans.model_actor import ModelActor
 from infthor_eval.plans.plan import plans_of, tasks_of
+from infthor_eval.plans.recalled_history import MemoryChoice
 from infthor_eval.runs import execute
 from model_adapters.backend import BackendConversation
 

@@ -18,7 +18,8 @@ from infthor_eval.formats.trajectory import ApiAction, HighAction, LowAction, Ta
 from infthor_eval.household.sequence_text import ACT, action_text, plan_text
 from infthor_eval.plans.environment import Ended
 from infthor_eval.plans.habits import expert_texts
-from infthor_eval.plans.history import Past, PublishedHistory
+from infthor_eval.plans.history import PublishedHistory
+from infthor_eval.plans.past import Past
 from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.plans.published_goals import Treated
 from infthor_eval.plans.published_log import log_rows

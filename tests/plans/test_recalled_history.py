@@ -6,7 +6,9 @@ import pytest
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.plans.history import FullHistory, MemoryChoice, Past, RecalledHistory, history_named
+from infthor_eval.plans.history import FullHistory, history_named
+from infthor_eval.plans.past import Past
+from infthor_eval.plans.recalled_history import MemoryChoice, RecalledHistory
 from infthor_eval.plans.segments import PlanSegment
 
 OWN = """
