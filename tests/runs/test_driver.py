@@ -195,7 +195,10 @@ def test_two_workers_have_the_results_of_one_process(tmp_path):
     alone, _ = run(request(tmp_path / "alone"))
     shared = execute(prepare(request(tmp_path / "shared", worker_settings=WorkerSettings(2)), ToySuite()))
     assert (shared.folder / "results.json").read_bytes() == (alone.folder / "results.json").read_bytes()
-    assert len(list((shared.folder / "journal").glob("worker-*.jsonl"))) == 2
+    shards = {path.stem: path.read_bytes() for path in (shared.folder / "journal").glob("worker-*.jsonl")}
+    # One worker may be so quick that there is nothing left for the other; the driver (0) does no unit itself.
+    assert {"worker-0"} < shards.keys() <= {"worker-0", "worker-1", "worker-2"}
+    assert b'"type":"unit"' not in shards["worker-0"]
 
 
 def test_a_shard_that_is_deleted_after_the_last_unit_gives_no_results(tmp_path, monkeypatch):
