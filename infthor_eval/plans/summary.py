@@ -37,6 +37,8 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         n_tried: those of them in which the subject acted.
         success: share of completed plans, by column of the published table.
         by_kind: share of completed plans, by kind.
+        path_weighted: share of completed plans, each weighted by the expert's number of actions over the agent's where
+            that is larger (ALFRED's path-weighted success).
         reward_share: reward of a trajectory divided by the highest possible reward of its attempted plans.
         reward: reward of a trajectory.
         max_reward: highest possible reward of a trajectory's attempted plans.
@@ -50,6 +52,7 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     n_tried: int | None
     success: dict[str, Rate]
     by_kind: dict[str, Rate]
+    path_weighted: Rate | None
     reward_share: Rate | None
     reward: Rate | None
     max_reward: Rate | None
@@ -77,6 +80,7 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
         n_tried=sum(record.payload.attempted for record in counted) if has_steps else None,
         success={name: rate for name, kinds in _COLUMNS.items() if (rate := _success(counted, kinds))},
         by_kind={str(kind): rate for kind in PlanKind if (rate := _success(counted, frozenset({kind})))},
+        path_weighted=clustered_rate([_path_weight(item.payload) for item in acted], [item.cluster for item in acted]),
         reward_share=_rate_of_trajectories(acted, lambda reward, most: reward / most if most else 0.0),
         reward=_rate_of_trajectories(acted, lambda reward, _: reward),
         max_reward=_rate_of_trajectories(acted, lambda _, most: most),
@@ -106,6 +110,11 @@ def _logged(records: Sequence[Record]) -> dict[str, Rate]:
 
 def _success(records: Sequence[Record], kinds: frozenset[str]) -> Rate | None:
     return success_rate([record for record in records if record.payload.kind in kinds])
+
+
+def _path_weight(plan: PlanRecord) -> float:
+    n_agent = max(plan.n_expert_steps, len(plan.steps))
+    return plan.n_expert_steps / n_agent if plan.done and n_agent else 0.0
 
 
 def _goals(records: Sequence[Record]) -> Rate | None:

@@ -12,6 +12,7 @@ from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["overview_table", "result_tables"]
 
+_PATH_WEIGHTED = "path-weighted"
 _COUNTS = ("plans", "tried", "trajectories", "excluded", "skipped", "failed")
 _NEVER = "*"  # marks published cells that cannot be other than 0
 _AFTER_FAILURE = {
@@ -44,7 +45,14 @@ def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
 def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
     """Return completed plans, by the columns of the published table of final tasks."""
     rows = [
-        Row((*names, *(format_percent(task.success.get(column)) for column in FINAL_COLUMNS), *_sizes(task)))
+        Row(
+            (
+                *names,
+                *(format_percent(task.success.get(column)) for column in FINAL_COLUMNS),
+                format_percent(task.path_weighted),
+                *_sizes(task),
+            )
+        )
         for *names, task in tasks
     ]
     notes = [*result_notes(runs), *_conduct_notes(runs)]
@@ -58,7 +66,7 @@ def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, P
         notes.append(f"{_NEVER} Cannot be other than 0: the published script counts every put as failed.")
     elif any(_has_final_task(run) for run in runs):
         notes.append("Published rows stand beside runs with --protocol published --rewards published alone.")
-    columns = (*NAME_COLUMNS, *map(Column, (*FINAL_COLUMNS, *_COUNTS)))
+    columns = (*NAME_COLUMNS, *map(Column, (*FINAL_COLUMNS, _PATH_WEIGHTED, *_COUNTS)))
     return Table("Plans completed, %", columns, tuple(rows), tuple(notes))
 
 
