@@ -2,6 +2,7 @@ import msgspec
 import pytest
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.generation.bundle import MANIFEST, build_bundle, read_manifest
@@ -60,3 +61,8 @@ def test_what_is_no_manifest_is_named(tmp_path, content):
     path.write_text(content)
     with pytest.raises(DataError, match=r"manifest\.json: not in its documented form"):
         read_manifest(path)
+
+
+def test_the_manifest_has_the_digests_of_the_files_that_are_there():
+    manifest = read_manifest(BUNDLED / MANIFEST)
+    assert {name: digest_of_file(BUNDLED / name) for name in manifest.files} == manifest.files

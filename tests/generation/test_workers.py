@@ -18,13 +18,13 @@ def test_the_files_are_the_same_whoever_makes_them(run, tmp_path):
         out = tmp_path / str(workers)
         code, said, err = run("generate", *SCENES, "--out", out / "made", "--workers", workers)
         assert code == 0, err
-        assert said.startswith("2 trajectories (0 made earlier)")
+        assert said.startswith("2 trajectories (0 generated earlier)")
         assert run("replay", out / "made", "--out", out / "set", "--workers", workers)[0] == 0
         assert run("questions", out / "set", "--out", out / "set" / "qa_set_q.csv", "--workers", workers)[0] == 0
     assert files(tmp_path / "1") == files(tmp_path / "2")
     assert len(files(tmp_path / "2")) > 40
     code, said, _ = run("generate", *SCENES, "--out", tmp_path / "2" / "made", "--workers", 2)
-    assert (code, said.splitlines()[0].split(",")[0]) == (0, "2 trajectories (2 made earlier)")
+    assert (code, said.splitlines()[0].split(",")[0]) == (0, "2 trajectories (2 generated earlier)")
 
 
 def test_gpus_are_shared_out_by_a_cluster_alone(run, tmp_path):

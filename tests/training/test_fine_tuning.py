@@ -80,7 +80,7 @@ def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter
 TRAINING = """
 import sys
 from pathlib import Path
-from infthor_eval.training.fine_tuning import fine_tune, prepared
+from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 from infthor_eval.training.recipe import read_recipe
 told = []
 fine_tune(prepare_run(read_recipe(sys.argv[1]), [Path(sys.argv[2])]), Path(sys.argv[3]), told.append)

@@ -79,11 +79,13 @@ def test_table4_is_printed_from_the_files_scores(tmp_path, run):
 
 
 @pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data")
-@pytest.mark.parametrize(("file", "n", "accuracy"), [(FILES[0], 829, 76.47), (FILES[1], 474, 67.33)])
-def test_who_sees_nothing_scores_this_on_the_published_files(tmp_path, run, file, n, accuracy):
+@pytest.mark.parametrize(
+    ("file", "n", "reference", "strict"), [(FILES[0], 829, 76.47, 76.53), (FILES[1], 474, 67.33, 67.28)]
+)
+def test_who_sees_nothing_scores_this_on_the_published_files(tmp_path, run, file, n, reference, strict):
     data, out = PUBLISHED / file, tmp_path / "out"
     assert run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0] == 0
     totals = {m: results_of(out, m)["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"] for m in ("oracle", "blind")}
     assert (totals["oracle"]["n"], totals["oracle"]["scores"]["strict"]["mean"]) == (n, 1.0)
-    for metric in ("reference", "strict"):
+    for metric, accuracy in (("reference", reference), ("strict", strict)):
         assert round(100 * totals["blind"]["scores"][metric]["mean"], 2) == accuracy
