@@ -13,6 +13,7 @@ from infthor_eval.memory.protocol import (
 )
 from infthor_eval.memory.registry import (
     MEMORIES,
+    MemoryOptions,
     accepted_options,
     memory_class,
     memory_identity,
@@ -25,6 +26,7 @@ __all__ = [
     "MEMORIES",
     "Memory",
     "MemoryCapabilities",
+    "MemoryOptions",
     "Observation",
     "Query",
     "Recalled",

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import UsageError, UserCodeError, in_one_line, unknown_name, wrap_errors
+from infthor_eval.formats.pairs import read_pairs
 from infthor_eval.memory.protocol import Memory
 from infthor_eval.plugins import PluginTable
 from model_adapters.adapter_identity import package_identity
@@ -17,6 +18,7 @@ from model_adapters.own_file import file_identity, load_from_file, name_in_file,
 
 __all__ = [
     "MEMORIES",
+    "MemoryOptions",
     "accepted_options",
     "memory_class",
     "memory_identity",
@@ -41,12 +43,11 @@ MEMORIES = PluginTable(
     },
     "docs/memories.md",
 )
-Options = tuple[tuple[str, Any], ...]  # sorted pairs
+MemoryOptions = tuple[tuple[str, Any], ...]  # sorted pairs
 
 
-@lru_cache(maxsize=8)
-def open_memory(name: str, options: Options = ()) -> Memory:
-    """Return a memory, the same object each time.
+def open_memory(name: str, options: MemoryOptions = ()) -> Memory:
+    """Return a memory, the same object each time for a class and its options.
 
     Args:
         name: a name of the table, or FILE.py:CLASS.
@@ -56,7 +57,7 @@ def open_memory(name: str, options: Options = ()) -> Memory:
         UsageError: there is no such memory or option, a value is not valid, or it lacks a member of the protocol.
         ModelError: the file of a memory of one's own does not define it, or cannot be imported.
     """
-    return _build(name, options)
+    return _build(name, memory_class(name), options)
 
 
 def accepted_options(name: str) -> Mapping[str, inspect.Parameter]:
@@ -69,7 +70,7 @@ def accepted_options(name: str) -> Mapping[str, inspect.Parameter]:
     return inspect.signature(memory_class(name)).parameters
 
 
-def memory_identity(name: str, options: Options = ()) -> dict[str, Any]:
+def memory_identity(name: str, options: MemoryOptions = ()) -> dict[str, Any]:
     """Return everything that can change what a memory recalls, as JSON values.
 
     Raises:
@@ -88,17 +89,9 @@ def parse_options(text: str | None) -> dict[str, str] | None:
     """Return the options of a memory, written as `k=v,k=v`; None if none are given.
 
     Raises:
-        UsageError: an item is not `k=v`.
+        UsageError: an item is not `k=v`, or a key is given twice.
     """
-    if text is None:
-        return None
-    options = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
-        key, equals, value = item.partition("=")
-        if not equals or not key.strip():
-            raise UsageError(f"--memory-args: {item!r} is not of the form key=value")
-        options[key.strip()] = value.strip()
-    return options
+    return None if text is None else read_pairs(text.split(","), "--memory-args")
 
 
 def wrap_memory_errors(name: str) -> AbstractContextManager[None]:
@@ -106,8 +99,8 @@ def wrap_memory_errors(name: str) -> AbstractContextManager[None]:
     return wrap_errors(f"the memory {name} fails", "fix it", catch=Exception, raise_as=UserCodeError)
 
 
-def _build(name: str, options: Options) -> Memory:
-    kind = memory_class(name)
+@lru_cache(maxsize=8)  # by the class: an edited file has another one
+def _build(name: str, kind: Any, options: MemoryOptions) -> Memory:
     values = _converted(name, kind, dict(options))
     try:
         memory = kind(**values)

@@ -225,7 +225,7 @@ def _recall_all(
     units: Sequence[NiehUnit], prepared: PreparedTask, answerer: Answerer, session: Session[NiehAnswer]
 ) -> list[tuple[NiehUnit, NiehUnit | Exception]]:
     """Return each unit with what its memory recalled, or why that failed; as they are if there is nothing to recall."""
-    if answerer.write is None or not any(unit.sample.recall and unit.sample.recalled is None for unit in units):
+    if answerer.write is None or not any(unit.sample.awaits_recall for unit in units):
         return [(unit, unit) for unit in units]
     recaller = Recaller(
         prepared.task_samples,

@@ -61,7 +61,7 @@ class _ConversationModel:
 
     def cost(self, prepared: PreparedTask) -> str | None:
         lines = [budget_of(prepared, self._model).description] if self._model.capabilities.counts_tokens else []
-        if any(sample.recall and sample.recalled is None for sample in prepared.task_samples.samples):
+        if any(sample.awaits_recall for sample in prepared.task_samples.samples):
             lines.append("what a memory recalls for each question is not counted yet")
         if prepared.task_samples.shows_films:
             name, as_video = self._model.name, "the film is given as a video"

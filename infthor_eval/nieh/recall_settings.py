@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from infthor_eval.memory import MemoryOptions
+
 __all__ = ["RecallSettings"]
 
 
@@ -20,7 +22,7 @@ class RecallSettings:
     """
 
     memory: str
-    options: tuple[tuple[str, Any], ...] = ()
+    options: MemoryOptions = ()
     budget: int | None = None
     tokens_per_frame: int | None = None
     seed: int = 0

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 from infthor_eval.errors import InfthorError, ModelError, UsageError
 from infthor_eval.formats.digests import fingerprint
@@ -38,8 +39,18 @@ KeepRecall = Callable[[str, NiehRecall], None]
 _IN_USE = threading.Lock()  # memories are shared by a process, and serve one trajectory at a time
 
 
+class _Built(NamedTuple):
+    """A memory that has observed a trajectory up to the step before the last: steps as it sees them, seconds taken."""
+
+    traj_id: str
+    settings: RecallSettings
+    memory: Memory
+    steps: Sequence[Observation]
+    seconds: float
+
+
 class Recaller:
-    """Recalls for the questions on one trajectory; a context manager, as only one of a process uses a memory."""
+    """Recalls for questions, trajectory by trajectory, while `in_use` reserves the memories of this process."""
 
     def __init__(self, task_samples: TaskSamples, write: Write | None, find: FindRecall, keep: KeepRecall) -> None:
         """Take a task's samples, what asks the model under test, and where recalls are kept.
@@ -51,8 +62,9 @@ class Recaller:
             keep: keeps a new one.
         """
         self._task_samples, self._write, self._find, self._keep = task_samples, write, find, keep
-        self._built: tuple[str, RecallSettings, Memory, float] | None = None
-        self._trajectories: dict[str, list[Observation]] = {}
+        self._built: _Built | None = None
+        self._identities: dict[RecallSettings, dict[str, Any]] = {}
+        self._observed: dict[str, tuple[list[Observation], list[str]]] = {}  # steps and digests of their frames
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
@@ -73,49 +85,56 @@ class Recaller:
         settings, question = sample.recall, sample.question
         if settings is None:
             raise ValueError("the sample's context has no memory")
-        steps = self._observations(question.traj_id, sample)
-        inputs = self._fingerprint(sample, settings, steps)
+        steps, digests = self._observations(sample)
+        inputs = self._fingerprint(sample, settings, digests)
         known = self._find(inputs)
         if known is not None:
             return known
-        memory, build_s = self._build(question.traj_id, settings, steps)
+        built = self._build(question.traj_id, settings, steps)
+        memory, past, present = built.memory, built.steps[:-1], built.steps[-1]
         clues = clue_positions(self._task_samples.data, question) if not question.absence else ()
-        shown = _visible(steps, memory)
-        query = Query(text=question.text, present=shown[-1], clues=clues if memory.capabilities.privileged else None)
+        query = Query(text=question.text, present=present, clues=clues if memory.capabilities.privileged else None)
         start = time.perf_counter()
         with wrap_memory_errors(settings.memory):
             recalled = list(memory.recall(query, settings.budget))
         recall_s = time.perf_counter() - start
-        check_recalled(recalled, shown[:-1], settings.memory, settings.budget, settings.tokens_per_frame)
+        check_recalled(recalled, past, settings.memory, settings.budget, settings.tokens_per_frame)
         result = NiehRecall(
             recalled=tuple(item if isinstance(item, str) else item.number for item in recalled),
-            build_s=round(build_s, 4),
+            build_s=round(built.seconds, 4),
             recall_s=round(recall_s, 4),
         )
         self._keep(inputs, result)
         return result
 
-    def _observations(self, traj_id: str, sample: Sample) -> list[Observation]:
-        if traj_id not in self._trajectories:
-            self._trajectories[traj_id] = _observations(self._task_samples, sample)
-        return self._trajectories[traj_id]
+    def _observations(self, sample: Sample) -> tuple[list[Observation], list[str]]:
+        traj_id = sample.question.traj_id
+        if traj_id not in self._observed:
+            steps = _observations(self._task_samples, sample)
+            self._observed[traj_id] = steps, [step.frame.digest for step in steps]
+        return self._observed[traj_id]
 
-    def _fingerprint(self, sample: Sample, settings: RecallSettings, steps: Sequence[Observation]) -> str:
+    def _identity(self, settings: RecallSettings) -> dict[str, Any]:
+        if settings not in self._identities:  # it reads the source of a memory of one's own
+            self._identities[settings] = memory_identity(settings.memory, settings.options)
+        return self._identities[settings]
+
+    def _fingerprint(self, sample: Sample, settings: RecallSettings, digests: Sequence[str]) -> str:
         return fingerprint(
             {
-                "memory": memory_identity(settings.memory, settings.options),
+                "memory": self._identity(settings),
                 "budget": [settings.budget, settings.tokens_per_frame],
                 "seed": settings.seed,
-                "frames": [step.frame.digest for step in steps],
+                "frames": digests,
                 "question": sample.question.text,
                 "clues": list(sample.question.clues),
                 "data": self._task_samples.data.fingerprint,
             }
         )
 
-    def _build(self, traj_id: str, settings: RecallSettings, steps: Sequence[Observation]) -> tuple[Memory, float]:
-        """Return the memory with the trajectory observed, and the seconds that this took."""
-        if self._built is None or self._built[:2] != (traj_id, settings):
+    def _build(self, traj_id: str, settings: RecallSettings, steps: Sequence[Observation]) -> _Built:
+        """Return the memory with the trajectory observed."""
+        if self._built is None or (self._built.traj_id, self._built.settings) != (traj_id, settings):
             memory = open_memory(settings.memory, settings.options)
             write = self._write if memory.capabilities.writes else None
             if memory.capabilities.writes and write is None:
@@ -123,13 +142,14 @@ class Recaller:
             facts = TrajectoryFacts(
                 name=traj_id, tokens_per_frame=settings.tokens_per_frame, seed=settings.seed, write=write
             )
+            seen = _visible(steps, memory)
             start = time.perf_counter()
             with wrap_memory_errors(settings.memory):
                 memory.begin(facts)
-                for step in _visible(steps, memory)[:-1]:
+                for step in seen[:-1]:
                     memory.observe(step)
-            self._built = traj_id, settings, memory, time.perf_counter() - start
-        return self._built[2], self._built[3]
+            self._built = _Built(traj_id, settings, memory, seen, time.perf_counter() - start)
+        return self._built
 
 
 def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:
@@ -144,7 +164,7 @@ def recall_all(task_samples: TaskSamples) -> list[Sample]:
     Raises:
         UsageError: the memory asks the model under test, or recalling fails.
     """
-    if not any(sample.recall and sample.recalled is None for sample in task_samples.samples):
+    if not any(sample.awaits_recall for sample in task_samples.samples):
         return list(task_samples.samples)
     kept: dict[str, NiehRecall] = {}
     recaller = Recaller(task_samples, None, kept.get, kept.__setitem__)

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.household.sequence_text import goal_part, plan_part
 from infthor_eval.memory import (
+    MemoryOptions,
     Observation,
     Query,
     TrajectoryFacts,
@@ -24,8 +25,6 @@ from infthor_eval.plans.segments import Part
 
 __all__ = ["MemoryChoice", "RecalledHistory"]
 
-Options = tuple[tuple[str, Any], ...]  # sorted pairs
-
 
 class RecalledHistory:
     """What a memory recalls of the steps before the present one (`infthor_eval.memory`), the goal, and that frame.
@@ -35,7 +34,7 @@ class RecalledHistory:
 
     needs_state: ClassVar[bool] = False
 
-    def __init__(self, name: str, options: Options = (), budget: int | None = None, blank: bool = False) -> None:
+    def __init__(self, name: str, options: MemoryOptions = (), budget: int | None = None, blank: bool = False) -> None:
         """Open a memory.
 
         Args:

@@ -39,7 +39,7 @@ def question_sequences(encoder: Encoder, task: TaskSamples, limit: int) -> Itera
 
 def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) -> TrainingSequence:
     context, text = task.request(sample)
-    if sample.recall is not None and sample.recalled is None:
+    if sample.awaits_recall:
         raise UsageError("training has no memory; use another context")
     return encoder.answer(name, [*as_images(context), text], doc_target(sample.question))  # it has no video input
 

@@ -89,3 +89,10 @@ def test_options_are_read_as_pairs():
     assert parse_options("k=3, retriever=./clip") == {"k": "3", "retriever": "./clip"}
     with pytest.raises(UsageError, match="--memory-args: 'k' is not of the form key=value"):
         parse_options("k")
+
+
+def test_an_edited_file_is_another_memory_in_the_same_process(mine):
+    first = open_memory(f"{mine}:Mine")
+    assert open_memory(f"{mine}:Mine") is first
+    mine.write_text(MINE.replace("n: int = 3", "n: int = 4"))
+    assert open_memory(f"{mine}:Mine").n == 4

@@ -3,7 +3,6 @@
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.values import parse_pairs
 
 __all__ = ["command"]
 
@@ -18,8 +17,8 @@ def command(memory: str, memory_args: str) -> int:
     of output; docs/memories.md explains them. Exit code 1 if a clause is broken.
     """
     from infthor_eval.cli.options.checks import print_checks
-    from infthor_eval.memory import open_memory
+    from infthor_eval.memory import open_memory, parse_options
     from infthor_eval.memory.check import check_memory
 
-    options = parse_pairs(memory_args.split(","), "--memory-args")
+    options = parse_options(memory_args) or {}
     return print_checks(memory, check_memory(open_memory(memory, tuple(sorted(options.items())))))

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import click
 
-from infthor_eval.errors import unknown_name
+from infthor_eval.errors import UsageError, unknown_name
+from infthor_eval.formats.pairs import read_pairs
 
 __all__ = [
     "PATH",
@@ -172,12 +173,7 @@ def parse_pairs(items: Iterable[str], option: str) -> dict[str, str]:
     Raises:
         click.UsageError: an item is not `k=v`, or a key is given twice.
     """
-    pairs: dict[str, str] = {}
-    for item in filter(None, (part.strip() for part in items)):
-        key, equals, value = item.partition("=")
-        if not equals or not key.strip():
-            raise click.UsageError(f"{option}: {item!r} is not of the form key=value")
-        if key.strip() in pairs:
-            raise click.UsageError(f"{option}: {key.strip()!r} is given twice")
-        pairs[key.strip()] = value.strip()
-    return pairs
+    try:
+        return read_pairs(items, option)
+    except UsageError as error:
+        raise click.UsageError(str(error)) from error

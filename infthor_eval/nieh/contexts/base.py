@@ -27,6 +27,10 @@ def _is_positive(value: Any) -> bool:
     return bool(value >= 1)
 
 
+def _is_plain(value: Any) -> bool:
+    return isinstance(value, str | int | float)
+
+
 # The check of each setting beyond its type, and the words for its valid values.
 _VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
     "ctx_size": (lambda value: 0 < value < _LARGEST, "a number of kilo-tokens above 0"),
@@ -35,7 +39,7 @@ _VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
     "tokens_per_frame": (_is_positive, _COUNT),
     "top_k": (_is_positive, _COUNT),
     "memory": (None, "the name of a memory"),
-    "memory_args": (None, "a mapping of the memory's options"),
+    "memory_args": (lambda value: all(map(_is_plain, value.values())), "a mapping of options to texts and numbers"),
     "budget": (_is_positive, f"{_COUNT}, in tokens"),
     "fps": (lambda value: 0 < value <= FILM_FPS, f"a number of frames per second above 0, at most {FILM_FPS}"),
     "seed": (None, "a whole number"),
@@ -66,6 +70,11 @@ class Sample:
     recall: RecallSettings | None = None
     recalled: tuple[int | str, ...] | None = None
     fps: float | None = None
+
+    @property
+    def awaits_recall(self) -> bool:
+        """True if a memory is still to recall what it shows."""
+        return self.recall is not None and self.recalled is None
 
 
 @dataclass(frozen=True, kw_only=True)
