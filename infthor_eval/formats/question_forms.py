@@ -1,4 +1,4 @@
-"""The forms of questions of the paper's Table 3, told by their words.
+"""The forms of questions, those of the paper's Table 3 and our further ones, told by their words.
 
 The published question files have no `question_type`. The type and the form of a question follow from its text, in the
 published words ("Is Mug on the Table?") and in ours ("Is the mug on the table?").
@@ -7,7 +7,7 @@ published words ("Is Mug on the Table?") and in ours ("Is the mug on the table?"
 import re
 from dataclasses import dataclass
 
-__all__ = ["FORMS", "QuestionForm", "find_form", "type_of"]
+__all__ = ["FORMS", "FURTHER_FORMS", "QuestionForm", "find_form", "type_of"]
 
 _ONE_TYPE = r"(?:(?:a|an|the) )?[^?]+"
 
@@ -17,7 +17,7 @@ class QuestionForm:
     """A form of questions.
 
     Attributes:
-        question_type: its type in Table 3, in the words of the `question_type` column.
+        question_type: its type in the words of the `question_type` column: one of Table 3's, or one of ours.
         words: the question with {} for each object.
     """
 
@@ -48,13 +48,38 @@ FORMS = (
     QuestionForm("movement_counting", "How many times did you move {}?"),
 )
 
+_CONTENT, _OPEN, _LOCATION, _COUNT, _PUT = (
+    f"{name}_further"
+    for name in ("container_content", "open_state", "location_tracing", "movement_counting", "put_action")
+)
+FURTHER_FORMS = (
+    QuestionForm(_OPEN, "Was {} open when you {}?"),
+    QuestionForm(_OPEN, "Is {} open now?"),
+    QuestionForm(_OPEN, "What did you open?"),
+    QuestionForm(_LOCATION, "Where was {} before you picked it up?"),
+    QuestionForm(_LOCATION, "Where was {} before you first picked it up?"),
+    QuestionForm(_LOCATION, "Where did you move {} to?"),
+    QuestionForm(_LOCATION, "In which places was {}, from first to last?"),
+    QuestionForm(_CONTENT, "Which things that can be picked up were directly in/on {} when you first opened it?"),
+    QuestionForm(
+        _CONTENT,
+        "Which other things that can be picked up were directly in/on {} when you picked up {} from it?",
+    ),
+    QuestionForm(_PUT, "What did you put in/on {}?"),
+    QuestionForm(_PUT, "What did you put down?"),
+    QuestionForm(_PUT, "Where did you put things?"),
+    QuestionForm(_COUNT, "How many times did you open {}?"),
+    QuestionForm(_COUNT, "How many times did you put something in/on {}?"),
+    QuestionForm(_COUNT, "How many different objects did you pick up?"),
+)
+
 
 def find_form(text: str) -> QuestionForm | None:
-    """Return the form of a question, or None if it has none of Table 3's."""
-    return next((form for form in FORMS if form.matches(text)), None)
+    """Return the form of a question, or None if it has none of these."""
+    return next((form for form in (*FORMS, *FURTHER_FORMS) if form.matches(text)), None)
 
 
 def type_of(text: str) -> str:
-    """Return the type in Table 3 of a question, or an empty text."""
+    """Return the type of a question, or an empty text if it has none of these forms."""
     form = find_form(text)
     return form.question_type if form else ""

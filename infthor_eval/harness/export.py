@@ -8,6 +8,7 @@ from datetime import datetime
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from infthor_eval.errors import wrap_errors
@@ -87,6 +88,11 @@ class _Scored:
     def name(self) -> str:
         return self.file.name
 
+    @property
+    def n_samples(self) -> int:
+        """Number of samples; one that was repeated has several records."""
+        return len({record.key.once for record in self.records})
+
     @cached_property
     def metrics(self) -> list[str]:
         return list(dict.fromkeys(name for scores in self.scores for name in scores))
@@ -104,12 +110,16 @@ def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
 
 
 def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
-    """Return a row per sample, in the task's order."""
-    rows = [
-        row | {"metrics": task.metrics} | {name: scores.get(name, 0.0) for name in task.metrics}
-        for row, scores in zip(task.rows, task.scores, strict=True)
-    ]
-    return sorted(rows, key=lambda row: row["doc_id"])
+    """Return a row per sample, in the task's order; one that was repeated has all replies, and its mean scores."""
+    repeated: dict[int, list[tuple[dict[str, Any], Mapping[str, float]]]] = {}
+    for row, scores in zip(task.rows, task.scores, strict=True):
+        repeated.setdefault(row["doc_id"], []).append((row, scores))
+    rows = []
+    for _, same in sorted(repeated.items()):
+        replies = [reply for row, _ in same for reply in row["filtered_resps"]]
+        means = {name: fmean(scores.get(name, 0.0) for _, scores in same) for name in task.metrics}
+        rows.append(same[0][0] | {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics} | means)
+    return rows
 
 
 def _row(sample: UnitSample) -> dict[str, Any]:
@@ -142,7 +152,7 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
         "versions": {task.name: task.file.settings.get("metadata", {}).get("version") for task in tasks},
         "n-shot": {task.name: 0 for task in tasks},
         "higher_is_better": {task.name: dict.fromkeys(task.metrics, True) for task in tasks},
-        "n-samples": {task.name: dict.fromkeys(("original", "effective"), len(task.records)) for task in tasks},
+        "n-samples": {task.name: dict.fromkeys(("original", "effective"), task.n_samples) for task in tasks},
         "config": {
             "model": NAME,
             "model_args": {"adapter": request.model, **request.model_options},
@@ -162,7 +172,7 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
 
 
 def _means(task: _Scored) -> dict[str, Any]:
-    means: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": len(task.records)}
+    means: dict[str, Any] = {"name": task.name, "alias": task.name, "sample_len": task.n_samples}
     for metric in task.metrics:
         scores = [scores.get(metric, 0.0) for scores in task.scores]
         estimate = clustered_mean(scores, [record.cluster for record in task.records])

@@ -28,7 +28,7 @@ from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
-from model_adapters import Model, Part, Reply, wrap_request_errors
+from model_adapters import Decoding, Model, Part, Reply, wrap_request_errors
 
 __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "answer_units"]
 
@@ -59,9 +59,15 @@ class _UnitRequest:
                 "context": [_content(part) for part in self.context],
                 "text": self.text,
                 "answers": list(self.unit.payload.answers),
-                "decoding": self.prepared.decoding.document(),
+                "decoding": self.decoding.document(),
             }
         )
+
+    @property
+    def decoding(self) -> Decoding:
+        """The task's decoding, with the seed of the repetition."""
+        decoding = self.prepared.decoding
+        return replace(decoding, seed=decoding.seed + self.unit.key.repeat - 1)
 
     def record(
         self, reply: Reply, seconds: float, faults: tuple[str, ...], usage: Usage, session: Session[NiehAnswer]
@@ -133,7 +139,7 @@ class ModelAnswerer:
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
-        context, decoding = requests[0].context, requests[0].prepared.decoding
+        context, decoding = requests[0].context, requests[0].decoding
         with wrap_request_errors(self._name):
             if any(item.context != context for item in requests[1:]):
                 self._go_to(())
@@ -184,8 +190,8 @@ def answer_units(
     """Yield the records of units on one trajectory.
 
     Those with one context are answered together, and all of them if the answerer batches contexts.
-    Neighbours share as long a prefix as there is, which a model's conversation encodes once. The order depends on the
-    units alone, so it is the same when a run is resumed.
+    Neighbours share as long a prefix as there is, which a model's conversation encodes once; so do the repetitions of
+    a question. The order depends on the units alone, so it is the same when a run is resumed.
     """
     requests = []
     for unit, recalled in _recall_all(units, prepared, answerer, session):
@@ -251,9 +257,9 @@ def _answer_in_batches(
     requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer]
 ) -> Iterator[UnitRecord[NiehAnswer]]:
     # A batch has the same requests when a run is resumed, as replies can differ by rounding with those beside them.
-    for at in range(0, len(requests), answerer.batch_size):
+    for batch in _batches(requests, answerer.batch_size):
         waiting = []
-        for item in requests[at : at + answerer.batch_size]:
+        for item in batch:
             record = _find_record(item, session)
             if record is None:
                 waiting.append(item)
@@ -261,6 +267,13 @@ def _answer_in_batches(
                 yield record
         if waiting:
             yield from _answer(waiting, answerer, session)
+
+
+def _batches(requests: Sequence[_UnitRequest], size: int) -> Iterator[Sequence[_UnitRequest]]:
+    """Yield batches of requests with one decoding: all first requests, then all second ones."""
+    for repeat in sorted({item.unit.key.repeat for item in requests}):
+        same = [item for item in requests if item.unit.key.repeat == repeat]
+        yield from (same[at : at + size] for at in range(0, len(same), size))
 
 
 def _find_record(request: _UnitRequest, session: Session[NiehAnswer]) -> UnitRecord[NiehAnswer] | None:

@@ -18,7 +18,7 @@ from infthor_eval.nieh.samples import TaskSamples, open_set
 from infthor_eval.nieh.task import NiehTask, PreparedTask
 from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import Cost, Group, Session, Skipped, TaskRequest, UnitKey, UnitRecord, UnitSample, Workload
-from model_adapters import Subject
+from model_adapters import Model, Subject
 
 __all__ = ["BoundNieh", "NiehEvaluation", "PreparedEvaluation"]
 
@@ -44,6 +44,7 @@ class NiehEvaluation:
         """See `infthor_eval.runs.Evaluation.bind`."""
         model = answering_model(subject)
         _refuse_without_frames(subject, self._tasks)
+        _refuse_without_sampling(subject, self._options)
         tokens = self._tokens_per_frame(model)
         tasks = {task.name: task for task in self._tasks}
         prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
@@ -53,7 +54,7 @@ class NiehEvaluation:
         )
         costs = {name: model.cost(item) for name, item in prepared.items()}
         workload = Workload(
-            groups=_groups(prepared),
+            groups=_groups(prepared, self._options.repeats),
             skipped=[
                 Skipped(UnitKey(name, skipped.question.id, skipped.variant), skipped.reason)
                 for name, item in prepared.items()
@@ -65,6 +66,7 @@ class NiehEvaluation:
                 "tokens_per_frame": tokens,
                 "frames": self._options.frames,
                 **self._memory(),
+                **({"repeats": self._options.repeats} if self._options.repeats > 1 else {}),
             },
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
         )
@@ -159,7 +161,7 @@ class BoundNieh:
     def to_sample(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
         """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
         prepared = self._prepared[record.task]
-        number = self._numbers[record.key]
+        number = self._numbers[record.key.once]
         sample = prepared.task_samples.samples[number]
         if record.payload.recall is not None:
             sample = apply_recall(sample, record.payload.recall)
@@ -185,7 +187,7 @@ class BoundNieh:
         }
 
 
-def _groups(prepared: Mapping[str, PreparedTask]) -> list[Group[NiehUnit]]:
+def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Group[NiehUnit]]:
     """Return a group for each task and trajectory: its samples share what is encoded of the trajectory."""
     groups = []
     for task, item in prepared.items():
@@ -193,7 +195,12 @@ def _groups(prepared: Mapping[str, PreparedTask]) -> list[Group[NiehUnit]]:
         for _, samples in groupby(ordered, key=lambda sample: sample.question.traj_id):
             same = list(samples)
             frames = len({frame for sample in same for frame in sample.frames})
-            groups.append(Group([NiehUnit.of(task, item.task_samples, sample) for sample in same], frames))
+            units = [
+                NiehUnit.of(task, item.task_samples, sample, repeat)
+                for sample in same
+                for repeat in range(1, repeats + 1)
+            ]
+            groups.append(Group(units, frames))
     return groups
 
 
@@ -217,6 +224,13 @@ def _refuse_without_frames(subject: Subject, tasks: Sequence[NiehTask]) -> None:
         raise UsageError(
             f"{without}: has questions but no frames, which {subject.name} needs; give a set with metadata/"
         )
+
+
+def _refuse_without_sampling(subject: Subject, options: NiehOptions) -> None:
+    """Refuse to draw replies from a model that cannot; baselines say the same every time."""
+    for name, is_given in (("repeats", options.repeats > 1), ("temperature", options.temperature is not None)):
+        if is_given and isinstance(subject, Model) and not subject.capabilities.sampling:
+            raise UsageError(f"--{name}: {subject.name} draws no replies; leave it out, or give another model")
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:

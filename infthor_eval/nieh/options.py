@@ -25,6 +25,8 @@ class NiehOptions:
         memory: memory that recalls what is shown, a name or FILE.py:CLASS; for tasks that leave it open.
         memory_args: its options, "k=v,k=v".
         budget: most tokens of what it recalls ("4k" is 4,000); None for the memory's own limit.
+        repeats: times that each question is asked, with the seeds from the run's on.
+        temperature: temperature of drawn replies; None for the tasks' own, or 1 where a greedy task is repeated.
     """
 
     k_tokens: int | None = field(
@@ -85,8 +87,27 @@ class NiehOptions:
         },
     )
 
+    repeats: int = field(
+        default=1,
+        metadata={
+            "help": "Ask each question N times, with replies drawn by the seeds from --seed on.",
+            "metavar": "N",
+        },
+    )
+    temperature: float | None = field(
+        default=None,
+        metadata={
+            "help": "Draw replies at this temperature; default: as the task says, and 1 if it is repeated.",
+            "metavar": "T",
+        },
+    )
+
     def __post_init__(self) -> None:
         """Raise UsageError if a value is not valid."""
+        if self.repeats < 1:
+            raise UsageError(f"--repeats {self.repeats}: a question is asked once at least")
+        if self.temperature is not None and not 0 < self.temperature < float("inf"):
+            raise UsageError(f"--temperature {self.temperature}: replies are drawn at a temperature above 0")
         read_budget(self.budget)
         check_frames(self.frames)
         if self.tokens_per_frame is not None and self.tokens_per_frame < 1:

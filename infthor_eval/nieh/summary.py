@@ -18,6 +18,7 @@ from infthor_eval.nieh.above_guessing import AboveGuessing, above_guessing
 from infthor_eval.nieh.answer_form import YesNo, format_failures, yes_no
 from infthor_eval.nieh.memory_summary import MemorySummary, MemoryTimes, summarise_memory, time_memory
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.repeat_summary import RepeatSummary, by_question, mean_record, summarise_repeats
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.rates import Rate
 from infthor_eval.runs import UnitRecord
@@ -150,11 +151,19 @@ class TaskSummary(msgspec.Struct, frozen=True):
     memory: MemorySummary | None = None
 
 
-class NiehSummary(msgspec.Struct, frozen=True):
-    """The summary of a run: its tasks by name, and what their memories took, which differs from run to run."""
+class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The summary of a run by task.
+
+    Attributes:
+        tasks: summaries over questions. Where answers were repeated, each question counts with its mean scores; replies
+            are counted in `yes_no`, `format_failures` and `failures` alone.
+        took: what their memories took, which differs from run to run.
+        repeats: how the repeated answers to their questions compare.
+    """
 
     tasks: dict[str, TaskSummary]
     took: dict[str, MemoryTimes] = {}
+    repeats: dict[str, RepeatSummary] = {}
 
 
 def summarise(config: Mapping[str, Any], records: Sequence[Record]) -> NiehSummary:
@@ -163,15 +172,24 @@ def summarise(config: Mapping[str, Any], records: Sequence[Record]) -> NiehSumma
     tasks = config["tasks"].items()
     by_task = {task: [record for record in in_order if record.task == task] for task, _ in tasks}
     times = {task: time_memory(of_task) for task, of_task in by_task.items()}
+    repeats = {
+        task: summarise_repeats(by_question(by_task[task]), _main_metric(about["metrics"]["names"]))
+        for task, about in tasks
+    }
     return NiehSummary(
         {task: _task(by_task[task], about, config) for task, about in tasks},
         {task: took for task, took in times.items() if took is not None},
+        {task: compared for task, compared in repeats.items() if compared is not None},
     )
 
 
 def main_metric(task: TaskSummary) -> str:
     """Return the main metric of a task: the strict scorer, else the first of its own."""
-    return "strict" if "strict" in task.metrics else task.metrics[0]
+    return _main_metric(task.metrics)
+
+
+def _main_metric(metrics: Sequence[str]) -> str:
+    return "strict" if "strict" in metrics else metrics[0]
 
 
 def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
@@ -181,8 +199,9 @@ def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
     return {name: Rate(score.mean, score.low, score.high, n) for name, (score, n) in scores.items()}
 
 
-def _task(records: Sequence[Record], about: Mapping[str, Any], config: Mapping[str, Any]) -> TaskSummary:
+def _task(replies: Sequence[Record], about: Mapping[str, Any], config: Mapping[str, Any]) -> TaskSummary:
     metrics = list(about["metrics"]["names"])
+    records = [mean_record(same) for same in by_question(replies)]
     names = sorted({record.payload.file for record in records} - {""})
     files = {name: [record for record in records if record.payload.file == name] for name in names}
     return TaskSummary(
@@ -198,13 +217,13 @@ def _task(records: Sequence[Record], about: Mapping[str, Any], config: Mapping[s
         by_length=_by_length(records, metrics),
         above_guessing=_above_guessing(records, metrics),
         skipped=_summarise_skipped(records, metrics, about["skipped"]),
-        yes_no=yes_no(records),
-        format_failures=format_failures(records, about["decoding"]["max_new_tokens"]),
+        yes_no=yes_no(replies),
+        format_failures=format_failures(replies, about["decoding"]["max_new_tokens"]),
         below_full_marks={
             name: [str(record.key) for record in records if _score(record, name) < 1.0] for name in metrics
         },
         scores={name: _by_trajectory(records, name) for name in metrics},
-        failures=[Failure(str(record.key), record.failure) for record in records if record.failure is not None],
+        failures=[Failure(str(record.key), record.failure) for record in replies if record.failure is not None],
         memory=summarise_memory(config, about, records),
     )
 

@@ -14,6 +14,7 @@ from infthor_eval.nieh.evidence_tables import (
 from infthor_eval.nieh.gains import Gain, find_gains, frames_of, name_of
 from infthor_eval.nieh.memory_tables import memory_tables
 from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.repeat_tables import repeat_tables
 from infthor_eval.nieh.rescoring_report import sources_of
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.nieh.summary import CLUE_COLUMNS, OPEN_ENDED, Cell, NiehSummary, TaskSummary, main_metric
@@ -57,12 +58,13 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
         *evidence_tables(runs),
         *effective_lengths(runs),
         *memory_tables(runs),
+        *repeat_tables(runs),
         _replies_table(runs),
     ]
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the accuracy of each task with its intervals, and the tables of gains and memories if there are any.
+    """Return the accuracy of each task with its intervals, and the tables of gains, memories and repeats if any.
 
     A task that asked nothing is a line below the table.
     """
@@ -75,7 +77,7 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
     numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
     notes = *dict.fromkeys(_nothing_asked(name, task) for _, name, task in tasks if not task.n), *_notes(runs)
     table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)
-    return [table, *_gains_table(runs), *memory_tables(runs)]
+    return [table, *_gains_table(runs), *memory_tables(runs), *repeat_tables(runs)]
 
 
 def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:

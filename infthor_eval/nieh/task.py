@@ -57,7 +57,8 @@ class NiehTask:
         self.settings: Mapping[str, Any] = file.settings
         self._limit = request.limit
         self._config: dict[str, Any] = _run_settings(request) | file.settings["dataset_kwargs"]
-        self.decoding: Decoding = decoding_of(file.settings["generation_kwargs"], request.seed, str(file.path))
+        self._generation_kwargs = _drawn(file.settings["generation_kwargs"], request.options)
+        self.decoding: Decoding = decoding_of(self._generation_kwargs, request.seed, str(file.path))
         self.metrics: Metrics = metrics_of(file)
         self.data: NiehSet = find_set(**self._config)
         # A budget of a memory is in tokens, too.
@@ -77,7 +78,7 @@ class NiehTask:
         samples = self.task_samples
         if samples is None:
             samples = find_samples(self._config | {"tokens_per_frame": tokens_per_frame}, self._limit)
-        return PreparedTask(samples, self.decoding, self.settings["generation_kwargs"], self.metrics)
+        return PreparedTask(samples, self.decoding, self._generation_kwargs, self.metrics)
 
     def answer_key(self, prepared: PreparedTask, tokens_per_frame: int | None) -> Sequence[Sample]:
         """Return the samples without a limit: the answer key that a baseline is fitted to."""
@@ -139,6 +140,18 @@ def _check(file: TaskFile) -> None:
             packaged_folder(f"sets/{given['bundled']}")
         except DataError as error:
             raise DataError(f"{place}: bundled is {given['bundled']!r:.60}: {error}") from error
+
+
+def _drawn(generation_kwargs: Any, options: NiehOptions) -> Any:
+    """Return the generation settings of a task with drawn replies, if the run wants them or repeats its questions."""
+    if not isinstance(generation_kwargs, Mapping):
+        return generation_kwargs  # refused where it is read
+    own = generation_kwargs.get("temperature") or None
+    greedy = not generation_kwargs.get("do_sample", own is not None)
+    if options.temperature is None and not (greedy and options.repeats > 1):
+        return generation_kwargs
+    temperature = own or 1.0 if options.temperature is None else options.temperature
+    return {**generation_kwargs, "do_sample": True, "temperature": temperature}
 
 
 def _run_settings(request: TaskRequest[NiehOptions]) -> dict[str, Any]:

@@ -19,9 +19,9 @@ class NiehUnit(Unit[NiehAnswer]):
     sample: Sample
 
     @classmethod
-    def of(cls, task: str, task_samples: TaskSamples, sample: Sample) -> "NiehUnit":
+    def of(cls, task: str, task_samples: TaskSamples, sample: Sample, repeat: int = 1) -> "NiehUnit":
         """Return the unit of a task's sample, with what can be guessed of it and how much of its evidence is shown."""
         question = sample.question
         guesses = find_guesses(task_samples.data, visible_knowledge(task_samples.context_name))
         payload = NiehAnswer.of(question, guesses.get(question.id), shown_clues(task_samples, sample))
-        return cls(UnitKey(task, question.id, sample.variant), question.traj_id, payload, sample)
+        return cls(UnitKey(task, question.id, sample.variant, repeat), question.traj_id, payload, sample)

@@ -40,14 +40,22 @@ class UnitKey(NamedTuple):
         task: name of the task.
         id: id of the question or the episode.
         variant: variant of the task's evaluation of it ("depth=0.4"); empty where there is only one.
+        repeat: number of its repetition, from 1, where it is evaluated several times.
     """
 
     task: str
     id: str
     variant: str = ""
+    repeat: int = 1
 
     def __str__(self) -> str:
-        return f"{self.id} {self.variant}".strip()
+        number = f"({self.repeat})" if self.repeat > 1 else ""
+        return " ".join(filter(None, (self.id, self.variant, number)))
+
+    @property
+    def once(self) -> "UnitKey":
+        """The key without the number of the repetition: that of the first."""
+        return self._replace(repeat=1)
 
 
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -98,6 +106,7 @@ class UnitRecord(
     fingerprint: str
     payload: P
     variant: str = ""
+    repeat: int = 1
     attempt: int = 1
     failure: str | None = None
     excluded: str | None = None
@@ -109,7 +118,7 @@ class UnitRecord(
     @property
     def key(self) -> UnitKey:
         """Key of the unit."""
-        return UnitKey(self.task, self.id, self.variant)
+        return UnitKey(self.task, self.id, self.variant, self.repeat)
 
 
 class ArtifactRecord(

@@ -88,6 +88,7 @@ def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRec
             "task": record.task,
             "id": record.id,
             "variant": record.variant,
+            **({"repeat": record.repeat} if record.repeat > 1 else {}),
             "cluster": record.cluster,
             "scores": suite.scores(record),
             "failure": record.failure,

@@ -99,6 +99,7 @@ class _UnitOutcome(msgspec.Struct, tag_field="type", tag="unit"):
     task: str
     id: str
     variant: str = ""
+    repeat: int = 1
     attempt: int = 1
     failure: str | None = None
 
@@ -120,7 +121,7 @@ def read_failures(run: Path) -> dict[UnitKey, bool]:
             with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=BAD):
                 unit = decoder.decode(line)
             if isinstance(unit, _UnitOutcome):
-                key, rank = UnitKey(unit.task, unit.id, unit.variant), (unit.attempt, unit.failure is None)
+                key, rank = UnitKey(unit.task, unit.id, unit.variant, unit.repeat), (unit.attempt, unit.failure is None)
                 latest[key] = max(latest.get(key, rank), rank)
     return {key: not succeeded for key, (_, succeeded) in latest.items()}
 

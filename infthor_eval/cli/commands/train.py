@@ -231,6 +231,7 @@ def _generate_data(scenes: SceneSettings, seed: int, out: Path, worker_settings:
         seed=seed,
         per_trajectory=_PER_TRAJECTORY,
         further=True,
+        by_subject=False,
         worker_settings=worker_settings,
         say=print_note,
     )

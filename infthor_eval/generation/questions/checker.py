@@ -46,8 +46,8 @@ class Checker:
     def verdict(self, question: Question) -> Verdict:
         """Check one question.
 
-        The clues of an absence question, for which no frame is evidence, count as minimal. For a mixed count, the
-        number of necessary clues must be the answer.
+        The clues of an absence question, for which no frame is evidence, count as minimal. For a further count, the
+        number of necessary clues must be the answer, and there must be others.
         """
         gold = sorted(str(item) for item in question.answers)
         clues = question.clues
@@ -59,7 +59,7 @@ class Checker:
         shown = [self._single[clue] for clue in clues]
         without_one = [[item for item in shown if item.frame != skipped] for skipped in clues]
         n_necessary = sum(not gives_gold(rest) for rest in without_one)
-        if (question.question_type or "").endswith("_mixed"):
+        if question.question_type == "movement_counting_further":
             minimal = [str(n_necessary)] == gold and n_necessary < len(clues)
         else:
             absence = question.text.startswith(("Is there any", "Have you seen")) and gold == ["no"]

@@ -95,11 +95,14 @@ def at_pickup(history: TrajectoryHistory) -> Iterator[Candidate]:
 def _loose_contents_question(
     history: TrajectoryHistory, asked: FormAndNames, event: Event, place: str
 ) -> Iterator[Candidate]:
-    """Yield a question on the contents of a receptacle right after an event that can be picked up."""
+    """Yield a question on the contents of a receptacle right after an event that can be picked up.
+
+    One of the clues shows the event: without it, nobody could tell that the others show what was there then.
+    """
     items = can_be_picked_up(history, event.frame, history.contents(event.frame, place))
-    if items is not None:
+    if items is not None and history.shows(event.frame, event.target):
         frames = _unchanged_frames(history, event.frame, place)
-        yield from _contents_question(history, FURTHER, asked, frames, place, items)
+        yield from _contents_question(history, FURTHER, asked, frames, place, items, shown_first=True)
 
 
 def _unchanged_frames(history: TrajectoryHistory, first: int, place: str) -> range:
@@ -116,15 +119,32 @@ def _contents_question(
     frames: range,
     place: str,
     items: frozenset[str],
+    *,
+    shown_first: bool = False,
 ) -> Iterator[Candidate]:
-    """Yield a question on objects in a receptacle, with the frames that show them there."""
+    """Yield a question on objects in a receptacle, with the frames that show them there.
+
+    Args:
+        history: the trajectory.
+        question_type: type of the question.
+        asked: its form, and the names in it.
+        frames: frames during which the contents are the same.
+        place: id of the receptacle.
+        items: ids of the objects.
+        shown_first: True if the first of the frames must be among the clues.
+    """
     shown = {
         frame: frozenset(key for key in items if history.shows_inside(frame, key))
         for frame in frames
         if history.shows(frame, place) and not _shows_similar_contents(history, frame, place)
     }
-    clues = minimal_cover(items, shown, lambda frame, keys: history.clarity(frame, *keys)) if items else None
+    if shown_first and frames[0] not in shown:
+        return
+    first = {frames[0]} if shown_first else set[int]()
+    missing = items.difference(*(shown[frame] for frame in first))
+    clues = minimal_cover(missing, shown, lambda frame, keys: history.clarity(frame, *keys)) if items else None
     if clues is not None:
+        clues = tuple(sorted(first.union(clues)))
         types = sorted(_whole_types(history, frames[0], items))
         yield from type_question(question_type, *asked, clues, types, (history.states(frames[0])[place].type,))
 

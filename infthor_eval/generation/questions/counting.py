@@ -1,10 +1,11 @@
 """Movement counting: how often something was moved; further forms count openings, puts and different objects.
 
-The clues of a count are one frame per counted event, so the number of clue frames alone gives the answer away. Some of
-the further questions therefore have additional frames without an event among their clues; these have a type of their
-own.
+The clues of Table 3's form are one frame per counted event, so the number of clue frames alone gives the answer away.
+The further questions therefore have frames without an event among their clues: 8 frames in all for answers up to 7, 16
+for answers up to 15, and so on.
 """
 
+import itertools
 import random
 from collections import defaultdict
 from collections.abc import Iterator
@@ -14,13 +15,11 @@ from infthor_eval.generation.questions.candidates import Candidate, further_type
 from infthor_eval.generation.questions.history import Event, ObjectMove, TrajectoryHistory
 from infthor_eval.household.wording import noun, with_article
 
-__all__ = ["FURTHER", "MIXED", "QUESTION_TYPE", "counts", "further_counts"]
+__all__ = ["FURTHER", "QUESTION_TYPE", "counts", "further_counts"]
 
 QUESTION_TYPE = "movement_counting"
 FURTHER = further_type(QUESTION_TYPE)
-MIXED = "movement_counting_mixed"
-_SHARE_MIXED = 0.5  # of the further questions
-_MAX_ADDED = 3  # frames without an event
+_FRAMES = 8  # of a further question whose answer is smaller
 
 
 def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -38,14 +37,16 @@ def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def further_counts(history: TrajectoryHistory, rng: random.Random) -> Iterator[Candidate]:
-    """Yield all other counts, some of them, chosen at random, with additional frames without an event."""
+    """Yield all other counts, with frames without an event, chosen at random, among their clues."""
     idle = sorted(set(range(1, len(history))) - {event.frame for event in history.events})
     for candidate in (*_openings(history), *_puts(history), *_items(history)):
-        if idle and rng.random() < _SHARE_MIXED:
-            added = rng.sample(idle, min(len(idle), rng.randint(1, _MAX_ADDED)))
-            yield replace(candidate, question_type=MIXED, clues=tuple(sorted({*candidate.clues, *added})))
-        else:
-            yield candidate
+        n_added = _number_of_frames(len(candidate.clues)) - len(candidate.clues)
+        if n_added <= len(idle):
+            yield replace(candidate, clues=tuple(sorted({*candidate.clues, *rng.sample(idle, n_added)})))
+
+
+def _number_of_frames(count: int) -> int:
+    return next(number for number in (_FRAMES << doublings for doublings in itertools.count()) if number > count)
 
 
 def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:

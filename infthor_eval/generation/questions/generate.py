@@ -5,7 +5,7 @@ The rules are those of the paper's Table 3; our further forms are optional and h
 
 import random
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,10 @@ from infthor_eval.generation.questions import (
 )
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.checker import Checker
+from infthor_eval.generation.questions.choosing import Chooser
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.generation.questions.published_words import in_published_words
+from infthor_eval.generation.questions.rooms import rooms_of
 from infthor_eval.workers import WorkerSettings, run_jobs
 
 __all__ = ["GeneratedQuestions", "candidates_of", "further_candidates_of", "generate_questions"]
@@ -76,6 +78,7 @@ def generate_questions(
     share: float = DEFAULT_SHARE,
     further: bool = False,
     published_words: bool = False,
+    by_subject: bool = True,
     worker_settings: WorkerSettings = _ONE_PROCESS,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedQuestions:
@@ -88,6 +91,8 @@ def generate_questions(
         share: share of the frame's pixels that an object must fill to count as shown.
         further: True to add our further forms, which have no published words.
         published_words: True for the same questions in the words of the published files.
+        by_subject: True to balance the answers on each object in each kind of room, too; False leaves more questions,
+            for training.
         worker_settings: number and place of the workers; they do not change the questions.
         say: called with messages about the workers.
 
@@ -109,15 +114,19 @@ def generate_questions(
         except DataError as error:
             result.skipped.append(str(error))
     result.trajectories = len(types)
-    vocabulary = frozenset[str]().union(*types.values())
-    rule_jobs = [_RuleJob(path, vocabulary, seed, share, further) for path in types]
+    rooms = {path: rooms_of(names) for path, names in types.items()}
+    vocabularies = {
+        kind: frozenset[str]().union(*(types[path] for path in types if rooms[path] == kind))
+        for kind in set(rooms.values())
+    }
+    rule_jobs = [_RuleJob(path, vocabularies[rooms[path]], seed, share, further) for path in types]
     candidates_by_path = _share_out(rule_jobs, worker_settings, say, result)
-    chooser = _Chooser()
+    chooser = Chooser(by_subject=by_subject)
     check_jobs, chosen_by_path = [], {}
     # Not shared out: the balance depends on what was chosen on all trajectories before.
     for path in [path for path in types if path in candidates_by_path]:
         candidates, rng = candidates_by_path[path]
-        chosen = chosen_by_path[path] = chooser.choose(candidates, per_trajectory, rng)
+        chosen = chosen_by_path[path] = chooser.choose(candidates, per_trajectory, rng, rooms[path])
         check_jobs.append(_CheckJob(path, tuple(item.question(path.name) for item in chosen), share))
     soundness = _share_out(check_jobs, worker_settings, say, result)
     for job in check_jobs:
@@ -211,7 +220,7 @@ def _trajectory_folders(folder: Path) -> list[Path]:
 def candidates_of(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
     """Return all questions of Table 3's forms on one trajectory.
 
-    Absence questions use the object types of the whole set, `vocabulary`, and random frames.
+    Absence questions use the object types of the set's rooms of the same kind, `vocabulary`, and random frames.
     """
     return [
         *presence.yes_questions(history),
@@ -228,7 +237,7 @@ def candidates_of(history: TrajectoryHistory, vocabulary: frozenset[str], rng: r
 
 
 def further_candidates_of(history: TrajectoryHistory, rng: random.Random) -> list[Candidate]:
-    """Return all questions of our further forms on one trajectory; some counting questions get random frames."""
+    """Return all questions of our further forms on one trajectory; counting questions get random frames."""
     return [
         *open_state.further_open_states(history),
         *location.further_locations(history),
@@ -237,61 +246,3 @@ def further_candidates_of(history: TrajectoryHistory, rng: random.Random) -> lis
         *put_action.further_puts(history),
         *counting.further_counts(history, rng),
     ]
-
-
-class _Chooser:
-    """Chooses questions so that types, forms, answers, numbers of clues and subjects are balanced over the set."""
-
-    def __init__(self) -> None:
-        self._types: Counter[str] = Counter()
-        self._groups: Counter[str] = Counter()
-        self._clues: Counter[int] = Counter()
-        self._answers: Counter[tuple[str, str]] = Counter()
-        self._subjects: Counter[tuple[str, str]] = Counter()
-
-    def choose(self, candidates: Iterable[Candidate], number: int, rng: random.Random) -> list[Candidate]:
-        remaining = list(candidates)
-        rng.shuffle(remaining)  # ties are broken by this order
-        chosen: list[Candidate] = []
-        # A limit per group: presence questions, which are always possible, must not fill up quiet trajectories.
-        limits = Counter({_group(item): max(2, number // 5) for item in remaining})
-        while len(chosen) < number:
-            eligible = [item for item in remaining if limits[_group(item)] and not self._is_unbalanced(item)]
-            if not eligible:
-                break
-            best = min(eligible, key=self._use)
-            remaining.remove(best)
-            limits[_group(best)] -= 1
-            chosen.append(best)
-            self._count(best)
-        return sorted(chosen, key=lambda item: (item.clues, item.text))
-
-    def _is_unbalanced(self, item: Candidate) -> bool:
-        """Return True if the answer is already more frequent than all other answers to the form together."""
-        if not item.is_closed:
-            return False
-        total = sum(count for (form, _), count in self._answers.items() if form == item.form)
-        return 2 * self._answers[item.form, str(item.answers[0])] > total
-
-    def _count(self, item: Candidate) -> None:
-        group = _group(item)
-        self._types[item.question_type] += 1
-        self._groups[group] += 1
-        self._clues[_clue_class(item)] += 1
-        self._subjects.update((group, subject) for subject in item.subjects)
-        if item.is_closed:
-            self._answers[item.form, str(item.answers[0])] += 1
-
-    def _use(self, item: Candidate) -> tuple[int, int, int, int]:
-        group = _group(item)
-        subjects = sum(self._subjects[group, subject] for subject in item.subjects)
-        return self._types[item.question_type], self._groups[group], self._clues[_clue_class(item)], subjects
-
-
-def _group(item: Candidate) -> str:
-    """Return the group that is balanced within a question type: yes, no, or other answers."""
-    return f"{item.question_type} {item.answers[0]}" if item.answers[0] in {"yes", "no"} else item.question_type
-
-
-def _clue_class(item: Candidate) -> int:
-    return min(len(item.clues), 3)

@@ -128,6 +128,12 @@ class TrajectoryHistory:
         return frozenset(canonical_type(state.type) for step in self.steps for state in step.changes.values())
 
     @cached_property
+    def types_in_frames(self) -> frozenset[str]:
+        """Types of all objects that a frame shows, however small."""
+        shown = ((self.states(frame), key) for frame in range(len(self)) for key in self.objects_in_frame(frame))
+        return frozenset(canonical_type(states[key].type) for states, key in shown if key in states)
+
+    @cached_property
     def has_rooms(self) -> bool:
         """True if the scene has several rooms; each has a floor object."""
         return sum(state.type == "Floor" for state in self.states(0).values()) > 1

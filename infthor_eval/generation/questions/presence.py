@@ -1,8 +1,9 @@
 """Object presence: "Is there any mug in this room?", "Have you seen a mug?"
 
 The clue of a yes-question is the first frame that shows such an object. A no-question names a type that the scene does
-not have and that is not easily mistaken for one that it has. The type is one of other trajectories in the set, so that
-its name does not give the answer away, or another of AI2-THOR's if there are few of these. No frame is evidence for an
+not have, or, in the second form, one that no frame shows, and that is not easily mistaken for one that is there. The
+type is one of other rooms of the same kind in the set, so that neither its name nor a look at the room gives the answer
+away, or another that is common in AI2-THOR's rooms of the kind if there are few of these. No frame is evidence for an
 absence, so its clue is a sampled frame. It has one, like a yes-question, or the number of frames would give the answer
 away.
 
@@ -10,16 +11,18 @@ In a house of several rooms "this room" would be ambiguous, so only the second f
 """
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.history import TrajectoryHistory
+from infthor_eval.generation.questions.rooms import rooms_of
 from infthor_eval.household.wording import noun, with_article
 
 __all__ = ["QUESTION_TYPE", "no_questions", "yes_questions"]
 
 QUESTION_TYPE = "object_presence"
-_FEW = 8  # with fewer types of other trajectories, AI2-THOR's are added
+_IN_ROOM, _SEEN = "Is there any {} in this room?", "Have you seen {}?"
+_FEW = 8  # with fewer types of other rooms, AI2-THOR's are added
 _BUSY = 3  # minimum number of objects in a sampled frame, if the trajectory has such frames
 
 # Never in questions: structures, parts, and types that people would not call by these names.
@@ -28,34 +31,62 @@ _UNASKED = frozenset(
     | {"Faucet", "ShowerHead", "ShowerGlass", "ShowerDoor", "Undefined", "Shelf", "ShelvingUnit", "Stool", "Curtains"}
     | {"Blinds", "ToiletPaperHanger", "TowelHolder", "HandTowelHolder", "TargetCircle", "Cart", "Desktop", "RoomDecor"}
 )
-_COMMON = frozenset(
-    {"AlarmClock", "Apple", "ArmChair", "BaseballBat", "BasketBall", "Bed", "Book", "Boots", "Bottle", "Bowl", "Box"}
-    | {"Bread", "Cabinet", "Candle", "CellPhone", "Chair", "Cloth", "CoffeeMachine", "CoffeeTable", "CounterTop", "CD"}
-    | {"CreditCard", "Cup", "Desk", "DeskLamp", "DiningTable", "DishSponge", "DogBed", "Drawer", "Dresser", "Dumbbell"}
-    | {"Egg", "FloorLamp", "Fork", "Fridge", "GarbageCan", "HousePlant", "Kettle", "KeyChain", "Knife", "Ladle"}
-    | {"Laptop", "Lettuce", "Microwave", "Mirror", "Mug", "Newspaper", "Ottoman", "Painting", "Pan", "Pencil"}
-    | {"PepperShaker", "Pillow", "Plate", "Plunger", "Pot", "Potato", "RemoteControl", "Safe", "SideTable", "Sink"}
-    | {"SoapBar", "SoapBottle", "Sofa", "Spatula", "SprayBottle", "Statue", "TeddyBear", "Television", "TennisRacket"}
-    | {"TissueBox", "Toaster", "Toilet", "ToiletPaper", "Tomato", "Towel", "TVStand", "VacuumCleaner", "Vase", "Watch"}
-    | {"WateringCan", "WineBottle"}
-)
+# Types in the rooms of each kind in AI2-THOR.
+_COMMON = {
+    "Kitchen": frozenset(
+        {"Apple", "Book", "Bottle", "Bowl", "Bread", "Cabinet", "CellPhone", "Chair", "CoffeeMachine", "CounterTop"}
+        | {"CreditCard", "Cup", "DiningTable", "DishSponge", "Drawer", "Egg", "Fork", "Fridge", "GarbageCan"}
+        | {"HousePlant", "Kettle", "Knife", "Ladle", "Lettuce", "Microwave", "Mug", "Pan", "Pencil", "PepperShaker"}
+        | {"Plate", "Pot", "Potato", "SaltShaker", "SideTable", "Sink", "SoapBottle", "Spatula", "Statue", "Toaster"}
+        | {"Tomato", "Vase", "WineBottle"}
+    ),
+    "LivingRoom": frozenset(
+        {"ArmChair", "Book", "Boots", "Bowl", "Box", "Candle", "CellPhone", "Chair", "CoffeeTable", "CreditCard"}
+        | {"Desk", "DeskLamp", "DiningTable", "DogBed", "Drawer", "Dresser", "FloorLamp", "GarbageCan", "HousePlant"}
+        | {"KeyChain", "Laptop", "Newspaper", "Ottoman", "Painting", "Pencil", "Pillow", "Plate", "RemoteControl"}
+        | {"Safe", "SideTable", "Sofa", "Statue", "Television", "TissueBox", "TVStand", "Vase", "Watch", "WateringCan"}
+    ),
+    "Bedroom": frozenset(
+        {"AlarmClock", "ArmChair", "BaseballBat", "BasketBall", "Bed", "Book", "Boots", "Bowl", "Box", "CD"}
+        | {"CellPhone", "Chair", "Cloth", "CreditCard", "Desk", "DeskLamp", "Drawer", "Dresser", "Dumbbell"}
+        | {"FloorLamp", "GarbageCan", "HousePlant", "KeyChain", "Laptop", "Mirror", "Mug", "Painting", "Pencil"}
+        | {"Pillow", "RemoteControl", "Safe", "SideTable", "Sofa", "Statue", "TeddyBear", "Television"}
+        | {"TennisRacket", "TissueBox", "VacuumCleaner", "Vase", "Watch"}
+    ),
+    "Bathroom": frozenset(
+        {"Cabinet", "Candle", "Cloth", "CounterTop", "DishSponge", "Drawer", "GarbageCan", "HousePlant", "Mirror"}
+        | {"Painting", "Plunger", "SideTable", "Sink", "SoapBar", "SoapBottle", "SprayBottle", "TissueBox", "Toilet"}
+        | {"ToiletPaper", "Towel"}
+    ),
+}
 _SIMILAR_TYPES = (
-    {"Cup", "Mug", "Bowl", "Vase"},
+    {"Cup", "Mug", "Vase"},
+    {"Cup", "Bowl"},
     {"Pen", "Pencil"},
-    {"Knife", "ButterKnife", "Fork", "Spoon", "Spatula", "Ladle"},
-    {"Bottle", "WineBottle", "SoapBottle", "SprayBottle", "Vase"},
-    {"Sofa", "ArmChair", "Ottoman", "Chair", "Footstool"},
+    {"Knife", "ButterKnife"},
+    {"Fork", "Spoon"},
+    {"Spoon", "Spatula", "Ladle"},
+    {"Bottle", "WineBottle", "SoapBottle", "SprayBottle"},
+    {"Bottle", "Vase"},
+    {"Sofa", "ArmChair"},
+    {"ArmChair", "Chair"},
+    {"Ottoman", "Footstool"},
     {"Desk", "DiningTable", "CoffeeTable", "SideTable", "CounterTop", "TVStand"},
-    {"Drawer", "Dresser", "Cabinet", "Safe"},
+    {"Drawer", "Dresser", "Cabinet"},
     {"Towel", "HandTowel", "Cloth"},
-    {"Pot", "Pan", "Kettle"},
+    {"Pot", "Pan"},
+    {"Pot", "Kettle"},
     {"DeskLamp", "FloorLamp"},
-    {"Apple", "Tomato", "Potato", "Egg"},
+    {"Apple", "Tomato"},
+    {"Potato", "Egg"},
+    {"Apple", "Potato"},
     {"SaltShaker", "PepperShaker"},
     {"Television", "Laptop"},
-    {"Book", "Newspaper", "Painting", "Poster", "Box"},
-    {"CellPhone", "RemoteControl", "CreditCard"},
-    {"ToiletPaper", "PaperTowelRoll", "TissueBox"},
+    {"Book", "Newspaper"},
+    {"Painting", "Poster"},
+    {"CellPhone", "RemoteControl"},
+    {"CellPhone", "CreditCard"},
+    {"ToiletPaper", "PaperTowelRoll"},
     {"SoapBar", "DishSponge"},
     {"Plunger", "ScrubBrush"},
     {"BasketBall", "Apple"},
@@ -72,31 +103,40 @@ def yes_questions(history: TrajectoryHistory) -> Iterator[Candidate]:
                 first.setdefault(states[key].type, frame)
     for object_type, frame in sorted(first.items()):
         if _is_nameable(object_type):
-            yield from _all_forms(history, object_type, frame, "yes")
+            yield from _questions(_forms(history), object_type, frame, "yes")
 
 
 def no_questions(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
-    """Yield no-questions with random frames on types of the whole set, `vocabulary`, that the scene does not have."""
+    """Yield no-questions with random frames on types of `vocabulary` that the scene does not have."""
     frames = [frame for frame in range(len(history)) if _is_busy(history, frame)] or [0]
-    types = _absent_types(history, vocabulary)
-    if len(types) < _FEW:
-        types |= _absent_types(history, _COMMON)
-    for object_type in sorted(types):
-        yield from _all_forms(history, object_type, rng.choice(frames), "no")
+    absent = _other_types(history, vocabulary, history.all_object_types)
+    for object_type in sorted(absent | _other_types(history, vocabulary, history.types_in_frames)):
+        forms = _forms(history) if object_type in absent else (_SEEN,)
+        yield from _questions(forms, object_type, rng.choice(frames), "no")
 
 
-def _all_forms(history: TrajectoryHistory, object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
-    """Yield the question in the forms that suit the scene."""
+def _forms(history: TrajectoryHistory) -> tuple[str, ...]:
+    """Return the forms that suit the scene."""
+    return (_SEEN,) if history.has_rooms else (_IN_ROOM, _SEEN)
+
+
+def _questions(forms: Iterable[str], object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
     words = noun(object_type)
-    room_form = () if history.has_rooms else (("Is there any {} in this room?", words),)
-    for form, name in (*room_form, ("Have you seen {}?", with_article(words))):
+    for form in forms:
+        name = with_article(words) if form == _SEEN else words
         yield Candidate(QUESTION_TYPE, form, (name,), (frame,), (answer,), (object_type,), absence=answer == "no")
 
 
-def _absent_types(history: TrajectoryHistory, vocabulary: frozenset[str]) -> set[str]:
-    existing = history.all_object_types
-    similar = set().union(*(group for group in _SIMILAR_TYPES if group & existing))
-    return {object_type for object_type in vocabulary - existing - similar if _is_nameable(object_type)}
+def _other_types(history: TrajectoryHistory, vocabulary: frozenset[str], there: frozenset[str]) -> set[str]:
+    """Return the types of the vocabulary that are not there, nor like one that is; more if these are few."""
+    similar = {name for group in _SIMILAR_TYPES if group & there for name in group}
+    rooms = rooms_of(history.all_object_types).split(", ")
+    common = frozenset[str]().union(*(_COMMON[room] for room in rooms)) - history.all_object_types
+    own, others = (
+        {object_type for object_type in types - there - similar if _is_nameable(object_type)}
+        for types in (vocabulary, common)
+    )
+    return own if len(own) >= _FEW else own | others
 
 
 def _is_busy(history: TrajectoryHistory, frame: int) -> bool:

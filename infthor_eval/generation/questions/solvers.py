@@ -25,6 +25,7 @@ class FrameFacts:
         action: name of the successful action before it, or empty.
         target: id of the object acted on.
         objects: states of the known objects by id.
+        in_frame: ids of all objects in the frame, however small.
         everything: True if `objects` has all objects, False if only those in the frame.
         loose: types that can be picked up, which is general knowledge and not restricted to the frame.
     """
@@ -33,6 +34,7 @@ class FrameFacts:
     action: str
     target: str | None
     objects: dict[str, ObjectState]
+    in_frame: frozenset[str]
     everything: bool
     loose: frozenset[str]
 
@@ -49,7 +51,9 @@ def frame_facts(steps: Sequence[Step], share: float, frames: Container[int] | No
             large = {key for key, seen in (step.seen or {}).items() if seen.pixels >= share * _FRAME_PIXELS}
             objects = {key: state for key, state in objects.items() if key in large}
         action = (step.action or "").split(" ")[0] if step.success else ""
-        facts.append(FrameFacts(step.img_idx, action, step.target, objects, frames is None, loose))
+        facts.append(
+            FrameFacts(step.img_idx, action, step.target, objects, frozenset(step.seen or {}), frames is None, loose)
+        )
     return facts
 
 
@@ -149,8 +153,13 @@ def _track(facts: Sequence[FrameFacts], words: str) -> list[tuple[FrameFacts, st
 
 
 def _presence(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    words = re.sub(r"^an? ", "", words)
     return ["yes" if any(_is(state, words) for item in facts for state in item.objects.values()) else "no"]
+
+
+def _seen(facts: Sequence[FrameFacts], words: str) -> list[str]:
+    words = re.sub(r"^an? ", "", words)
+    shown = (item.objects[key] for item in facts for key in item.in_frame & item.objects.keys())
+    return ["yes" if any(_is(state, words) for state in shown) else "no"]
 
 
 def _before(facts: Sequence[FrameFacts], words: str, first: str | None) -> list[str]:
@@ -261,12 +270,19 @@ def _at_slicing(facts: Sequence[FrameFacts], _preposition: str, place: str, item
 
 
 def _at_opening(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    chosen = _events(facts, "OpenObject", place)[:1] if facts[0].everything else facts
-    return _all_contents([_only_loose(item) for item in chosen], "", place)
+    events = _events(facts, "OpenObject", place)
+    if not events:
+        return []  # nothing shows when that was
+    since = events[:1] if facts[0].everything else [item for item in facts if item.frame >= events[0].frame]
+    return _all_contents([_only_loose(item) for item in since], "", place)
 
 
 def _left_at_pickup(facts: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
-    return _left_at([_only_loose(glimpse) for glimpse in facts], "PickupObject", place, item)
+    events = _events(facts, "PickupObject", item)
+    if len(events) != 1:
+        return []  # nothing shows when that was, or it was not once
+    since = [glimpse for glimpse in facts if facts[0].everything or glimpse.frame >= events[0].frame]
+    return _left_at([_only_loose(glimpse) for glimpse in since], "PickupObject", place, item)
 
 
 def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) -> list[str]:
@@ -345,7 +361,7 @@ def _n_picked_up(facts: Sequence[FrameFacts]) -> list[str]:
 
 _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Is there any (.+) in this room\?", _presence),
-    (r"Have you seen (.+)\?", _presence),
+    (r"Have you seen (.+)\?", _seen),
     (r"Was the (.+) open\?", _ever_open),
     (r"Where was the (.+) before you put it to the (.+)\?", _before_put),
     (r"Where did you move the (.+) from the (.+)\?", _moved_from),

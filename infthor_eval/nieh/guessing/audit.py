@@ -59,6 +59,14 @@ class Group:
         yes, no = (self.answers[answer] for answer in _YES_NO)
         return yes / (yes + no) if yes + no else None
 
+    @property
+    def chance(self) -> float:
+        """Mean over the questions of one over the number of answers that their form has here."""
+        answers: dict[str, set[str]] = {}
+        for item in self.questions:
+            answers.setdefault(form_of(item.question), set()).add(doc_target(item.question).lower())
+        return sum(1 / len(answers[form_of(item.question)]) for item in self.questions) / len(self.questions)
+
     def means(self) -> tuple[float, ...]:
         """Return the mean score of each guesser."""
         columns = zip(*(item.scores for item in self.questions), strict=True)

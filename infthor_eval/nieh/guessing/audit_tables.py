@@ -37,7 +37,7 @@ def guessers_table(questions: Sequence[AuditedQuestion]) -> Table:
 def audit_tables(questions: Sequence[AuditedQuestion]) -> list[Table]:
     """Return a table for each way to group the questions."""
     tables = []
-    numbers = ("questions", "answers", "entropy, bits", "yes, %", "best guess, %")
+    numbers = ("questions", "answers", "entropy, bits", "yes, %", "chance, %", "best guess, %")
     for by, head in _HEADS.items():
         rows = []
         for group in groups(questions, by):
@@ -48,6 +48,7 @@ def audit_tables(questions: Sequence[AuditedQuestion]) -> list[Table]:
                 str(len(group.answers)),
                 f"{group.entropy:.2f}",
                 "-" if yes is None else f"{100 * yes:.1f}",
+                f"{100 * group.chance:.1f}",
                 f"{100 * mean:.1f}",
                 best,
             )

@@ -9,7 +9,7 @@ _LEADING_WORDS = 2
 
 
 def form_of(question: Question) -> str:
-    """Return its form of Table 3 ("Is {} in/on {}?"), or what `question_type` returns if it has none of these."""
+    """Return its form ("Is {} in/on {}?"), or what `question_type` returns if it has none of these."""
     form = find_form(question.text)
     return question_type(question) if form is None else form.words
 

@@ -53,7 +53,7 @@ def _sample(
         suite=runs[0].suite.name,
         task=key.task,
         id=key.id,
-        variant=key.variant,
+        variant=" ".join(filter(None, (key.variant, f"answer {key.repeat}" if key.repeat > 1 else ""))),
         cluster=first.cluster,
         results=tuple(results),
         timeline=timelines.get(key),

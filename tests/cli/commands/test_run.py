@@ -141,11 +141,14 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nie
     assert "letters is not averaged (aggregation: mean); use lm-eval" in err
 
 
-def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_path):
+@pytest.mark.parametrize("repeats", [1, 3])
+def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_path, repeats):
     data = make_nieh_set(MANY)
+    n_answers = 2 * repeats * len(MANY)
 
     def start(output):
         arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh", "--data", data, "--output", output]
+        arguments += ["--repeats", repeats]
         code = "from infthor_eval.cli import main; main()"
         return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
 
@@ -155,12 +158,12 @@ def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     n_before = only(tmp_path / "killed", "worker-0.jsonl").read_bytes().count(b"\n") - 1
-    assert 0 < n_before < 2 * len(MANY)
+    assert 0 < n_before < n_answers
 
     again = start(tmp_path / "killed")
     _, said = again.communicate(timeout=PATIENCE_S)
     assert again.returncode == 0, said
-    assert f"{2 * len(MANY) - n_before} evaluated now, {n_before} resumed" in said
+    assert f"{n_answers - n_before} evaluated now, {n_before} resumed" in said
     whole = start(tmp_path / "whole")
     assert whole.communicate(timeout=PATIENCE_S) and whole.returncode == 0
 

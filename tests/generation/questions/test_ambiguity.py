@@ -4,9 +4,11 @@ import random
 
 import pytest
 
+from infthor_eval.formats.question import Question
 from infthor_eval.generation.questions import contents, counting, final_state, location, open_state, presence
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
+from infthor_eval.generation.questions.rooms import rooms_of
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.recorder import Recorder
 from infthor_eval.thor.simulator import Simulator
@@ -130,6 +132,39 @@ def test_no_room_is_meant_in_a_house_of_several():
         asked = [*presence.yes_questions(log), *presence.no_questions(log, frozenset({"Toaster"}), random.Random(0))]
         assert {" ".join(candidate.text.split()[:3]) for candidate in asked} == forms
         assert {candidate.answers for candidate in asked} == {("yes",), ("no",)}
+
+
+def test_what_no_frame_shows_was_not_seen_but_is_in_the_room():
+    log = history({**PLACES, MUG: state(MUG, FRIDGE)}, ("LookUp", None, None, {}))
+    for step in log.steps:
+        del step.seen[MUG]
+    log = TrajectoryHistory("made", log.steps)
+    asked = list(presence.no_questions(log, frozenset({"Mug", "Toaster"}), random.Random(0)))
+    texts_on_mugs = {candidate.text for candidate in asked if candidate.subjects == ("Mug",)}
+    assert texts_on_mugs == {"Have you seen a mug?"}
+    checker = Checker(log.steps, DEFAULT_SHARE)
+    assert all(checker.verdict(candidate.question("made")).sound for candidate in asked)
+    assert not checker.verdict(Question("made", "Is there any mug in this room?", (0,), ("no",))).right
+
+
+def test_absences_are_of_what_rooms_of_the_kind_have():
+    bathroom = history({"Toilet|1": state("Toilet|1"), "Sink|1": state("Sink|1")})
+    asked = {item.subjects[0] for item in presence.no_questions(bathroom, frozenset(), random.Random(0))}
+    assert "Plunger" in asked and not asked & {"Toaster", "Bed", "Toilet"}
+
+
+@pytest.mark.parametrize(
+    ("types", "rooms"),
+    [
+        ({"Toilet", "Sink"}, "Bathroom"),
+        ({"Bed", "Sofa"}, "Bedroom"),
+        ({"Fridge"}, "Kitchen"),
+        ({"Television"}, "LivingRoom"),
+        ({"Fridge", "Bed", "Toilet", "Sofa"}, "Kitchen, Bedroom, Bathroom, LivingRoom"),
+    ],
+)
+def test_rooms_are_told_by_what_stands_in_them(types, rooms):
+    assert rooms_of(types) == rooms
 
 
 def test_the_rules_know_a_house_by_its_floors():

@@ -33,7 +33,6 @@ FURTHER_TYPES = {
     "container_content_further",
     "location_tracing_further",
     "movement_counting_further",
-    "movement_counting_mixed",
     "open_state_further",
     "put_action_further",
 }
@@ -78,7 +77,7 @@ def replayed(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def everything(replayed):
-    return generate_questions(replayed, per_trajectory=1000, further=True)
+    return generate_questions(replayed, per_trajectory=1000, further=True, by_subject=False)
 
 
 def test_the_checker_agrees_with_every_question(everything):
@@ -88,7 +87,7 @@ def test_the_checker_agrees_with_every_question(everything):
 
 
 def test_without_further_forms_all_are_in_the_words_of_table_3(replayed, everything):
-    asked = generate_questions(replayed, per_trajectory=1000).questions
+    asked = generate_questions(replayed, per_trajectory=1000, by_subject=False).questions
     assert QUESTION_TYPES - RARE <= {question.question_type for question in asked} <= QUESTION_TYPES
     for question in asked:
         forms = TABLE_3[question.question_type]
@@ -108,9 +107,26 @@ def test_what_was_moved_once_is_not_counted(everything):
     assert counted and all(int(question.answers[0]) == len(question.clues) > 1 for question in counted)
 
 
-def test_the_number_of_frames_tells_nothing_where_counts_are_mixed(everything):
-    mixed = [question for question in everything.questions if question.question_type == "movement_counting_mixed"]
-    assert mixed and all(int(question.answers[0]) < len(question.clues) for question in mixed)
+def test_the_number_of_frames_tells_nothing_about_further_counts(everything):
+    counted = [question for question in everything.questions if question.question_type == "movement_counting_further"]
+    assert len({question.answers for question in counted if len(question.clues) == 8}) > 2
+    for question in counted:
+        count, number = int(question.answers[0]), len(question.clues)
+        assert count < number and (number == 8 or (number % 8 == 0 and count >= number / 2)), question
+
+
+def test_a_frame_shows_the_moment_that_a_question_asks_about(everything, replayed):
+    logs = {folder.name: read_steps(folder) for folder in (replayed / "metadata").iterdir()}
+    verbs = {"first opened": "OpenObject", "picked up": "PickupObject", "put": "PutObject", "sliced": "SliceObject"}
+    verbs["turned on"] = "ToggleObjectOn"
+    asked = [question for question in everything.questions if " when you " in question.text]
+    asked = [question for question in asked if question.question_type.endswith("_further")]
+    assert len({question.question_type for question in asked}) == 2
+    for question in asked:
+        moment = question.text.partition(" when you ")[2]
+        action = next(action for words, action in verbs.items() if moment.startswith(words))
+        steps = [logs[question.traj_id][clue] for clue in question.clues]
+        assert [step for step in steps if step.success and (step.action or "").startswith(action)], question
 
 
 def test_gold_answers_score_full_marks(everything):
@@ -124,7 +140,7 @@ def test_the_checker_notices_what_is_wrong(everything, replayed):
     checkers = {folder.name: Checker(read_steps(folder), DEFAULT_SHARE) for folder in (replayed / "metadata").iterdir()}
     presence = [question for question in everything.questions if question.question_type != "object_presence"]
     for question in presence:
-        if question.question_type == "movement_counting_mixed":
+        if question.question_type == "movement_counting_further":
             continue  # one frame more or less without an occasion does no harm
         checker = checkers[question.traj_id]
         assert not checker.verdict(replace(question, answers=("teapot",))).right
@@ -142,6 +158,7 @@ def test_choice_is_balanced_and_seeded(replayed):
     no = [question for question in made[0].questions if question.answers == ("no",)]
     assert abs(len(yes) - len(no)) <= 5
     assert set(made[0].by_type()) >= QUESTION_TYPES - RARE
+    assert len(made[0].questions) < len(generate_questions(replayed, by_subject=False).questions)
 
 
 def test_absences_are_flagged_and_look_like_presences(everything):
@@ -152,7 +169,7 @@ def test_absences_are_flagged_and_look_like_presences(everything):
     assert {len(question.clues) for question in presence} == {1}
 
 
-def test_no_answer_follows_from_the_form_of_a_question(replayed):
+def test_no_answer_follows_from_the_form_or_the_object_of_a_question(replayed):
     made = generate_questions(replayed, per_trajectory=60, further=True)
     answers = defaultdict(Counter)
     for question in made.questions:
@@ -162,6 +179,13 @@ def test_no_answer_follows_from_the_form_of_a_question(replayed):
     for form, counts in answers.items():
         most = counts.most_common(1)[0][1]
         assert most <= counts.total() - most + 1, (form, counts)
+    on_object = defaultdict(Counter)
+    for question in made.questions:
+        if question.question_type == "object_presence":  # both trajectories are in a kitchen
+            on_object[re.sub(r"Is there any|Have you seen an?|in this room|\W", "", question.text)][
+                question.answers
+            ] += 1
+    assert on_object and all(abs(counts["yes",] - counts["no",]) <= 1 for counts in on_object.values())
 
 
 def _form(text):
