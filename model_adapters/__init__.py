@@ -36,6 +36,7 @@ from model_adapters.registry import (
     options,
 )
 from model_adapters.stopping import cut_at_stop
+from model_adapters.thinking import Thought, answer_of
 from model_adapters.transcript import Transcript
 
 __all__ = [
@@ -56,10 +57,12 @@ __all__ = [
     "Reply",
     "Role",
     "Subject",
+    "Thought",
     "Transcript",
     "Turn",
     "Video",
     "adapter_identity",
+    "answer_of",
     "check_adapter",
     "check_decoding",
     "check_options",

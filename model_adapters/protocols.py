@@ -109,6 +109,8 @@ class Reply:
             string, all up to the token that completed it.
         faults: faults that were recovered from by a retry, a line each.
         cost: cost of the reply in US dollars, or None if it is free or its price unknown.
+        thinking: what the model thought before the reply, if it is told apart from the text; thoughts between markers
+            in the text are told from the answer where the reply is read (`model_adapters.thinking`).
     """
 
     text: str
@@ -118,6 +120,7 @@ class Reply:
     token_ids: tuple[int, ...] | None = None
     faults: tuple[str, ...] = ()
     cost: float | None = None
+    thinking: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

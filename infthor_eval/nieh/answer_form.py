@@ -53,12 +53,13 @@ def format_failures(records: Sequence[Record], max_new_tokens: int | None) -> di
 def _failures(record: Record, said: str, max_new_tokens: int | None) -> list[str]:
     gold, reasons = _gold(record), []
     if not said:
-        reasons.append("empty")
+        reasons.append("empty" if record.payload.thinking is None else "cut off while thinking")
     elif gold in ({"yes"}, {"no"}) and says_yes_or_no(said) is None:
         reasons.append("neither yes nor no")
     elif len(gold) == 1 and says_number(next(iter(gold))) and not says_number(said):
         reasons.append("no number")
-    if max_new_tokens is not None and (record.tokens.reply or 0) >= max_new_tokens:
+    is_cut_thinking = not said and record.payload.thinking is not None
+    if not is_cut_thinking and max_new_tokens is not None and (record.tokens.reply or 0) >= max_new_tokens:
         reasons.append("cut off at the token limit")
     return reasons
 

@@ -28,7 +28,7 @@ from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
-from model_adapters import Decoding, Model, Part, Reply, wrap_request_errors
+from model_adapters import Decoding, Model, Part, Reply, answer_of, wrap_request_errors
 
 __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "answer_units"]
 
@@ -74,13 +74,15 @@ class _UnitRequest:
     ) -> UnitRecord[NiehAnswer]:
         """Return the record of a reply; a failed one, with the reply, if the task's own metrics fail on it."""
         scores, failure = {}, None
+        thinking, answer = answer_of(reply)
+        answer = self.prepared.cut(answer)
         try:
-            scores = self.prepared.metrics.scores(self.prepared.task_samples, self.unit.sample, reply.text)
+            scores = self.prepared.metrics.scores(self.prepared.task_samples, self.unit.sample, answer)
         except MetricError as error:
             failure = session.describe_failure(self.unit, error)
         return self.unit.record(
             self.fingerprint,
-            self.unit.payload.with_reply(reply.text, scores),
+            self.unit.payload.with_reply(answer, scores, thinking),
             failure=failure,
             faults=(*faults, *reply.faults),
             seconds=round(seconds, 4),

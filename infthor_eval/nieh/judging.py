@@ -28,6 +28,7 @@ from model_adapters import (
     Decoding,
     Model,
     adapter_identity,
+    answer_of,
     check_options,
     is_known,
     label,
@@ -154,7 +155,7 @@ class Judge:
             answers=payload.answers,
             reply=said,
             said=reply.text,
-            verdict=says_yes_or_no(reply.text),
+            verdict=says_yes_or_no(answer_of(reply).answer),
             judge=self._identity,
             seconds=round(time.perf_counter() - start, 4),
         )

@@ -7,7 +7,7 @@ from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.nieh.records import NiehAnswer, NiehNote
 from infthor_eval.runs import Session, Usage
-from model_adapters import Decoding, Model, wrap_request_errors
+from model_adapters import Decoding, Model, answer_of, wrap_request_errors
 
 __all__ = ["Notebook"]
 
@@ -44,7 +44,7 @@ class Notebook:
             self._conversation.append(*parts)
             reply = self._conversation.reply(decoding)
         note = NiehNote(
-            note=reply.text,
+            note=answer_of(reply).answer,
             n_frames=sum(isinstance(part, FrameRef) for part in parts),
             n_context_tokens=reply.n_context_tokens,
             n_reply_tokens=reply.n_reply_tokens,

@@ -26,6 +26,8 @@ class NiehOptions:
         memory_args: its options, "k=v,k=v".
         budget: most tokens of what it recalls ("4k" is 4,000); None for the memory's own limit.
         repeats: times that each question is asked, with the seeds from the run's on.
+        max_thinking_tokens: tokens for what a model thinks before its answer, beside the task's own tokens; None for no
+            further ones.
         temperature: temperature of drawn replies; None for the tasks' own, or 1 where a greedy task is repeated.
     """
 
@@ -102,8 +104,15 @@ class NiehOptions:
         },
     )
 
+    max_thinking_tokens: int | None = field(
+        default=None,
+        metadata={"help": "Tokens for what a model thinks, beside those of its answer.", "metavar": "N"},
+    )
+
     def __post_init__(self) -> None:
         """Raise UsageError if a value is not valid."""
+        if self.max_thinking_tokens is not None and self.max_thinking_tokens < 1:
+            raise UsageError(f"--max-thinking-tokens {self.max_thinking_tokens}: give 1 or more, or leave it out")
         if self.repeats < 1:
             raise UsageError(f"--repeats {self.repeats}: a question is asked once at least")
         if self.temperature is not None and not 0 < self.temperature < float("inf"):

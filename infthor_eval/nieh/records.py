@@ -68,6 +68,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
         recall: what a memory recalled; None where the context has no memory.
         reply: the reply; None if the model failed.
         scores: scores of the reply by metric; empty if there is none.
+        thinking: what the model thought before the reply, which is empty if it was cut off there; None if it did not.
     """
 
     question: str
@@ -81,6 +82,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     recall: NiehRecall | None = None
     reply: str | None = None
     scores: dict[str, float] = {}
+    thinking: str | None = None
 
     @classmethod
     def of(cls, question: Question, guess: Guess | None = None, shown_clues: ShownClues | None = None) -> "NiehAnswer":
@@ -96,9 +98,9 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
             shown_clues=shown_clues,
         )
 
-    def with_reply(self, reply: str, scores: dict[str, float]) -> "NiehAnswer":
-        """Return the same question with a reply."""
-        return msgspec.structs.replace(self, reply=reply, scores=scores)
+    def with_reply(self, reply: str, scores: dict[str, float], thinking: str | None = None) -> "NiehAnswer":
+        """Return the same question with a reply, and what the model thought before it."""
+        return msgspec.structs.replace(self, reply=reply, scores=scores, thinking=thinking)
 
 
 class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_note"):

@@ -126,6 +126,9 @@ class TaskSummary(msgspec.Struct, frozen=True):
         by_length: cells by thousand tokens of the context ("32-64").
         above_guessing: the share of what cannot be guessed that the replies got, by scorer.
         format_failures: number of replies that are not of the form asked for, by reason.
+        n_thought: number of replies behind thoughts.
+        tokens_per_right: tokens of all replies, thoughts included, for each right answer under the main metric; None
+            if none is right or the model counts no tokens.
         below_full_marks: samples with a score below 1, by metric.
         scores: scores by metric and trajectory, in the order of the samples' keys, by which runs are paired.
         memory: the memory that recalled what was shown; None if there is none.
@@ -145,6 +148,8 @@ class TaskSummary(msgspec.Struct, frozen=True):
     skipped: SkippedSummary
     yes_no: YesNo
     format_failures: dict[str, int]
+    n_thought: int
+    tokens_per_right: float | None
     below_full_marks: dict[str, list[str]]
     scores: dict[str, dict[str, list[float]]]
     failures: list[Failure]
@@ -219,6 +224,8 @@ def _task(replies: Sequence[Record], about: Mapping[str, Any], config: Mapping[s
         skipped=_summarise_skipped(records, metrics, about["skipped"]),
         yes_no=yes_no(replies),
         format_failures=format_failures(replies, about["decoding"]["max_new_tokens"]),
+        n_thought=sum(record.payload.thinking is not None for record in replies),
+        tokens_per_right=_tokens_per_right(replies, _main_metric(metrics)),
         below_full_marks={
             name: [str(record.key) for record in records if _score(record, name) < 1.0] for name in metrics
         },
@@ -226,6 +233,12 @@ def _task(replies: Sequence[Record], about: Mapping[str, Any], config: Mapping[s
         failures=[Failure(str(record.key), record.failure) for record in replies if record.failure is not None],
         memory=summarise_memory(config, about, records),
     )
+
+
+def _tokens_per_right(replies: Sequence[Record], metric: str) -> float | None:
+    counts = [record.tokens.reply for record in replies if record.tokens.reply is not None]
+    right = math.fsum(_score(record, metric) for record in replies)
+    return sum(counts) / right if counts and right else None
 
 
 def _score(record: Record, metric: str) -> float:

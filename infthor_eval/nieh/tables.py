@@ -272,15 +272,19 @@ def _depth_table(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _replies_table(runs: Sequence[RunSummary]) -> Table:
-    """Return the bias to yes, and the replies that are no answer: a row per run and task."""
-    numbers = ("yes/no questions", "gold yes, %", "said yes, %")
+    """Return the bias to yes, the length of replies, and those that are no answer: a row per run and task."""
+    thought = any(task.n_thought for _, _, task in _tasks(runs))
+    numbers = ["yes/no questions", "gold yes, %", "said yes, %", "tokens per right answer"]
+    numbers += ["with thoughts"] if thought else []
     rows = []
     for run, name, task in _tasks(runs):
         if not task.n:
             continue
+        tokens = "-" if task.tokens_per_right is None else f"{task.tokens_per_right:.1f}"
+        further = [tokens, str(task.n_thought)] if thought else [tokens]
         both = (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)
         shares = ["-" if share is None else f"{100 * share:.1f}" for share in both]
         said = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
-        rows.append(Row((run, name, str(task.yes_no.n), *shares, said)))
+        rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, said)))
     columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
     return Table("Form of the replies", columns, tuple(rows))

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,7 @@ from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
-from model_adapters import Decoding
+from model_adapters import Decoding, cut_at_stop
 
 __all__ = ["NiehTask", "PreparedTask"]
 
@@ -26,12 +26,22 @@ _NEEDED = ("custom_dataset", "dataset_kwargs", "doc_to_text", "generation_kwargs
 
 @dataclass(frozen=True)
 class PreparedTask:
-    """A task with all that turns its samples into records; `generation_kwargs` are the decoding in lm-eval's words."""
+    """A task with all that turns its samples into records; `generation_kwargs` are the decoding in lm-eval's words.
+
+    Attributes:
+        stop: strings that end an answer behind thoughts; the decoding's own would end the thoughts.
+    """
 
     task_samples: TaskSamples
     decoding: Decoding
     generation_kwargs: Mapping[str, Any]
     metrics: Metrics = PUBLISHED
+    stop: tuple[str, ...] = ()
+
+    def cut(self, answer: str) -> str:
+        """Return an answer before its first stop string."""
+        before = cut_at_stop(answer, self.stop)
+        return answer if before is None else before
 
 
 class NiehTask:
@@ -59,6 +69,7 @@ class NiehTask:
         self._config: dict[str, Any] = _run_settings(request) | file.settings["dataset_kwargs"]
         self._generation_kwargs = _drawn(file.settings["generation_kwargs"], request.options)
         self.decoding: Decoding = decoding_of(self._generation_kwargs, request.seed, str(file.path))
+        self._max_thinking_tokens = request.options.max_thinking_tokens
         self.metrics: Metrics = metrics_of(file)
         self.data: NiehSet = find_set(**self._config)
         # A budget of a memory is in tokens, too.
@@ -78,7 +89,12 @@ class NiehTask:
         samples = self.task_samples
         if samples is None:
             samples = find_samples(self._config | {"tokens_per_frame": tokens_per_frame}, self._limit)
-        return PreparedTask(samples, self.decoding, self._generation_kwargs, self.metrics)
+        if self._max_thinking_tokens is None:
+            return PreparedTask(samples, self.decoding, self._generation_kwargs, self.metrics)
+        n_tokens = self.decoding.max_new_tokens + self._max_thinking_tokens
+        decoding = replace(self.decoding, max_new_tokens=n_tokens, stop=())
+        settings = {**self._generation_kwargs, "max_gen_toks": n_tokens}
+        return PreparedTask(samples, decoding, settings, self.metrics, self.decoding.stop)
 
     def answer_key(self, prepared: PreparedTask, tokens_per_frame: int | None) -> Sequence[Sample]:
         """Return the samples without a limit: the answer key that a baseline is fitted to."""

@@ -15,7 +15,7 @@ from infthor_eval.plans.final_protocol import FinalForm, present_parts, with_rec
 from infthor_eval.plans.past import History
 from infthor_eval.plans.segments import Part
 from infthor_eval.thor.actions import applicable_actions
-from model_adapters import Decoding, Model, wrap_request_errors
+from model_adapters import Decoding, Model, answer_of, wrap_request_errors
 
 __all__ = ["AgentConfig", "ModelActor"]
 
@@ -83,7 +83,7 @@ class ModelActor:
             self._restart([*self._given, *present_parts(self._present_frame())])
         with wrap_request_errors(self._model.name):
             reply = self._conversation.reply(decoding)
-        return Act(reply.text, reply)
+        return Act(answer_of(reply).answer, reply)
 
     def observe(self, outcome: StepOutcome) -> None:
         """See `PlanActor`; the action is appended as it was understood, not as the model wrote it."""

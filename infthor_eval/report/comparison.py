@@ -123,9 +123,9 @@ def _drawing(scores: Sequence[tuple[Sequence[float], Sequence[float]]]) -> float
 
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
     """Return a table with a row per task and metric, each in its own unit; `first` and `second` name the runs."""
-    numbers = ("first", "second", "difference", "95 % interval", "p", "samples", "only in one")
     repeated = any(comparison.drawing is not None for comparison in comparisons)
-    numbers = (*numbers, "drawing") if repeated else numbers
+    numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "only in one"]
+    numbers += ["drawing"] if repeated else []
     notes = ("drawing: what the difference moves by if both are asked the same again (95 %).",) if repeated else ()
     columns = (Column("task", False), Column("metric", False), Column("unit", False), *map(Column, numbers))
     rows = tuple(_row(comparison, repeated=repeated) for comparison in comparisons)

@@ -1,10 +1,13 @@
 """A checkpoint in memory."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from model_adapters.hf.decoding import Generation
 from model_adapters.hf.family import Family
+from model_adapters.hf.rendering import prompt_end
+from model_adapters.thinking import MARKERS, opening_marker
 
 __all__ = ["LoadedCheckpoint"]
 
@@ -32,3 +35,17 @@ class LoadedCheckpoint:
     generation: Generation
     max_tokens: int | None
     identity: dict[str, Any]
+
+    @cached_property
+    def opening(self) -> str:
+        """Marker that the template writes before every reply, so that the model begins in thought; mostly empty."""
+        if not any(before in self.template for before, _ in MARKERS.values()):
+            return ""
+        return opening_marker(prompt_end(self.tokenizer, self.template))
+
+    @cached_property
+    def marker_ids(self) -> dict[int, str]:
+        """Special tokens that are markers of thoughts, by id: decoding would leave them out."""
+        markers = {text for pair in MARKERS.values() for text in pair}
+        added = self.tokenizer.added_tokens_decoder.items()
+        return {token: str(item.content) for token, item in added if item.special and item.content in markers}

@@ -14,7 +14,7 @@ from model_adapters.hf.memory_limit import OutOfMemoryError, limit_memory
 from model_adapters.hf.time_limit import OutOfTimeError, limit_time
 from model_adapters.protocols import Part, Turn, Video
 
-__all__ = ["Marks", "render", "starts_with_bos", "writes_videos"]
+__all__ = ["Marks", "prompt_end", "render", "starts_with_bos", "writes_videos"]
 
 # Errors of a template that is broken or does not support the turns: Jinja's, and those of its expressions.
 _REFUSALS = (
@@ -92,6 +92,16 @@ def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
         return None
     alone = replace(turn, role="user")
     return _apply(tokenizer, template, [alone], [_message(alone)])
+
+
+def prompt_end(tokenizer: Any, template: str) -> str:
+    """Return what the template writes behind a turn of the user; empty if it refuses one without frames."""
+    asked = "?"
+    try:
+        text = _apply(tokenizer, template, (turn := Turn("user", (asked,)),), [_message(turn)])
+    except ModelError:
+        return ""
+    return text.rpartition(asked)[2]
 
 
 def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:

@@ -23,7 +23,7 @@ def begin_reply(loaded: LoadedCheckpoint, decoding: Decoding, context: Iterable[
     def has_stopped(ids: list[int]) -> bool:
         if not decoding.stop:  # saves decoding the text after every token
             return False
-        return ids[-1] in ends or cut_at_stop(_text(loaded.tokenizer, ids), decoding.stop) is not None
+        return ids[-1] in ends or cut_at_stop(_text(loaded, ids), decoding.stop) is not None
 
     choices = read_choices(loaded.tokenizer, decoding)
     return ReplyState(loaded.generation, decoding, context=context, choices=choices, finished=has_stopped)
@@ -32,7 +32,7 @@ def begin_reply(loaded: LoadedCheckpoint, decoding: Decoding, context: Iterable[
 def end_reply(loaded: LoadedCheckpoint, state: ReplyState, n_context: int, n_cached: int) -> Reply:
     """Return a finished reply; `n_cached` tokens of its context were not encoded again."""
     return Reply(
-        state.choice or reply_text(loaded.tokenizer, state.ids, state.decoding),
+        state.choice or reply_text(loaded, state.ids, state.decoding),
         n_reply_tokens=len(state.ids),
         n_context_tokens=n_context,
         n_cached_tokens=n_cached,
@@ -40,11 +40,14 @@ def end_reply(loaded: LoadedCheckpoint, state: ReplyState, n_context: int, n_cac
     )
 
 
-def reply_text(tokenizer: Any, ids: Sequence[int], decoding: Decoding) -> str:
-    """Return the text of a free reply before its first stop string; the ids have no end token."""
-    text = _text(tokenizer, ids)
+def reply_text(loaded: LoadedCheckpoint, ids: Sequence[int], decoding: Decoding) -> str:
+    """Return the text of a free reply before its first stop string; the ids have no end token.
+
+    A marker of thoughts that the template wrote before the reply is there, too, as if the model had written it.
+    """
+    text = _text(loaded, ids)
     before_stop = cut_at_stop(text, decoding.stop)
-    return text if before_stop is None else before_stop
+    return loaded.opening + (text if before_stop is None else before_stop)
 
 
 def stop_ids(tokenizer: Any, decoding: Decoding) -> set[int]:
@@ -55,5 +58,16 @@ def stop_ids(tokenizer: Any, decoding: Decoding) -> set[int]:
     return {added[string] for string in decoding.stop if string in added}
 
 
-def _text(tokenizer: Any, ids: Sequence[int]) -> str:
-    return str(tokenizer.decode(list(ids), skip_special_tokens=True))
+def _text(loaded: LoadedCheckpoint, ids: Sequence[int]) -> str:
+    """Return the text of a reply without special tokens, but for those that mark what the model thinks."""
+    pieces: list[str] = []
+    start = 0
+    for at, token in enumerate(ids):
+        if token in loaded.marker_ids:
+            pieces += _decoded(loaded, ids[start:at]), loaded.marker_ids[token]
+            start = at + 1
+    return "".join((*pieces, _decoded(loaded, ids[start:])))
+
+
+def _decoded(loaded: LoadedCheckpoint, ids: Sequence[int]) -> str:
+    return str(loaded.tokenizer.decode(list(ids), skip_special_tokens=True))

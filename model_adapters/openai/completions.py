@@ -51,6 +51,8 @@ class TokenUsage(msgspec.Struct, frozen=True):
 class _Message(msgspec.Struct, frozen=True):
     content: str | None = None
     refusal: str | None = None
+    reasoning_content: str | None = None
+    reasoning: str | None = None  # newer servers' name of the same
 
 
 class _Choice(msgspec.Struct, frozen=True):
@@ -69,8 +71,16 @@ class Completion(msgspec.Struct, frozen=True):
     choices: list[_Choice]
     usage: TokenUsage | None = None
 
+    @property
+    def thinking(self) -> str | None:
+        """What the model thought before its reply, if the server tells it apart."""
+        message = self.choices[0].message if self.choices else _Message()
+        return message.reasoning_content or message.reasoning or None
+
     def text(self, where: str) -> str:
         """Return the text of the reply; a refusal in words counts as a reply. The message names the server by `where`.
+
+        The text is empty where the model was cut off while it thought.
 
         Raises:
             ModelError: the reply has no text.
@@ -83,6 +93,8 @@ class Completion(msgspec.Struct, frozen=True):
             text = choice.message.refusal
         if text is not None and (text or choice.finish_reason != "content_filter"):
             return text
+        if self.thinking is not None and choice.finish_reason == "length":
+            return ""
         raise ModelError(f"{where} gives no text{_WHY.get(choice.finish_reason or '', '; see its log')}")
 
 

@@ -70,7 +70,8 @@ class ServedModel:
         with self._spend.request() as charge:
             completion, faults = self._send(request, charge)
         text = self._secret.redact(completion.text(self._endpoint.where))
-        reply, usage = Reply(self._cut(text, decoding), faults=faults), completion.usage
+        thinking = None if completion.thinking is None else self._secret.redact(completion.thinking)
+        reply, usage = Reply(self._cut(text, decoding), faults=faults, thinking=thinking), completion.usage
         if usage is None:
             return reply
         return replace(

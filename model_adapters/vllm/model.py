@@ -164,7 +164,7 @@ class VllmModel(CheckpointModel):
                 f"processor makes {expected}: it processes frames differently; run it with --engine transformers"
             )
         ids = output.ids[:-1] if output.ids and output.ids[-1] in self._ends else output.ids
-        free_text = reply_text(self._loaded.tokenizer, ids, decoding)
+        free_text = reply_text(self._loaded, ids, decoding)
         return Reply(
             self._require_choice(output.text, decoding) if decoding.choices else free_text,
             n_reply_tokens=len(ids),

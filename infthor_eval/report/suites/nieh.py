@@ -53,8 +53,9 @@ class NiehPresenter(PlainPresenter):
         return record.payload.reply or ""
 
     def details(self, record: Record) -> Mapping[str, str]:
-        """See `Presenter.details`: the page shows all of it elsewhere."""
-        return {}
+        """See `Presenter.details`: what the model thought; the page shows the rest elsewhere."""
+        thinking = record.payload.thinking
+        return {} if thinking is None else {"thought": thinking}
 
     def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
         """See `Presenter.timelines`."""

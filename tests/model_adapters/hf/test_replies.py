@@ -1,7 +1,6 @@
 """What ends a reply, and what of it is text."""
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -9,7 +8,9 @@ import torch
 
 from model_adapters import Decoding, Reply
 from model_adapters.hf.decoding import Generation, extend_replies
+from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.replies import begin_reply, end_reply
+from model_adapters.thinking import MARKERS, answer_of
 from model_adapters.tiny.tokenizer import train_tokenizer
 
 from ..asking import up_to
@@ -17,9 +18,11 @@ from ..asking import up_to
 SPECIAL = ("</s>", "<image>", "<|act|>", "<|plan|>")
 
 
-def _loaded(special: Sequence[str]) -> Any:
+def _loaded(special: Sequence[str], template: str = "") -> Any:
     tokenizer = train_tokenizer(special, end="</s>", pad="</s>", named={})
-    return SimpleNamespace(tokenizer=tokenizer, generation=Generation(frozenset([tokenizer.eos_token_id])))
+    generation = Generation(frozenset([tokenizer.eos_token_id]))
+    nothing: Any = None
+    return LoadedCheckpoint(nothing, tokenizer, None, template, nothing, generation, None, {})
 
 
 def _written(loaded: Any, text: str, decoding: Decoding) -> Reply:
@@ -66,3 +69,22 @@ def test_a_reply_may_be_a_stop_string_only() -> None:
 def test_a_special_token_cuts_no_choice() -> None:
     decoding = up_to(50, choices=("mug<|act|>on",), stop=("<|act|>",))
     assert _written(_loaded(SPECIAL), "mug<|act|>on</s>", decoding).text == "mug<|act|>on"
+
+
+@pytest.mark.parametrize(("before", "behind"), MARKERS.values())
+def test_markers_of_thoughts_are_in_the_text_even_where_they_are_special_tokens(before: str, behind: str) -> None:
+    for special in (SPECIAL, (*SPECIAL, before, behind)):
+        reply = _written(_loaded(special), f"{before}a mug?{behind}yes</s>", up_to(300))
+        assert answer_of(reply) == ("a mug?", "yes")
+
+
+@pytest.mark.parametrize(
+    ("end", "opening"),
+    [("<think>", "<think>"), ("[THINK] ", "[THINK]"), ("", ""), ("<think></think>", ""), ("{{ fail() }}<think>", "")],
+)
+def test_a_marker_that_the_template_writes_belongs_to_the_reply(end: str, opening: str) -> None:
+    template = "{% for m in messages %}{{ m.role }}: {{ m.content[0].text }}\n{% endfor %}assistant: " + end
+    loaded = _loaded(SPECIAL, template)
+    assert loaded.opening == opening
+    reply = _written(loaded, "a mug?</s>", up_to(300))
+    assert answer_of(reply) == (("a mug?", "") if opening else (None, "a mug?"))

@@ -252,3 +252,19 @@ def test_without_the_client_library_one_line_names_the_mend(monkeypatch: pytest.
     monkeypatch.setitem(sys.modules, "openai", None)
     with pytest.raises(ModelError, match=r"openai needs the package openai, 3 or newer \(.*\); pip install 'infthor-e"):
         load("openai", {"model": "m", "base_url": "http://127.0.0.1:1"}, 0)
+
+
+@pytest.mark.parametrize("field", ["reasoning_content", "reasoning"])
+def test_thoughts_that_the_server_tells_apart_are_kept_apart(field: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MY_KEY", KEY)
+    answer = completion("a cup", message={field: f"A mug? {KEY}"})
+    with opened(lambda *_: answer, api_key_env="MY_KEY") as model:
+        reply = _ask(model, "What?")
+    assert reply.text == "a cup" and reply.thinking.startswith("A mug?") and KEY not in reply.thinking
+    with opened(lambda *_: completion(None, message={field: "A mug?"}, finish_reason="length")) as model:
+        assert _ask(model, "What?").text == ""
+    with (
+        opened(lambda *_: completion(None, message={field: "A mug?"}, finish_reason="stop")) as model,
+        pytest.raises(ModelError, match="gives no text"),
+    ):
+        _ask(model, "What?")
