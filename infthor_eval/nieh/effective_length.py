@@ -10,8 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from infthor_eval.distances import LENGTHS
 from infthor_eval.nieh.gains import name_of
-from infthor_eval.nieh.summary import LENGTHS, NiehSummary, TaskSummary
+from infthor_eval.nieh.summary import NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from infthor_eval.distances import DISTANCES
 from infthor_eval.nieh.above_guessing import SOLVED, AboveGuessing
 from infthor_eval.nieh.gains import name_of
-from infthor_eval.nieh.summary import DISTANCES, SHOWN_CLUES, Cell, EvidenceCells, NiehSummary, TaskSummary
+from infthor_eval.nieh.summary import SHOWN_CLUES, Cell, EvidenceCells, NiehSummary, TaskSummary
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table, TableCell
 

@@ -5,14 +5,13 @@ Cache hits are not in it: they differ between a run and the same run resumed. Wh
 """
 
 import math
-from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 from typing import Any
 
 import msgspec
 
+from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.above_guessing import AboveGuessing, above_guessing
 from infthor_eval.nieh.answer_form import YesNo, format_failures, yes_no
@@ -26,8 +25,6 @@ from infthor_eval.statistics import bootstrap_interval, clustered_mean
 
 __all__ = [
     "CLUE_COLUMNS",
-    "DISTANCES",
-    "LENGTHS",
     "OPEN_ENDED",
     "SHOWN_CLUES",
     "Cell",
@@ -48,11 +45,6 @@ CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
 OPEN_ENDED = "open-ended"  # column of questions whose answer is neither yes, no nor a number, as published
 
 SHOWN_CLUES = ("all", "some", "none")
-# Bins double in width, so that they serve trajectories of hundreds and of thousands of frames alike.
-_DISTANCES = (0, 50, 100, 200, 400, 800, 1600, 3200)
-DISTANCES = (*(f"{low}-{high - 1}" for low, high in pairwise(_DISTANCES)), f">={_DISTANCES[-1]}")
-_LENGTHS = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)  # thousand tokens
-LENGTHS = (*(f"{low}-{high}" for low, high in pairwise(_LENGTHS)), f">={_LENGTHS[-1]}")
 
 Record = UnitRecord[NiehAnswer]
 
@@ -306,16 +298,12 @@ def _share_shown(record: Record) -> str | None:
 
 def _distance(record: Record) -> str | None:
     clues = record.payload.shown_clues
-    return None if clues is None or clues.n_after is None else _bin_of(clues.n_after, _DISTANCES, DISTANCES)
+    return None if clues is None or clues.n_after is None else distance_class(clues.n_after)
 
 
 def _length(record: Record) -> str | None:
     tokens = record.tokens.context
-    return None if tokens is None else _bin_of(tokens / 1000, _LENGTHS, LENGTHS)
-
-
-def _bin_of(value: float, edges: Sequence[int], names: Sequence[str]) -> str:
-    return names[bisect_right(edges, value) - 1]
+    return None if tokens is None else length_class(tokens)
 
 
 def _cell(records: Sequence[Record], metrics: Sequence[str]) -> Cell:

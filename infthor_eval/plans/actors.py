@@ -10,7 +10,7 @@ from infthor_eval.plans.environment import Observation, PlanEnvironment, StepOut
 from infthor_eval.plans.plan import Plan
 from model_adapters import Reply, Subject
 
-__all__ = ["Act", "PlanActor", "PlanBaseline", "PlanSituation"]
+__all__ = ["Act", "CountingActor", "PlanActor", "PlanBaseline", "PlanSituation"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,17 @@ class PlanActor(Protocol):
 
     def observe(self, outcome: StepOutcome) -> None:
         """Take the outcome of the last action, if the plan goes on."""
+
+
+@runtime_checkable
+class CountingActor(PlanActor, Protocol):
+    """An actor with a model that may count tokens."""
+
+    def tokens_between(self, first: int, last: int) -> int | None:
+        """Return the tokens of the whole history from one frame to another; None if the model counts none.
+
+        Frames are numbered from the trajectory's first; the history is that before the plan that has begun.
+        """
 
 
 @runtime_checkable

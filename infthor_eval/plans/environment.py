@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.goal_conditions import GoalConditions, goal_conditions
 from infthor_eval.household.navigation import Grid
 from infthor_eval.household.scout import HORIZON_STEP, grid_pose_of, reachable_grid
 from infthor_eval.household.treatments import Treatments
@@ -67,6 +68,7 @@ class StepInfo:
         message: what was wrong with it; empty if nothing was.
         ended: how the plan ended with it; None if it goes on.
         goal_reached: whether the goal of the whole task has been reached in this plan.
+        conditions: conditions of the task's goal that are met where the plan ended; None while it goes on.
     """
 
     call: Mapping[str, Any] | None
@@ -74,6 +76,7 @@ class StepInfo:
     message: str = ""
     ended: Ended | None = None
     goal_reached: bool = False
+    conditions: GoalConditions | None = None
 
 
 class StepOutcome(NamedTuple):
@@ -141,6 +144,7 @@ class PlanEnvironment:
         self._plan: Plan | None = None
         self._reward: PlanReward | PublishedReward
         self._preferred: set[str] = set()
+        self._treatments = Treatments()  # since the start of the present task
         self._n_steps = 0
 
     def reset(self, plan: int = 0) -> tuple[Observation, Mapping[str, Any]]:
@@ -165,7 +169,7 @@ class PlanEnvironment:
         expert_actions = self._expert.actions(plan)
         start, end = self._expert.start(plan), self._expert.start(plan + 1)
         view = self._simulator.rewind(start.mark, exactly=True)
-        self._plan, self._n_steps = present, 0
+        self._plan, self._n_steps, self._treatments = present, 0, start.treatments
         info: dict[str, Any] = {"n_expert": len(expert_actions), "expert_reward": None}
         if self._script is not None:
             scripted = self._script.plan(plan)
@@ -225,8 +229,9 @@ class PlanEnvironment:
         try:
             text, call = self._ground(action, before)
         except UngroundedError as error:
+            ended = Ended(str(error.misuse))
+            info = StepInfo(None, "", str(error), ended, conditions=self._conditions(before))
             self._plan = None
-            info = StepInfo(None, "", str(error), Ended(str(error.misuse)))
             return StepOutcome(Observation(before, None), 0.0, True, False, info)
         return self._execute(text, call, before)
 
@@ -259,15 +264,23 @@ class PlanEnvironment:
         call = ground(text, view, self.look_degrees, self._preferred, self._words)
         return str(text), {**call, **force}
 
+    def _conditions(self, view: SimulatorView) -> GoalConditions:
+        assert self._plan is not None
+        return goal_conditions(self.tasks[self._plan.task].task, view, self._treatments)
+
     def _execute(self, text: str, call: Mapping[str, Any], before: SimulatorView) -> StepOutcome:
         after = self._simulator.step(**call)
         self._n_steps += 1
         earned = self._reward.after(call, before, after)
         ended = _ending(earned)
         truncated = ended is None and self._n_steps >= self._max_steps
+        self._treatments = self._treatments.after(call["action"], call.get("objectId"), after)
+        conditions = None
         if ended is not None or truncated:
+            conditions = self._conditions(after)
             self._plan = None
-        info = StepInfo(call, text, after.error, Ended.LIMIT if truncated else ended, self._reward.goal_reached)
+        ended = Ended.LIMIT if truncated else ended
+        info = StepInfo(call, text, after.error, ended, self._reward.goal_reached, conditions)
         observation = Observation(after, self._frames.keep(after))
         return StepOutcome(observation, earned.reward, ended is not None, truncated, info)
 

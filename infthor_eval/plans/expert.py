@@ -12,6 +12,7 @@ from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.sequence_text import action_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.household.treatments import Treatments
+from infthor_eval.plans.clue_steps import clue_step, object_logs
 from infthor_eval.plans.past import Past
 from infthor_eval.plans.plan import Plan, TrajectoryTask
 from infthor_eval.plans.segments import PlanSegment
@@ -93,6 +94,7 @@ class Expert:
         self._starts = [PlanStart(simulator.mark(), frames.keep(simulator.view), Treatments())]
         self._actions: list[list[ExpertAction]] = []
         self._segments: list[PlanSegment] = []
+        self._object_logs = object_logs(trajectory)
         self._refused: ExpertRefusedError | None = None
         self._log = Recorder() if in_words else None
         if self._log is not None:
@@ -124,8 +126,15 @@ class Expert:
 
     def past(self, plan: int) -> Past:
         """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as `start` does."""
-        segment = self._open_segment(plan)
-        return Past(self._segments[:plan], segment, self._state(self._plans[plan].low[0]) if self._log else "")
+        segment, present = self._open_segment(plan), self._plans[plan]
+        first = present.low[0]
+        return Past(
+            self._segments[:plan],
+            segment,
+            self._state(first) if self._log else "",
+            self._object_logs[: first + 1],
+            clue_step(self._object_logs, self._trajectory, present, first - 1),
+        )
 
     def _open_segment(self, plan: int) -> PlanSegment:
         """Return the segment of a plan, without a step."""

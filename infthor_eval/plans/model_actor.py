@@ -8,7 +8,7 @@ from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.digests import seed_of
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.household.sequence_text import ACT
+from infthor_eval.household.sequence_text import ACT, action_part
 from infthor_eval.plans.actors import Act, PlanSituation
 from infthor_eval.plans.environment import StepOutcome
 from infthor_eval.plans.final_protocol import FinalForm, present_parts, with_recorded_state
@@ -67,6 +67,7 @@ class ModelActor:
         past = environment.past(plan)
         if self._config.form is not None:
             past = with_recorded_state(past, environment.trajectory, situation.plan.low[0])
+        self._past = past
         with wrap_request_errors(self._model.name):
             self._given = self._config.history.recall(past, self._count)
             self._restart(self._given)
@@ -92,6 +93,20 @@ class ModelActor:
             return
         frame = self._present_frame()
         self._conversation.append(f"{outcome.info.action}{ACT}", *self._visible_parts([frame]), ACT)
+
+    def tokens_between(self, first: int, last: int) -> int | None:
+        """See `CountingActor`."""
+        parts: list[Part] = []
+        ends: list[int] = []  # of the parts up to each frame; a task's first frame is there again behind its goal
+        for segment in self._past.all:
+            parts += segment.opening()
+            ends += [] if ends else [parts.index(segment.before) + 1]
+            for action, frame in segment.steps:
+                parts += action_part(action), frame
+                ends.append(len(parts))
+        counts = [self._count(parts[: ends[frame]]) for frame in (first, last)]
+        self._restart(self._given)
+        return None if counts[0] is None or counts[1] is None else counts[1] - counts[0]
 
     @property
     def _asks_anew(self) -> bool:

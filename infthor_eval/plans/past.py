@@ -6,6 +6,7 @@ from typing import ClassVar, Protocol
 
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.memory import Observation
 from infthor_eval.plans.segments import Part, PlanSegment, goal_of_last
 
@@ -22,11 +23,15 @@ class Past:
         segments: segments of the plans before.
         present: the plan's own segment, without a step.
         state: the state of room and agent in words, as far as it was seen; empty if no history needs it.
+        logs: what each frame up to the present one shows, for memories that are given it; empty if it is not known.
+        clue: number of the last frame with what the plan needs in view (`clue_steps`); None if there is none.
     """
 
     segments: Sequence[PlanSegment]
     present: PlanSegment
     state: str = ""
+    logs: Sequence[ObjectLog] = ()
+    clue: int | None = None
 
     @property
     def all(self) -> list[PlanSegment]:
@@ -43,8 +48,13 @@ class Past:
         """Every frame before the present one."""
         return [step.frame for step in self.observations()[:-1]]
 
-    def observations(self, blank: bool = False) -> list[Observation]:
-        """Return all steps as a memory observes them, the present one last; with `blank` their frames are grey."""
+    def observations(self, blank: bool = False, privileged: bool = False) -> list[Observation]:
+        """Return all steps as a memory observes them, the present one last.
+
+        Args:
+            blank: whether their frames are grey.
+            privileged: whether they have their logs.
+        """
         steps: list[tuple[FrameRef, str | None, str | None]] = []
         goal = None
         for segment in self.all:
@@ -53,7 +63,13 @@ class Past:
                 steps.append((segment.before, None, goal))
             steps += [(frame, action, goal) for action, frame in segment.steps]
         return [
-            Observation(number=number, frame=blank_like(frame) if blank else frame, action=action, goal=of_step)
+            Observation(
+                number=number,
+                frame=blank_like(frame) if blank else frame,
+                action=action,
+                goal=of_step,
+                log=self.logs[number] if privileged else None,
+            )
             for number, (frame, action, of_step) in enumerate(steps)
         ]
 

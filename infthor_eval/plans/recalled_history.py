@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.household.sequence_text import goal_part, plan_part
 from infthor_eval.memory import (
     MemoryOptions,
@@ -44,14 +44,13 @@ class RecalledHistory:
             blank: whether it observes blank frames.
 
         Raises:
-            UsageError: there is no such memory, or it needs what an agent does not have.
+            UsageError: there is no such memory, or it needs a model that writes.
         """
         self._name, self._options, self._budget, self._blank = name, options, budget, blank
         self._memory = open_memory(name, options)
-        capabilities = self._memory.capabilities
-        if capabilities.privileged or capabilities.writes:
-            needs = "metadata and clues" if capabilities.privileged else "a model that writes for it"
-            raise UsageError(f"the memory {name} needs {needs}, which agents do not have; take another")
+        self._privileged = self._memory.capabilities.privileged
+        if self._memory.capabilities.writes:
+            raise UsageError(f"the memory {name} needs a model that writes for it, as agents do not; take another")
         self.identity()  # opens what the memory needs now, rather than at the first plan
         self._observed: list[Observation] = []
         self._in_use = threading.Lock()  # episodes in flight share it
@@ -69,12 +68,15 @@ class RecalledHistory:
         """Return what is recalled, in order.
 
         Raises:
-            DataError: a frame cannot be read.
+            DataError: a frame cannot be read, or the trajectory lacks what a privileged memory needs.
             ModelError: there is a budget and the model counts no tokens, or the memory exceeds it.
             UserCodeError: the memory fails.
         """
-        *steps, present = past.observations(self._blank)
-        query = Query(text=f"{past.goal} {past.present.plan}", present=present)
+        if self._privileged and not past.logs:
+            raise DataError(f"the trajectory has no log of what is in view, which the memory {self._name} needs")
+        *steps, present = past.observations(self._blank, self._privileged)
+        clues = (() if past.clue is None else (past.clue,)) if self._privileged else None
+        query = Query(text=f"{past.goal} {past.present.plan}", present=present, clues=clues)
         size = self._tokens_per_frame(present, count)
         with self._in_use, wrap_memory_errors(self._name):
             self._observe(steps, size)

@@ -41,6 +41,10 @@ class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, t
         is_final: whether its task is the final long-horizon task.
         expert_reward: what the published loop adds to the expert's total with this plan; None under other rules.
         goal_reached: whether the task's goal was reached in it.
+        conditions: conditions of the task's goal that were met at its end, and how many there are; None without a step.
+        clue_distance: of a final task's plan, the frames from where its object, or the place that it goes to, was last
+            in view to the task's first frame; None if it never was or that is not known.
+        clue_tokens: the same in tokens of the whole history; None if the subject counts no tokens.
     """
 
     plan: str
@@ -52,6 +56,9 @@ class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, t
     expert_reward: float | None = None
     steps: tuple[StepRecord, ...] = ()
     goal_reached: bool = False
+    conditions: tuple[int, int] | None = None
+    clue_distance: int | None = None
+    clue_tokens: int | None = None
 
 
 RECORDS = RecordTypes(unit=PlanRecord)

@@ -9,7 +9,7 @@ import msgspec
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.plans.actor_factory import ActorFactory
-from infthor_eval.plans.actors import Act, PlanSituation
+from infthor_eval.plans.actors import Act, CountingActor, PlanSituation
 from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
 from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.plans.plan import Plan
@@ -29,6 +29,7 @@ _DIGITS = 6  # of rewards; more would be rounding noise
 def plan_record(trajectory: PlanTrajectory, plan: Plan) -> PlanRecord:
     """Return the record of a plan before anybody acts."""
     first, end = plan.low
+    clue = trajectory.clue(plan) if plan.is_final else None
     return PlanRecord(
         index=plan.index,
         kind=str(plan.kind),
@@ -38,6 +39,7 @@ def plan_record(trajectory: PlanTrajectory, plan: Plan) -> PlanRecord:
         first_step=first,
         n_expert_steps=end - first,
         is_final=plan.is_final,
+        clue_distance=None if clue is None else trajectory.first_frame(plan) - clue,
     )
 
 
@@ -102,6 +104,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             expert_reward=None if of_expert is None else round(of_expert, _DIGITS),
         )
         self._actor.begin(PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation, goes_on))
+        self.begun = self._with_clue_tokens(self.begun, plan)
         acts: list[tuple[Act, StepOutcome]] = []
         while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):
             if acts:
@@ -113,6 +116,14 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         replies = [act.reply for act, _ in acts if act.reply is not None]
         faults = tuple(fault for reply in replies for fault in reply.faults)
         return EpisodeResult(_completed_record(self.begun, acts), _tokens(replies), faults)
+
+    def _with_clue_tokens(self, begun: PlanRecord, plan: Plan) -> PlanRecord:
+        """Return the record with how far back the clue of a final task's plan is, in tokens of the whole history."""
+        clue = self._trajectory.clue(plan) if plan.is_final else None
+        if clue is None or not isinstance(self._actor, CountingActor):
+            return begun
+        tokens = self._actor.tokens_between(clue, self._trajectory.first_frame(plan))
+        return msgspec.structs.replace(begun, clue_tokens=tokens)
 
     def pass_over(self, plan: Plan) -> EpisodeResult[PlanRecord]:
         """Leave out a plan after an earlier one ended the trajectory.
@@ -136,6 +147,7 @@ def _completed_record(begun: PlanRecord, acts: Sequence[tuple[Act, StepOutcome]]
         reward=round(sum(outcome.reward for _, outcome in acts), _DIGITS),
         ended=str(last.info.ended),
         goal_reached=any(outcome.info.goal_reached for _, outcome in acts),
+        conditions=last.info.conditions,
     )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
 from infthor_eval.episodes.summary import (
     EpisodesSummary,
     EpisodeTaskSummary,
@@ -17,7 +18,7 @@ from infthor_eval.plans.records import PlanRecord
 from infthor_eval.rates import Rate, clustered_rate, rate_over_clusters
 from infthor_eval.runs import UnitRecord
 
-__all__ = ["FINAL_COLUMNS", "PlanTaskSummary", "PlansSummary", "summarise_plans"]
+__all__ = ["FINAL_COLUMNS", "NEVER", "PlanTaskSummary", "PlansSummary", "summarise_plans"]
 
 Record = UnitRecord[PlanRecord]
 _COLUMNS: dict[str, frozenset[str]] = {
@@ -26,6 +27,7 @@ _COLUMNS: dict[str, frozenset[str]] = {
     "Put": frozenset({PlanKind.PUT}),
     "total": frozenset(PlanKind),
 }
+NEVER = "not seen"  # class of plans whose clue was never in view, or is not known
 FINAL_COLUMNS = tuple(_COLUMNS)  # of the paper's table of final tasks
 
 
@@ -43,6 +45,10 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         reward: reward of a trajectory.
         max_reward: highest possible reward of a trajectory's attempted plans.
         goals: share of tasks whose goal was reached in one of their plans.
+        goal_conditions: share of a task's goal conditions that are met at the end of its last plan that was tried
+            (ALFRED's goal-condition success).
+        by_distance: plans of final tasks done, by the frames since their clue was in view ("50-99", or `NEVER`).
+        by_tokens: the same by thousand tokens of the history since then ("2-4").
         n_actions: actions of all plans.
         rules: name of the reward rules; None for imported counts.
         logged: totals of a trajectory as the published script logs them, by its names; empty under other rules.
@@ -57,6 +63,9 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
     reward: Rate | None
     max_reward: Rate | None
     goals: Rate | None
+    goal_conditions: Rate | None
+    by_distance: dict[str, Rate]
+    by_tokens: dict[str, Rate]
     n_actions: int | None
     rules: str | None
     logged: dict[str, Rate]
@@ -85,6 +94,9 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
         reward=_rate_of_trajectories(acted, lambda reward, _: reward),
         max_reward=_rate_of_trajectories(acted, lambda _, most: most),
         goals=_goals(acted),
+        goal_conditions=_goal_conditions(acted),
+        by_distance=_by_class(acted, _distance, (*DISTANCES, NEVER)),
+        by_tokens=_by_class(acted, _clue_tokens, LENGTHS),
         n_actions=sum(len(record.payload.steps) for record in acted) if has_steps else None,
         rules=_rules(config["rewards"]),
         logged=_logged(acted),
@@ -124,6 +136,39 @@ def _goals(records: Sequence[Record]) -> Rate | None:
         key = record.cluster, record.payload.task
         reached[key] = reached.get(key, False) or record.payload.goal_reached
     return clustered_rate([float(value) for value in reached.values()], [trajectory for trajectory, _ in reached])
+
+
+def _goal_conditions(records: Sequence[Record]) -> Rate | None:
+    """Return the mean over tasks of the share of their conditions that are met where the agent left them."""
+    last: dict[tuple[str, int], float] = {}
+    for record in sorted(records, key=lambda record: record.payload.index):
+        if record.payload.conditions is not None:
+            met, total = record.payload.conditions
+            last[record.cluster, record.payload.task] = met / total
+    return clustered_rate(list(last.values()), [trajectory for trajectory, _ in last])
+
+
+def _by_class(
+    records: Sequence[Record], class_of: Callable[[PlanRecord], str | None], names: Sequence[str]
+) -> dict[str, Rate]:
+    """Return the share of plans done in each class that has plans; some plans are in none."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        name = class_of(record.payload)
+        if name is not None:
+            groups.setdefault(name, []).append(record)
+    rates = {name: success_rate(groups[name]) for name in names if name in groups}
+    return {name: rate for name, rate in rates.items() if rate is not None}
+
+
+def _distance(plan: PlanRecord) -> str | None:
+    if not plan.is_final:
+        return None
+    return NEVER if plan.clue_distance is None else distance_class(plan.clue_distance)
+
+
+def _clue_tokens(plan: PlanRecord) -> str | None:
+    return None if plan.clue_tokens is None else length_class(plan.clue_tokens)
 
 
 def _rate_of_trajectories(records: Sequence[Record], measure: Callable[[float, float], float]) -> Rate | None:

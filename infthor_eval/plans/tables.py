@@ -3,10 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import published_tables
-from infthor_eval.plans.summary import FINAL_COLUMNS, PlanTaskSummary
-from infthor_eval.rates import format_number, format_percent
+from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
+from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
@@ -39,7 +40,7 @@ def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return all tables of some runs."""
     tasks = list(named_tasks(runs))
     endings = endings_table("How plans ended", tasks, "actions", _actions)
-    return [_success_table(runs, tasks), _reward_table(tasks), endings]
+    return [_success_table(runs, tasks), *_distance_tables(tasks), _reward_table(tasks), endings]
 
 
 def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
@@ -70,6 +71,29 @@ def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, P
     return Table("Plans completed, %", columns, tuple(rows), tuple(notes))
 
 
+def _distance_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[Table]:
+    """Return the final tasks' plans by the distance of their clues: in frames, and in tokens if they are counted."""
+    tables = []
+    for title, of_task, order in (
+        ("frames since what they need was in view", lambda task: task.by_distance, (*DISTANCES, NEVER)),
+        ("thousand tokens since then", lambda task: task.by_tokens, LENGTHS),
+    ):
+        names = [name for name in order if any(name in of_task(task) for *_, task in tasks)]
+        rows = [
+            Row((*run, *(_rate_and_n(of_task(task).get(name)) for name in names)))
+            for *run, task in tasks
+            if of_task(task)
+        ]
+        if rows:
+            columns = (*NAME_COLUMNS, *map(Column, names))
+            tables.append(Table(f"Final tasks: plans completed, % (plans), by {title}", columns, tuple(rows)))
+    return tables
+
+
+def _rate_and_n(rate: Rate | None) -> str:
+    return "-" if rate is None else f"{format_percent(rate)} ({rate.n})"
+
+
 def _conduct_notes(runs: Sequence[RunSummary]) -> list[str]:
     """Return how the runs went on after a failed plan; Algorithm 2 of the paper and its script differ in it."""
     ways = {task.get("after_failure") for run in runs for task in run.header.config["tasks"].values()}
@@ -82,12 +106,13 @@ def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
     for *names, task in tasks:
         of_trajectory = format_number(task.reward), format_number(task.max_reward), format_percent(task.reward_share)
         totals = (format_number(task.logged.get(name)) for name in logged)
-        rows.append(Row((*names, task.rules or "-", *of_trajectory, format_percent(task.goals), *totals)))
+        goals = format_percent(task.goals), format_percent(task.goal_conditions)
+        rows.append(Row((*names, task.rules or "-", *of_trajectory, *goals, *totals)))
     of_log = (f"logged {name}" for name in logged)
     columns = (
         *NAME_COLUMNS,
         Column("rules", False),
-        *map(Column, ("reward", "at most", "% of it", "goals reached, %", *of_log)),
+        *map(Column, ("reward", "at most", "% of it", "goals reached, %", "goal conditions, %", *of_log)),
     )
     notes = (_PUBLISHED_RULES,) if logged else ()
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows), notes)

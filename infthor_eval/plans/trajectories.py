@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
 from infthor_eval.errors import DataError
 from infthor_eval.formats.digests import digest
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.formats.trajectory import TrajectorySource
+from infthor_eval.plans.clue_steps import clue_step, object_logs
 from infthor_eval.plans.plan import Plan, TrajectoryTask, plans_of, tasks_of
 
 __all__ = ["PlanTrajectory", "read_plan_trajectory"]
@@ -19,6 +22,18 @@ class PlanTrajectory(TaskTrajectory):
 
     plans: Sequence[Plan]
     tasks: Sequence[TrajectoryTask]
+
+    def first_frame(self, plan: Plan) -> int:
+        """Return the frame that the task of a plan begins with."""
+        return next(other.low[0] for other in self.plans if other.task == plan.task and other.in_task)
+
+    def clue(self, plan: Plan) -> int | None:
+        """Return the last frame, up to the first of its task, with what a plan needs in view; see `clue_step`."""
+        return clue_step(self._logs, self.data, plan, self.first_frame(plan))
+
+    @cached_property
+    def _logs(self) -> Sequence[ObjectLog]:
+        return object_logs(self.data)
 
 
 def read_plan_trajectory(source: TrajectorySource, words: Words) -> PlanTrajectory:

@@ -3,8 +3,9 @@ from itertools import pairwise
 import msgspec
 import pytest
 
+from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.nieh.records import Guess, ShownClues
-from infthor_eval.nieh.summary import DISTANCES, LENGTHS, NiehSummary, summarise
+from infthor_eval.nieh.summary import NiehSummary, summarise
 from infthor_eval.runs import Tokens
 
 from .made import identity, record

@@ -7,11 +7,12 @@ from typing import NamedTuple
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from infthor_eval.distances import DISTANCES
 from infthor_eval.formats.question import ABSENCE
 from infthor_eval.nieh.above_guessing import AboveGuessing
 from infthor_eval.nieh.evidence_tables import short_name
 from infthor_eval.nieh.gains import find_gains, name_of
-from infthor_eval.nieh.summary import CLUE_COLUMNS, DISTANCES, SHOWN_CLUES, Cell, Score, TaskSummary, main_metric
+from infthor_eval.nieh.summary import CLUE_COLUMNS, SHOWN_CLUES, Cell, Score, TaskSummary, main_metric
 from infthor_eval.report.figures.style import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.memory_chart import memory_charts

@@ -1,0 +1,27 @@
+"""Classes of distances from a clue, in frames and in tokens, for results by distance."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import pairwise
+
+__all__ = ["DISTANCES", "LENGTHS", "distance_class", "length_class"]
+
+# Bins double in width, so that they serve trajectories of hundreds and of thousands of frames alike.
+_FRAMES = (0, 50, 100, 200, 400, 800, 1600, 3200)
+DISTANCES = (*(f"{low}-{high - 1}" for low, high in pairwise(_FRAMES)), f">={_FRAMES[-1]}")  # frames
+_TOKENS = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)
+LENGTHS = (*(f"{low}-{high}" for low, high in pairwise(_TOKENS)), f">={_TOKENS[-1]}")  # thousand tokens
+
+
+def distance_class(n_frames: int) -> str:
+    """Return the class of a number of frames."""
+    return _class(n_frames, _FRAMES, DISTANCES)
+
+
+def length_class(n_tokens: int) -> str:
+    """Return the class of a number of tokens."""
+    return _class(n_tokens / 1000, _TOKENS, LENGTHS)
+
+
+def _class(value: float, edges: Sequence[int], names: Sequence[str]) -> str:
+    return names[bisect_right(edges, value) - 1]
