@@ -1,11 +1,13 @@
 """A memory in front of an agent: what it observes, and what the agent is given."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.plans.history import FullHistory, history_named
 from infthor_eval.plans.past import Past
 from infthor_eval.plans.recalled_history import MemoryChoice, RecalledHistory
@@ -120,10 +122,20 @@ def test_the_first_plan_has_nothing_to_recall():
     assert past(0).frames == []
 
 
-@pytest.mark.parametrize("name", ["oracle", "text-log", "notes"])
-def test_what_an_agent_does_not_have_is_refused(name):
-    with pytest.raises(UsageError, match=f"the memory {name} needs .* which agents do not have; take another"):
-        RecalledHistory(name)
+def test_an_agent_has_no_model_that_writes():
+    with pytest.raises(UsageError, match="the memory notes needs a model that writes for it, as agents do not"):
+        RecalledHistory("notes")
+
+
+def test_privileged_memories_have_logs_and_the_last_sight_of_what_the_plan_needs():
+    logs = [ObjectLog(visible=["Mug"] if number == 1 else ["Sofa"]) for number in range(7)]
+    known = replace(past(3), logs=logs, clue=1)
+    assert names(RecalledHistory("oracle", (("k", 1),)).choose(known, no_count)) == ["a1"]
+    (text,) = RecalledHistory("text-log").choose(known, no_count)
+    assert text.index("Sofa") < text.index("Mug") < text.rindex("Sofa")
+    for name in ("oracle", "text-log"):
+        with pytest.raises(DataError, match=f"no log of what is in view, which the memory {name} needs"):
+            RecalledHistory(name).choose(past(3), no_count)
 
 
 @pytest.mark.parametrize(
