@@ -136,3 +136,33 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepared, final, experts
     journal.write_text("".join(lines[:-1]))
     again = execute(prepared(QWEN, **settings))
     assert [record.payload for record in again.records] == [record.payload for record in whole.records]
+
+
+def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(acting, experts, final):
+    (trajectory,) = iter_trajectories(final)
+    plan = plans_of(trajectory, Words.PUBLISHED)[4]
+    name = trajectory.plan.high_pddl[plan.high].discrete_action.args[0]
+    seen, first = plan.low[0] - 7, plan.low[0]
+    path = final / f"{FORK}.json"
+    entries = [{"visible": [name.capitalize()] if number in (1, seen) else []} for number in range(first + 1)]
+    entries += [{"visible": [name]}] * (len(trajectory.plan.low_actions) - first)  # later than anybody may know
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"object_log": entries}))
+
+    said = [text for texts in experts[4:] for text in texts]
+    plans, model, outcome = acting(said, protocol="default", rewards="default")
+    assert plans[0].ended == "done" and {plan.conditions[1] for plan in plans} == {4}  # two slices, both there
+    n_tokens, after_goal, up_to = 0, False, []  # tokens up to each frame: a word is one, a frame is one
+    for part in model.asked[0][0]:
+        n_tokens += 1 if isinstance(part, FrameRef) else len(part.split())
+        if isinstance(part, FrameRef) and (not up_to or not after_goal):
+            up_to.append(n_tokens)
+        after_goal = isinstance(part, str) and "<|goal|>" in part
+    assert (plans[0].clue_distance, plans[0].clue_tokens) == (7, up_to[first] - up_to[seen])
+    assert (plans[1].clue_distance, plans[1].clue_tokens) == (None, None)
+    (task,) = outcome.summary.summary.tasks.values()
+    assert {name: (rate.mean, rate.n) for name, rate in task.by_distance.items()} == {
+        "0-49": (1.0, 1),
+        "not seen": (float(plans[1].ended == "done"), 1),
+    }
+    assert task.by_tokens["0-1"].n == 1
+    assert task.goal_conditions.mean == plans[-1].conditions[0] / 4
