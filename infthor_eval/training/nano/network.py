@@ -12,6 +12,7 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits
 
 from infthor_eval.household.wording import compact_name, noun
+from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.nano.architecture import TOKENS
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.network import SequenceModel
@@ -37,12 +38,9 @@ class NanoNetwork(SequenceModel):
         dataset: all frames.
 
     Attributes:
-        last_frames: indices in the dataset and features of the frames of the last sequences.
         scale: scale of the similarities of features and names.
         bias: bias of these, one for each type.
     """
-
-    last_frames: tuple[list[int], Tensor]
 
     def __init__(self, loaded: LoadedCheckpoint, dataset: FrameDataset) -> None:
         super().__init__(loaded)
@@ -55,11 +53,17 @@ class NanoNetwork(SequenceModel):
 
     def features(self, frames: Sequence[Frame]) -> list[Tensor]:
         """Return features of each frame; see `SequenceModel`."""
-        distinct = list(dict.fromkeys(frame.digest for frame in frames))
-        indices = [self._index_by_digest[digest] for digest in distinct]
-        self.last_frames = indices, self.frame_features(indices)
-        by_digest = dict(zip(distinct, self.last_frames[1], strict=True))
-        return [by_digest[frame.digest] for frame in frames]
+        indices = self._indices(frames)
+        rows = dict(zip(indices, self.frame_features(indices), strict=True))
+        return [rows[self._index_by_digest[frame.digest]] for frame in frames]
+
+    def frames_of(self, sequences: Sequence[TrainingSequence]) -> tuple[list[int], Tensor]:
+        """Return the indices in the dataset and the features of the frames of some sequences, each frame once."""
+        indices = self._indices([frame for sequence in sequences for frame in sequence.frames])
+        return indices, self.frame_features(indices)
+
+    def _indices(self, frames: Sequence[Frame]) -> list[int]:
+        return [self._index_by_digest[digest] for digest in dict.fromkeys(frame.digest for frame in frames)]
 
     def cache_features(self) -> None:
         """Compute the features of all frames once, for all later sequences; the tower is not trained any more.

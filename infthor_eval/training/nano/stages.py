@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from infthor_eval.reasons import count_reasons
-from infthor_eval.training.batches import collate
+from infthor_eval.training.batches import collate, n_labels
 from infthor_eval.training.encoding import Encoder, TrainingSequence
 from infthor_eval.training.nano.architecture import build_untrained, image_processor
 from infthor_eval.training.nano.frame_dataset import read_frame_dataset
@@ -25,6 +25,7 @@ _WARM_UP = 50  # steps
 _LOWEST = 0.05  # final learning rate as a share of the highest
 _BETAS = (0.9, 0.98)
 _CLIP = 1.0
+_BATCHES = 4  # that the sequences of a step are computed in
 _TEXT_STAGE_FRAMES = 16  # frames for the vision loss in each step of the text stage
 
 
@@ -147,12 +148,11 @@ class _StageTrainer:
         Answers and actions have the same weight, though most tokens are actions.
         """
         recipe = self._recipe
-        answers = self._token_loss(
-            self._sampler.questions(
-                recipe.questions_per_step, recipe.synthetic_questions, recipe.recalled_questions, recipe.recalled_frames
-            )
+        questions = self._sampler.questions(
+            recipe.questions_per_step, recipe.synthetic_questions, recipe.recalled_questions, recipe.recalled_frames
         )
-        indices, features = self._network.last_frames
+        answers = self._token_loss(questions)
+        indices, features = self._network.frames_of(questions)
         histories = self._sampler.histories(recipe.windows_per_step, recipe.plans_per_step, recipe.single_plan_share)
         actions = self._token_loss(histories)
         text_plans = self._token_loss(self._sampler.synthetic_plans(recipe.joint_text_plans_per_step))
@@ -163,5 +163,14 @@ class _StageTrainer:
         return self._network.vision_loss(features, indices, self._sampler.spelling(self._network.n_spellings))
 
     def _token_loss(self, sequences: Sequence[TrainingSequence]) -> Tensor:
-        """Return the mean loss per token of some sequences."""
-        return self._network(**collate(sequences, self._network.family, pad_id=0))["loss"]
+        """Return the mean loss per token of some sequences, which are computed in batches of about one length.
+
+        A question on one frame has 40 tokens, one behind a memory 300: most of a single batch would be padding.
+        """
+        by_length = sorted(sequences, key=lambda sequence: sequence.n_tokens)
+        size = math.ceil(len(by_length) / _BATCHES)
+        parts = (by_length[at : at + size] for at in range(0, len(by_length), size))
+        batches = [collate(part, self._network.family, pad_id=0) for part in parts]
+        n_tokens = sum(map(n_labels, batches))
+        losses = [self._network(**batch, num_items_in_batch=n_tokens)["loss"] for batch in batches]
+        return torch.stack(losses).sum()
