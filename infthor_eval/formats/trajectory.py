@@ -9,9 +9,10 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest
@@ -98,7 +99,7 @@ class Scene(_Fields, omit_defaults=False):
 class ApiAction(_Fields):
     """One recorded call of the simulator, with object ids of the AI2-THOR version that recorded it."""
 
-    action: str
+    action: Annotated[str, Meta(pattern=r"\S")]
     object_id: str | None = msgspec.field(name="objectId", default=None)
     receptacle_id: str | None = msgspec.field(name="receptacleObjectId", default=None)
     move_magnitude: float | None = msgspec.field(name="moveMagnitude", default=None)

@@ -217,6 +217,10 @@ BROKEN = {
         "sub-goal 1 is 'Juggle'; there are GotoLocation",
     ),
     "no goal": (lambda it: it["sub_tasks"][0]["task_info"].update(goal=""), "task 0: a task has no goal"),
+    "an action without a name": (
+        lambda it: it["plan"]["low_actions"][5]["api_action"].update(action=" "),
+        "not a trajectory (Expected `str` matching regex",
+    ),
     "no action": (lambda it: it["plan"].update(low_actions=[]), "no plan with an action; leave it out"),
 }
 
