@@ -279,8 +279,8 @@ class PlanEnvironment:
         if ended is not None or truncated:
             conditions = self._conditions(after)
             self._plan = None
-        ended = Ended.LIMIT if truncated else ended
-        info = StepInfo(call, text, after.error, ended, self._reward.goal_reached, conditions)
+        said = Ended.LIMIT if truncated else ended
+        info = StepInfo(call, text, after.error, said, self._reward.goal_reached, conditions)
         observation = Observation(after, self._frames.keep(after))
         return StepOutcome(observation, earned.reward, ended is not None, truncated, info)
 

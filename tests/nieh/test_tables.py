@@ -63,7 +63,7 @@ def test_a_leaning_to_yes_and_the_form_of_replies_have_a_table():
     (table,) = [table for table in tables([run_of(identity(), records)]) if table.title == "Form of the replies"]
     (row,) = [row for row in table.rows if row.cells[0] == "a run"]
     assert row.cells == (
-        *("a run", "nieh_gt", "4", "25.0", "25.0"),
+        *("a run", "nieh_gt", "4", "25.0", "25.0", "25.0"),  # 50 tokens of two right answers
         "1 cut off at the token limit, 1 empty, 1 neither yes nor no, 1 no number",
     )
 

@@ -115,7 +115,7 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nie
     code, out, err = run(*arguments, "--tasks", "nieh_gt,nieh_own", "--full")
     assert code == 0, err
     rows = [line.split() for line in out.splitlines()]
-    assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 6] == ["letters"]
+    assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 7] == ["letters"]
     # By clues: 3, 2 and 2 letters of 20; 10; 10.
     assert next(row for row in rows if row[1:3] == ["nieh_own", "letters"])[3:10:2] == [
         "11.67",
