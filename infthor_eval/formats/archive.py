@@ -4,10 +4,12 @@ An archive is untrusted: its members may point outside the folder, be links or d
 disk holds. Nothing is unpacked unless every member is a plain file or a folder below the target.
 """
 
+import gzip
 import shutil
 import tarfile
 import tempfile
 from pathlib import Path, PurePosixPath
+from typing import Self
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.reading import DAMAGED, require_file
@@ -16,6 +18,14 @@ __all__ = ["unpack_tar"]
 
 _MAX_FILES = 2_000_000
 _MAX_FILE_BYTES = 2 * 2**30
+_MAX_HEADER_BYTES = 2**20  # of a long name or of attributes, which are read into memory at once
+_HEADERS = (
+    tarfile.XHDTYPE,
+    tarfile.XGLTYPE,
+    tarfile.SOLARIS_XHDTYPE,
+    tarfile.GNUTYPE_LONGNAME,
+    tarfile.GNUTYPE_LONGLINK,
+)
 
 
 def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> None:
@@ -30,19 +40,40 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
         DataError: the archive is damaged, has an unsafe member, or does not fit on the disk.
     """
     require_file(archive, "fetch it again")
-    damaged = (tarfile.TarError, *DAMAGED)
+    damaged = (tarfile.TarError, gzip.BadGzipFile, *DAMAGED)
     with (
         wrap_errors(f"{archive}: cannot be unpacked to {target}", "make room, or fetch the archive again"),
         wrap_errors(f"{archive}: a damaged archive", "delete it and fetch it again", catch=damaged),
     ):
         target.parent.mkdir(parents=True, exist_ok=True)
         with (
-            tarfile.open(archive) as tar,
+            tarfile.open(archive, tarinfo=_BoundedInfo) as tar,
             tempfile.TemporaryDirectory(dir=target.parent, prefix=".unpacking-") as scratch,
         ):
             members = _check_members(tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free))
             tar.extractall(scratch, members=members, filter="data")
             (Path(scratch) / target.name).rename(target)
+
+
+class _BoundedInfo(tarfile.TarInfo):
+    """A header whose own data fit into memory."""
+
+    @classmethod
+    def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> Self:
+        info = super().frombuf(buf, encoding, errors)
+        if info.type in _HEADERS and info.size > _MAX_HEADER_BYTES:
+            raise tarfile.ReadError(f"a header of {info.size:,} bytes")
+        return info
+
+
+def _check_end(tar: tarfile.TarFile) -> None:
+    """Check that all members were read: tarfile takes a damaged header for the end of the archive."""
+    assert tar.fileobj is not None
+    tar.fileobj.seek(tar.offset)
+    if tar.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
+        raise tarfile.ReadError(f"no header and no end at byte {tar.offset:,}")
+    while tar.fileobj.read(2**20):
+        pass  # to the end, where compressed files have a checksum
 
 
 def _check_members(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int) -> list[tarfile.TarInfo]:
@@ -64,6 +95,7 @@ def _check_members(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int
         members.append(member)
         if member.size > _MAX_FILE_BYTES or total > max_bytes or len(members) > _MAX_FILES:
             raise DataError(f"{archive}: unpacks to more than the limit or the free disk; make room or check the file")
+    _check_end(tar)
     if not members:
         raise DataError(f"{archive}: empty archive; delete it and fetch it again")
     return members

@@ -231,3 +231,44 @@ def test_a_deep_object_in_a_trajectory_is_one_line(tmp_path):
     text = json.dumps(deep)[:-1] + ', "gen_info": {"a": ' + "[" * 100_000 + "]" * 100_000 + "}}"
     (tmp_path / "a.json").write_text(text)
     refused(lambda: list(iter_trajectories(tmp_path / "a.json")), "not a trajectory")
+
+
+def _packed(path, **headers):
+    """An archive of ten files of 2 KB, of which the first has these attributes."""
+    with tarfile.open(path, "w:gz", format=tarfile.PAX_FORMAT) as tar:
+        for number in range(10):
+            info = tarfile.TarInfo(f"metadata/{number}")
+            info.size, info.pax_headers = 2000, headers if number == 0 else {}
+            tar.addfile(info, io.BytesIO(os.urandom(2000)))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("damage", "problem"),
+    [
+        (lambda tar: tar[:6000] + bytes([tar[6000 + at] ^ 255 for at in range(2000)]) + tar[8000:], "no header"),
+        (lambda tar: tar[: tar.index(b"metadata/5") + 3] + b"\0" + tar[tar.index(b"metadata/5") + 4 :], "no header"),
+        (lambda tar: tar[: tar.index(b"metadata/5") + 100], "damaged archive"),
+        (lambda tar: tar[: tar.index(b"metadata/5")], "no header"),
+    ],
+)
+def test_half_of_an_archive_is_not_taken_for_the_whole(tmp_path, damage, problem):
+    path = _packed(tmp_path / "a.tar.gz")
+    path.write_bytes(gzip.compress(damage(gzip.decompress(path.read_bytes()))))
+    refused(lambda: unpack_tar(path, tmp_path / "metadata"), problem)
+    assert not (tmp_path / "metadata").exists()
+
+
+def test_a_checksum_that_is_wrong_is_noticed(tmp_path):
+    path = _packed(tmp_path / "a.tar.gz")
+    content = path.read_bytes()
+    path.write_bytes(content[:-8] + bytes([content[-8] ^ 1]) + content[-7:])
+    refused(lambda: unpack_tar(path, tmp_path / "metadata"), "a damaged archive")
+    unpack_tar(_packed(path), tmp_path / "metadata")
+    assert len(list((tmp_path / "metadata").iterdir())) == 10
+
+
+def test_a_header_that_would_fill_the_memory_is_not_read(tmp_path):
+    path = _packed(tmp_path / "a.tar.gz", comment="a" * 2**22)
+    refused(lambda: unpack_tar(path, tmp_path / "metadata"), "a header of 4,194,")
+    unpack_tar(_packed(path, comment="a" * 2**10), tmp_path / "metadata")
