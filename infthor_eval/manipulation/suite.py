@@ -9,8 +9,9 @@ from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 from infthor_eval.manipulation.summary import ManipulationSummary, summarise_manipulation
 from infthor_eval.manipulation.tables import overview_table, result_tables
+from infthor_eval.manipulation.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -26,6 +27,10 @@ class ManipulationSuite:
     options: ClassVar[type] = ManipulationOptions
     baselines: ClassVar[Mapping[str, Callable[[int], Subject]]] = BASELINES
     records: ClassVar[RecordTypes[ArmRecord]] = RECORDS
+
+    def check_task(self, task: TaskFile) -> None:
+        """See `Suite.check_task`."""
+        check_task_file(task)
 
     def prepare(self, request: TaskRequest[ManipulationOptions]) -> ManipulationEvaluation:
         """See `Suite.prepare`."""

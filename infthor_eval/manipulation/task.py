@@ -17,7 +17,7 @@ from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, re
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.limiting import limit_items
 
-__all__ = ["ArmTaskSettings", "ManipulationTask"]
+__all__ = ["ArmTaskSettings", "ManipulationTask", "check_task_file"]
 
 _INSTRUCTIONS = {
     ManipulationKind.PICKUP: "pick up the {object}",
@@ -105,6 +105,12 @@ class ArmTaskSettings:
     def camera_options(self) -> dict[str, Any]:
         """The same as options of `Simulator`."""
         return {"width": self.image_size, "height": self.image_size, "fieldOfView": self.field_of_view}
+
+
+def check_task_file(file: TaskFile) -> None:
+    """Check the settings of a task file; raises DataError if one is unknown or has a value that is not allowed."""
+    file.require("dataset_kwargs")
+    task_settings(file, ArmTaskSettings, {}, _CHOICES)
 
 
 class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):

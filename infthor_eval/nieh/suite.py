@@ -9,8 +9,9 @@ from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.summary import NiehSummary, primary_metrics, summarise
 from infthor_eval.nieh.tables import overview, tables
+from infthor_eval.nieh.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -26,6 +27,10 @@ class NiehSuite:
     options: ClassVar[type] = NiehOptions
     baselines: ClassVar[Mapping[str, Callable[[int], Subject]]] = BASELINES
     records: ClassVar[RecordTypes[NiehAnswer]] = RECORDS
+
+    def check_task(self, task: TaskFile) -> None:
+        """See `Suite.check_task`."""
+        check_task_file(task)
 
     def prepare(self, request: TaskRequest[NiehOptions]) -> "NiehEvaluation":
         """See `Suite.prepare`."""

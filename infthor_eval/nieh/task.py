@@ -18,7 +18,7 @@ from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
 from model_adapters import Decoding, cut_at_stop
 
-__all__ = ["NiehTask", "PreparedTask"]
+__all__ = ["NiehTask", "PreparedTask", "check_task_file"]
 
 _OF_SETS = ("context", "data", "bundled")  # keys of `dataset_kwargs` beside the settings of contexts
 _NEEDED = ("custom_dataset", "dataset_kwargs", "doc_to_text", "generation_kwargs", "process_results", "test_split")
@@ -62,7 +62,7 @@ class NiehTask:
             DataError: the file or the set is not valid.
         """
         file.require(*_NEEDED)
-        _check(file)
+        check_task_file(file)
         self.name = file.name
         self.settings: Mapping[str, Any] = file.settings
         self._limit = request.limit
@@ -125,7 +125,7 @@ class NiehTask:
         }
 
 
-def _check(file: TaskFile) -> None:
+def check_task_file(file: TaskFile) -> None:
     """Check the settings under `dataset_kwargs`, so that none is without effect, as a misspelt one would be.
 
     Raises:

@@ -9,8 +9,9 @@ from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.records import RECORDS, PlanRecord
 from infthor_eval.plans.summary import PlansSummary, summarise_plans
 from infthor_eval.plans.tables import overview_table, result_tables
+from infthor_eval.plans.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -26,6 +27,10 @@ class PlansSuite:
     options: ClassVar[type] = PlansOptions
     baselines: ClassVar[Mapping[str, Callable[[int], Subject]]] = BASELINES
     records: ClassVar[RecordTypes[PlanRecord]] = RECORDS
+
+    def check_task(self, task: TaskFile) -> None:
+        """See `Suite.check_task`."""
+        check_task_file(task)
 
     def prepare(self, request: TaskRequest[PlansOptions]) -> PlansEvaluation:
         """See `Suite.prepare`."""

@@ -23,7 +23,7 @@ from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.limiting import limit_items
 
-__all__ = ["PlanTaskSettings", "PlansTask"]
+__all__ = ["PlanTaskSettings", "PlansTask", "check_task_file"]
 
 _CHOICES = {
     "plans": ("all", "final"),
@@ -61,6 +61,12 @@ class PlanTaskSettings:
     after_failure: str = "continue"
     max_steps: int = MAX_STEPS
     preamble: str = ""
+
+
+def check_task_file(file: TaskFile) -> None:
+    """Check the settings of a task file; raises DataError if one is unknown or has a value that is not allowed."""
+    file.require("dataset_kwargs")
+    task_settings(file, PlanTaskSettings, {}, _CHOICES)
 
 
 class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):

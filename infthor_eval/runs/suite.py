@@ -208,6 +208,14 @@ class Suite(Protocol[U, P]):
     def records(self) -> RecordTypes[P]:
         """Payloads of the suite's records."""
 
+    def check_task(self, task: TaskFile) -> None:
+        """Check the settings of a task file, without its data.
+
+        Raises:
+            UsageError: a setting that does not fit.
+            DataError: the file does not match its format.
+        """
+
     def prepare(self, request: TaskRequest[Any]) -> Evaluation[U, P]:
         """Set up a run. Whatever can be refused without the subject is refused here, before it is loaded.
 

@@ -93,3 +93,13 @@ def test_a_larger_document_is_read_where_the_limit_is_raised(make_nieh_set, tmp_
     said_in_one_line(run(*arguments), "has more than 10 values")
     monkeypatch.delenv("INFTHOR_EVAL_MAX_YAML_NODES")
     assert run(*arguments)[0] == 0
+
+
+@pytest.mark.parametrize("settings", ["null", "[context]", "{context: trajctory}", "{context: clues, depthz: [0.2]}"])
+def test_a_task_that_cannot_be_run_is_not_listed_as_if_it_could(tmp_path, run, settings):
+    (tmp_path / "own.yaml").write_text(f"{HEAD}dataset_kwargs: {settings}\n")
+    (tmp_path / "good.yaml").write_text("include: _nieh.yaml\ntask: good\ndataset_kwargs: {context: clues}\n")
+    code, out, err = run("ls", "tasks", "--include-path", tmp_path)
+    assert (code, err) == (0, "")
+    said = " ".join(out.split())
+    assert said.count("not usable: ") == 1 and "good context clues" in said and "nieh_mini_gt" in said

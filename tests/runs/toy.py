@@ -72,6 +72,9 @@ class ToySuite:
     name, needs, options, records = "toy", "conversation", object, runs.RecordTypes(Sum)
     baselines = {"adder": Adder}  # noqa: RUF012
 
+    def check_task(self, task):
+        pass
+
     def prepare(self, request):
         return Prepared(Sums)
 

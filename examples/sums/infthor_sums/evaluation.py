@@ -54,9 +54,7 @@ class SumsEvaluation:
 
 
 def _draw_sums(task: TaskFile) -> list[Sum]:
-    settings = task.settings.get("dataset_kwargs", {})
-    if not settings.keys() >= {"below", "n"}:
-        raise UsageError(f"{task.path}: no below and n under dataset_kwargs; write {{below: 20, n: 24}}")
+    settings = settings_of(task)
     draw = random.Random(task.name)  # the same sums in every run
     pairs = [(a, b) for a in range(settings["below"]) for b in range(settings["below"])]
     return [Sum(a, b) for a, b in sorted(draw.sample(pairs, settings["n"]))]
@@ -126,3 +124,11 @@ class BoundSums:
 
     def close(self) -> None:
         """See `BoundEvaluation.close`: there is nothing to release."""
+
+
+def settings_of(task: TaskFile) -> Mapping[str, int]:
+    """Return the settings of a task file; raises UsageError if one is missing."""
+    settings = task.settings.get("dataset_kwargs", {})
+    if not isinstance(settings, Mapping) or not settings.keys() >= {"below", "n"}:
+        raise UsageError(f"{task.path}: no below and n under dataset_kwargs; write {{below: 20, n: 24}}")
+    return settings

@@ -11,7 +11,7 @@ from typing import ClassVar
 import msgspec
 
 from infthor_eval.rates import Rate, clustered_rate, format_percent
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskRequest, UnitRecord
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
 from infthor_eval.runs.baseline import BaselineSubject
 from infthor_eval.tables import Column, Row, Table
 
@@ -83,6 +83,12 @@ class SumsSuite:
     options: ClassVar[type] = SumsOptions
     baselines: ClassVar[Mapping[str, type]] = {"calculator": Calculator}
     records: ClassVar[RecordTypes] = RecordTypes(Sum)
+
+    def check_task(self, task: TaskFile) -> None:
+        """See `Suite.check_task`."""
+        from infthor_sums.evaluation import settings_of
+
+        settings_of(task)
 
     def prepare(self, request: TaskRequest):
         """See `Suite.prepare`."""

@@ -17,7 +17,7 @@ from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.catalog import Catalog
 from infthor_eval.runs.run_labels import label_runs
 from infthor_eval.runs.run_search import BrokenRun, StoredRun, find_runs
-from infthor_eval.suites import baseline_suites, split_by_suite
+from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import console, print_line
 from model_adapters import names, options
@@ -79,6 +79,11 @@ def _tasks(include: tuple[Path, ...]) -> None:
             if any(task in tasks for task in catalog.expand(members)):
                 table.add_row(group, f"group: {', '.join(members)}", "")
         for task in tasks:
+            try:
+                find_suite(suite).check_task(task)
+            except InfthorError as error:  # a file of one's own, or another package's: say so, list the others
+                table.add_row(task.name, f"not usable: {error}", "", style="red")
+                continue
             settings = dict(task.settings.get("dataset_kwargs", {}))
             data = settings.pop("bundled", "--data")
             without_description = ", ".join(f"{name} {value}" for name, value in settings.items())
