@@ -6,6 +6,7 @@ The rules are those of the paper's Table 3; our further forms are optional and h
 import random
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -182,7 +183,13 @@ class _QuestionWorker:
         pass
 
     def do(self, job: _RuleJob | _CheckJob) -> Iterator[Any]:
-        yield job.run()
+        try:
+            with _telling_inconsistency(job.path):
+                result: Any = job.run()
+        except DataError as error:  # of this trajectory alone
+            yield error
+        else:
+            yield result
 
     def close(self) -> None:
         pass
@@ -198,15 +205,20 @@ def _share_out(
     results: dict[Path, Any] = {}
     for number, outcome in run_jobs(_QuestionWorker, jobs, worker_settings, say):
         if isinstance(outcome, InfthorError):
-            result.skipped.append(f"{jobs[number].path}: {outcome}")
+            place = "" if isinstance(outcome, DataError) else f"{jobs[number].path}: "
+            result.skipped.append(f"{place}{outcome}")
         else:
             results[jobs[number].path] = outcome
     return results
 
 
 def _read_history(path: Path, share: float) -> TrajectoryHistory:
-    with wrap_errors(f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT):
+    with _telling_inconsistency(path):
         return TrajectoryHistory(path.name, read_steps(path), share)
+
+
+def _telling_inconsistency(path: Path) -> AbstractContextManager[None]:
+    return wrap_errors(f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT)
 
 
 def _trajectory_folders(folder: Path) -> list[Path]:

@@ -1,6 +1,8 @@
 """The rules on a replayed trajectory, judged by the checker and by the scorers."""
 
+import json
 import re
+import shutil
 from collections import Counter, defaultdict
 from dataclasses import replace
 
@@ -212,3 +214,16 @@ def test_a_log_without_what_frames_show_is_skipped(replayed, tmp_path):
         TrajectoryHistory("t", [Step(0, "0.png")])
     with pytest.raises(DataError, match="has no trajectory; replay"):
         generate_questions(tmp_path)
+
+
+def test_a_log_that_contradicts_itself_is_skipped_and_the_others_are_asked_about(replayed, tmp_path):
+    shutil.copytree(replayed, tmp_path / "set")
+    path = tmp_path / "set/metadata/kitchen-3-seed3/metadata.json"
+    steps = json.loads(path.read_text())
+    opened = next(step for step in steps if (step.get("action") or "").startswith("PickupObject"))
+    opened["target"] = "Mug|+09.00|+09.00|+09.00"  # which is nowhere
+    path.write_text(json.dumps(steps))
+    made = generate_questions(tmp_path / "set", per_trajectory=10)
+    (line,) = made.skipped
+    assert "kitchen-3-seed3: its log is inconsistent (no 'Mug|+09.00|+09.00|+09.00'); replay" in line
+    assert {question.traj_id for question in made.questions} == {"kitchen-5-seed3"}
