@@ -2,6 +2,9 @@
 
 import pytest
 
+from infthor_eval.runs import Catalog
+from infthor_eval.suites import find_suite
+
 from .told import said_in_one_line
 
 SETTING = "own.yaml: dataset_kwargs:"
@@ -103,3 +106,8 @@ def test_a_task_that_cannot_be_run_is_not_listed_as_if_it_could(tmp_path, run, s
     assert (code, err) == (0, "")
     said = " ".join(out.split())
     assert said.count("not usable: ") == 1 and "good context clues" in said and "nieh_mini_gt" in said
+
+
+def test_all_packaged_tasks_are_good():
+    for task in Catalog.find_packaged().tasks.values():
+        find_suite(task.suite).check_task(task)
