@@ -135,7 +135,7 @@ def test_what_the_published_saver_writes_is_replayed_asked_about_and_evaluated(t
     assert training.long_horizon_task is None
     assert test.long_horizon_task.task_desc == test.sub_tasks[-1].task_desc == test.sub_trajs[-1].subgoal
     made = generate_questions(tmp_path / "set", per_trajectory=20)
-    assert len(made.questions) == 40 and not made.unconfirmed
+    assert 30 < len(made.questions) <= 40 and not made.unconfirmed
     assert "put a cold apple in the microwave" in (tmp_path / "set/metadata/floorplan28_test/traj.txt").read_text()
     predict = BASELINES["oracle"](0).fit(made.questions)
     said = {question: predict(Sample(question, question.clues)) for question in made.questions}
