@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from infthor_eval.sim.default_objects import default_object
+from infthor_eval.sim.free_places import find_place
 from infthor_eval.sim.geometry import Array, object_id
 from infthor_eval.sim.object_types import ObjectType, allowed_in, type_named
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.receptacles import find_parent, find_place
+from infthor_eval.sim.receptacles import find_parent
 from infthor_eval.sim.world import World
 
 __all__ = ["NamedPose", "assign_parents", "set_poses", "spawn_randomly"]

@@ -1,26 +1,18 @@
-"""The surfaces of receptacles, free places on them, and the receptacle that an object is in or on."""
+"""The surfaces of receptacles, and the receptacle that an object is in or on."""
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array, yaw_matrix
 from infthor_eval.sim.objects import DRAWER_SLIDE, SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["PointFilter", "Surface", "contains_box", "find_parent", "find_place", "surfaces"]
+__all__ = ["Surface", "contains_box", "drawer_offset", "find_parent", "surfaces"]
 
 _WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacles
-_STEP = 0.05  # metres between the places that are tried
-_BELOW_HAND = 0.15  # metres below the agent's own height of the surface that is tried first
-_CLEARANCE = 0.008  # metres between neighbours
-_ON_IT = 0.05  # metres between a surface and the underside of what stands on it
-
-
-PointFilter = Callable[[Array], NDArray[np.bool_]]
+_TOUCH = 0.008  # metres by which what stands on a vessel's floor may reach into it
 
 
 @dataclass(frozen=True)
@@ -99,131 +91,7 @@ def contains_box(vessel: SimObject, low: Array, high: Array) -> bool:
     sides = np.array([[half[0], 0, 0], [-half[0], 0, 0], [0, 0, half[2]], [0, 0, -half[2]]])
     points = (middle + sides - cavity.center) @ yaw_matrix(cavity.yaw)
     beside = np.abs(points[:, [0, 2]]).max(axis=0) > cavity.half
-    return bool(low[1] > cavity.center[1] - _CLEARANCE and not beside.any())
-
-
-def find_place(
-    world: World,
-    item: SimObject,
-    receptacle: SimObject,
-    overlap: float = 0.0,
-    random: np.random.Generator | None = None,
-    point_filter: PointFilter | None = None,
-    among_fixed: bool = False,
-) -> SimObject | None:
-    """Return a copy of `item` at the first free place of `receptacle`; None if it is full.
-
-    Args:
-        item: object to place, e.g. the held one; it and the world are not changed.
-        overlap: share of their size by which neighbours may overlap.
-        random: random numbers that choose among the free places; None for the nearest.
-        point_filter: function that marks which of some points (n, 3) may be used; None: all.
-        among_fixed: allow places within lamps, appliances and taps: their recorded boxes are too large.
-    """
-    boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
-    ghost = item.duplicate(item.object_id)
-    for surface in _sort_by_reach(world, surfaces(receptacle)):
-        fixed = [] if among_fixed else [o.bounds() for o in _fixed_on(world, receptacle, surface)]
-        for turn in (0.0, 90.0):
-            ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
-            place = _free_point(world, ghost, surface, boxes + fixed, overlap, random, point_filter)
-            if place is not None:
-                ghost.place_bottom(place)
-                return ghost
-    return None
-
-
-def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterator[SimObject]:
-    """Yield the loose objects that could be in the way: those in this receptacle, and those of other receptacles."""
-    inside = {o.object_id for o in world.descendants(item)} | {item.object_id}
-    for other in world.objects.values():
-        if other.object_id in inside or other is receptacle or not other.type.pickupable:
-            continue
-        # Left out: objects on nothing, and those that share the receptacle's own parent. These stand beside it, as
-        # plates on the table that a bowl is on.
-        if other.parent == receptacle.object_id or (other.parent is not None and receptacle.parent != other.parent):
-            yield other
-
-
-def _fixed_on(world: World, receptacle: SimObject, surface: Surface) -> Iterator[SimObject]:
-    """Yield what stands on the surface and cannot be picked up: lamps, screens, appliances, taps, burners."""
-    for other in world.objects.values():
-        if other.type.pickupable or other.type.furniture or other.type.stacked or other is receptacle:
-            continue
-        if abs(float(other.bounds()[0][1]) - float(surface.center[1])) < _ON_IT:
-            yield other
-
-
-def _sort_by_reach(world: World, listed: list[Surface]) -> list[Surface]:
-    """Return surfaces, the easiest for the agent to reach first: near its hand's height, then near it, then low."""
-    agent = world.agent.position
-
-    def cost(surface: Surface) -> tuple[float, float, float]:
-        turned = yaw_matrix(surface.yaw).T @ (agent - surface.center)
-        away = np.maximum(np.abs(turned[[0, 2]]) - surface.half, 0.0)
-        return (
-            round(abs(surface.center[1] - agent[1] + _BELOW_HAND), 3),
-            float(np.hypot(*away)),
-            float(surface.center[1]),
-        )
-
-    return sorted(listed, key=cost)
-
-
-def _free_point(
-    world: World,
-    ghost: SimObject,
-    surface: Surface,
-    boxes: list[tuple[Array, Array]],
-    overlap: float,
-    random: np.random.Generator | None,
-    point_filter: PointFilter | None,
-) -> Array | None:
-    """Return the point (3,) of a surface for the underside of `ghost`, clear of `boxes`; None if there is none."""
-    low, high = ghost.bounds()
-    height = high[1] - low[1]
-    if height > surface.headroom + 0.02:
-        return None
-    turn = yaw_matrix(surface.yaw)
-    local = np.abs(turn.T @ (high - low)) if surface.yaw % 90 == 0 else high - low
-    points = _grid(world, surface, (local[0] / 2, local[2] / 2), turn)
-    if not len(points):
-        return None
-    if point_filter is not None:
-        points = points[point_filter(points + np.array([0.0, height / 2, 0.0]))]
-    half = (high - low) / 2 * (1 - overlap)
-    gap = _CLEARANCE * (1 - overlap)
-    free = np.ones(len(points), dtype=bool)
-    for other_low, other_high in boxes:
-        if other_low[1] > surface.center[1] + height or other_high[1] < surface.center[1] + 0.004:
-            continue  # above or below what is to stand here
-        middle, other = (other_low + other_high) / 2, (other_high - other_low) / 2 * (1 - overlap)
-        free &= (np.abs(points[:, 0] - middle[0]) > half[0] + other[0] + gap) | (
-            np.abs(points[:, 2] - middle[2]) > half[2] + other[2] + gap
-        )
-    chosen = points[free]
-    if not len(chosen):
-        return None
-    return chosen[0] if random is None else chosen[int(random.integers(len(chosen)))]
-
-
-def _grid(world: World, surface: Surface, half: tuple[float, float], turn: Array) -> Array:
-    """Return points (n, 3) of the surface at which something of this half size fits on it, nearest first."""
-    spans = [surface.half[i] - half[i] for i in range(2)]
-    if min(spans) < -surface.overhang:
-        return np.zeros((0, 3))
-    axes = []
-    for span in spans:
-        count = max(1, math.ceil(2 * max(span, 0.0) / _STEP) + 1)
-        axes.append(np.linspace(-max(span, 0.0), max(span, 0.0), count) if count > 1 else np.zeros(1))
-    xs, zs = np.meshgrid(axes[0], axes[1], indexing="ij")
-    flat = np.stack([xs.ravel(), np.zeros(xs.size), zs.ravel()], axis=1) @ turn.T + surface.center
-    origin = surface.center if surface.from_middle else world.agent.position
-    away = np.hypot(flat[:, 0] - origin[0], flat[:, 2] - origin[2])
-    # Places within 6 cm of the edge count as farther away than they are: things stand safer, and look so, inside.
-    edge = np.maximum(0.0, 0.06 - np.minimum(axes[0].max() - np.abs(xs.ravel()), axes[1].max() - np.abs(zs.ravel())))
-    # Rounding and a stable sort make ties independent of the last bits of the agent's position.
-    return flat[np.argsort(np.round(away + 3 * edge, 6), kind="stable")]
+    return bool(low[1] > cavity.center[1] - _TOUCH and not beside.any())
 
 
 def find_parent(world: World, item: SimObject) -> SimObject | None:

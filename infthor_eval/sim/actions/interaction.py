@@ -7,9 +7,10 @@ from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.actions.targets import BY_ID_OR_PIXEL, held_object, interactable, object_action
 from infthor_eval.sim.effects import slice_object, toggle
 from infthor_eval.sim.errors import ActionError, ErrorCode
+from infthor_eval.sim.free_places import find_place
 from infthor_eval.sim.object_types import allowed_in
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.receptacles import drawer_offset, find_place
+from infthor_eval.sim.receptacles import drawer_offset
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.unfolding import unfold
 

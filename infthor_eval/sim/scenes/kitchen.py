@@ -75,7 +75,7 @@ def _place_sink(plan: RoomPlan, top: SimObject, at: float) -> None:
     faucet = plan.place_against("z+", "Faucet", at, y=_HEIGHT, size=(0.16, 0.28, 0.2), gap=0.04)
     faucet.style = 0
     top.pieces, sink.pieces = rim_pieces(top, sink), rim_pieces(sink, basin)
-    plan.place_against("z+", "Window", at, y=1.25, size=(0.8, 0.9, 0.06), gap=-0.02)
+    plan.place_against("z+", "Window", at, y=1.25, size=(_MODULE - 0.04, 0.9, 0.06), gap=-0.02)
 
 
 def _place_stove(plan: RoomPlan, at: float) -> None:

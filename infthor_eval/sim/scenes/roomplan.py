@@ -6,11 +6,12 @@ import numpy as np
 
 from infthor_eval.sim.agent import AGENT_HEIGHT, Agent
 from infthor_eval.sim.default_objects import default_object
+from infthor_eval.sim.free_places import find_place
 from infthor_eval.sim.geometry import Array, aabb_overlap, level_gaps
 from infthor_eval.sim.navigation import CELL, NavGrid
 from infthor_eval.sim.object_types import allowed_in, type_named
 from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.receptacles import find_place
+from infthor_eval.sim.solids import opening_space
 from infthor_eval.sim.world import RoomShell, World
 
 __all__ = ["RoomPlan", "build_world"]
@@ -30,7 +31,7 @@ class RoomPlan:
     Attributes:
         objects: furniture and fixtures so far.
         loose: types of the loose objects to scatter.
-        reserved: boxes of floor that must stay free.
+        reserved: boxes that must stay free: before doorways, doors and drawers, below towel rails.
     """
 
     def __init__(self, room: RoomShell, random: np.random.Generator) -> None:
@@ -49,13 +50,26 @@ class RoomPlan:
         y: float = 0.0,
         size: tuple[float, float, float] | None = None,
     ) -> SimObject:
-        """Put an object with the middle of its underside at (x, y, z)."""
+        """Put an object with the middle of its underside at (x, y, z); the space that its door needs stays free."""
+        item = self._at(object_type, x, z, yaw, y, size)
+        self._add(item)
+        return item
+
+    def _add(self, item: SimObject) -> None:
+        self.objects.append(item)
+        to_open = opening_space(item)
+        if to_open is not None:
+            self.reserved.append(to_open)
+
+    @staticmethod
+    def _at(
+        object_type: str, x: float, z: float, yaw: float, y: float, size: tuple[float, float, float] | None
+    ) -> SimObject:
         # Two steps, as the id names the object's origin, which follows from its box.
         item = default_object(object_type, np.zeros(3), yaw, None if size is None else np.array(size))
         item.place_bottom(np.array([x, y, z]))
         named = default_object(object_type, np.round(item.position, 4), yaw, item.box_size)
         named.support = item.support
-        self.objects.append(named)
         return named
 
     def place_against(
@@ -76,6 +90,13 @@ class RoomPlan:
             size: width, height and depth, metres; None for the type's usual size.
             gap: distance from the wall, metres.
         """  # fmt: skip
+        item = self._against(side, object_type, at, y, size, gap)
+        self._add(item)
+        return item
+
+    def _against(
+        self, side: str, object_type: str, at: float, y: float, size: tuple[float, float, float] | None, gap: float
+    ) -> SimObject:
         depth = (type_named(object_type).size if size is None else size)[2] / 2 + gap
         room = self.room
         x, z, yaw = {
@@ -84,7 +105,7 @@ class RoomPlan:
             "x+": (room.x_max - depth, at, 270.0),
             "x-": (room.x_min + depth, at, 90.0),
         }[side]
-        return self.place(object_type, x, z, yaw, y, size)
+        return self._at(object_type, x, z, yaw, y, size)
 
     def shuffle(self, options: Sequence[str]) -> list[str]:
         """Return walls or types in a random order."""
@@ -96,10 +117,14 @@ class RoomPlan:
         return (room.x_min, room.x_max) if side[0] == "z" else (room.z_min, room.z_max)
 
     def is_clear(self, low: Array, high: Array, margin: float = 0.0) -> bool:
-        """Return whether a box, grown by a margin, touches no furniture and no reserved floor."""
-        grown_low, grown_high = low - margin, high + margin
-        boxes = [o.bounds() for o in self.objects if o.object_type != "Floor"] + self.reserved
-        return not any(aabb_overlap(grown_low, grown_high, a, b) for a, b in boxes)
+        """Return whether a box, grown by a margin, touches no furniture and no reserved space."""
+        return self._is_empty(low - margin, high + margin) and not any(
+            aabb_overlap(low - margin, high + margin, a, b) for a, b in self.reserved
+        )
+
+    def _is_empty(self, low: Array, high: Array) -> bool:
+        """Return whether a box touches no furniture."""
+        return not any(aabb_overlap(low, high, *o.bounds()) for o in self.objects if o.object_type != "Floor")
 
     def try_against(
         self, object_type: str, sides: Iterable[str], size: tuple[float, float, float] | None = None, y: float = 0.0
@@ -110,12 +135,13 @@ class RoomPlan:
             start, end = self.span(side)
             places = np.arange(start + width / 2 + 0.1, end - width / 2 - 0.1 + 1e-6, 0.15)
             for at in self.random.permutation(places):
-                item = self.place_against(side, object_type, round(float(at), 2), y, size, gap=0.02 if y == 0 else 0.0)
-                self.objects.pop()
-                low, high = item.bounds()
+                item = self._against(side, object_type, round(float(at), 2), y, size, gap=0.02 if y == 0 else 0.0)
                 blocked = any(s == side and a - width / 2 < at < b + width / 2 for s, a, b in self.room.openings)
-                if not blocked and self.is_clear(low, high, 0.05 if y == 0 else 0.01):
-                    self.objects.append(item)
+                to_open = opening_space(item)
+                if blocked or not (to_open is None or self._is_empty(*to_open)):
+                    continue
+                if self.is_clear(*item.bounds(), 0.05 if y == 0 else 0.01):
+                    self._add(item)
                     return item
         return None
 
