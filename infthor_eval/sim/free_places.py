@@ -114,10 +114,13 @@ def _outer_boxes(other: SimObject, surface: Surface, low: Array, high: Array) ->
 
     What stands on the surface keeps its whole box: things look lost under a lamp's shade.
     """
+    bounds = other.bounds()
+    farthest = float(other.box_size.max()) if other.type.hinged or other.type.slides else 0.0
+    if not aabb_overlap(bounds[0] - farthest, bounds[1] + farthest, low, high):
+        return
     to_open = opening_space(other)
     if to_open is not None:
         yield to_open
-    bounds = other.bounds()
     if (other.type.encloses and not other.hollow) or 0 <= float(bounds[0][1] - surface.center[1]) + _CLEARANCE < _ON_IT:
         yield bounds
     elif aabb_overlap(*bounds, low, high):

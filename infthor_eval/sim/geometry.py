@@ -125,7 +125,7 @@ def _coordinate_text(value: float) -> str:
 
 def aabb_overlap(low_a: Array, high_a: Array, low_b: Array, high_b: Array) -> bool:
     """Return whether two axis-aligned boxes, given by their low and high corners, share volume."""
-    return bool(np.all(low_a < high_b) and np.all(low_b < high_a))
+    return bool((low_a < high_b).all() and (low_b < high_a).all())
 
 
 def aabb_gap(point: Array, low: Array, high: Array) -> float:

@@ -211,8 +211,10 @@ def _scatter(world: World, plan: RoomPlan) -> None:
         holders = [(o, stock) for o, stock in fitting if o.object_type.endswith("Holder")]
         order = [*holders, *(fitting[i] for i in plan.random.permutation(len(fitting)))]
         for home, stock in order:
+            if len(home.contents) >= stock:
+                continue
             place = find_place(world, item, home, random=plan.random)
-            if place is None or len(home.contents) >= stock:
+            if place is None:
                 continue
             # A new object at the place, as its id names its position. Two at the same rounded one would share an id.
             placed = default_object(object_type, np.round(place.position, 4), float(place.rotation[1]))
