@@ -52,6 +52,7 @@ def _place_washstand(plan: RoomPlan, at: float) -> None:
     plan.place_against("z+", "Mirror", at, y=1.2, size=(1.0, 0.8, 0.04))
     for column in (-1, 0, 1):
         cabinet = plan.place_against(
-            "z+", "Cabinet", round(at + column * width / 3, 3), y=0.1, size=(width / 3 - 0.03, 0.58, 0.5), gap=0.01
+            "z+", "Cabinet", round(at + column * width / 3, 3), y=0.1, size=(width / 3 - 0.004, 0.705, 0.5), gap=0.01
         )
+        cabinet.hollow = column == 0  # the sink hangs in it
         cabinet.hinge = 1 if column > 0 else -1

@@ -11,6 +11,7 @@ __all__ = ["furnish_kitchen"]
 
 _HEIGHT, _DEPTH = 0.92, 0.65  # of the counter, metres
 _MODULE = 0.6  # width of a part of the counter, metres
+_FRONT = _MODULE - 0.004  # width of its doors and drawers: a hairline between neighbours
 _APPLIANCES = (("Microwave", (0.52, 0.32, 0.4)), ("CoffeeMachine", (0.25, 0.36, 0.3)), ("Toaster", (0.2, 0.2, 0.3)))
 _TOOLS = (
     "Apple Bread ButterKnife Bowl Cup DishSponge Egg Fork Knife Lettuce Mug Pan PepperShaker Plate Pot Potato"
@@ -51,7 +52,7 @@ def _place_counter(plan: RoomPlan) -> None:
         elif index == stove:
             _place_stove(plan, at)
         if index not in (sink, stove):
-            upper = plan.place_against("z+", "Cabinet", at, y=1.5, size=(_MODULE - 0.02, 0.65, 0.35))
+            upper = plan.place_against("z+", "Cabinet", at, y=1.5, size=(_FRONT, 0.65, 0.35))
             upper.hinge = 1 if index % 2 else -1
     free = [i for i in range(count) if i not in (sink, stove)]
     for (object_type, size), index in zip(_APPLIANCES, plan.random.permutation(free), strict=False):
@@ -61,9 +62,9 @@ def _place_counter(plan: RoomPlan) -> None:
 def _place_lower_cabinet(plan: RoomPlan, at: float, index: int, drawer: bool) -> None:
     top = _HEIGHT - 0.05
     if drawer:
-        plan.place_against("z+", "Drawer", at, y=top - 0.17, size=(_MODULE - 0.02, 0.16, _DEPTH - 0.06))
-        top -= 0.18
-    cabinet = plan.place_against("z+", "Cabinet", at, y=0.1, size=(_MODULE - 0.02, top - 0.11, _DEPTH - 0.06))
+        plan.place_against("z+", "Drawer", at, y=top - 0.178, size=(_FRONT, 0.176, _DEPTH - 0.06))
+        top -= 0.182
+    cabinet = plan.place_against("z+", "Cabinet", at, y=0.1, size=(_FRONT, top - 0.102, _DEPTH - 0.06))
     cabinet.hinge = 1 if index % 2 else -1
     cabinet.hollow = not drawer  # the sink hangs in it
 
