@@ -1,10 +1,10 @@
 """Count the things of procedural rooms whose drawings go through one another, as a careful eye sees them.
 
-    python benchmarks/interpenetrations.py [--rooms 200] [--against CHECKOUT] [--examples]
+    python benchmarks/interpenetrations.py [--rooms 200] [--puts 10] [--against CHECKOUT] [--examples]
 
 For each room it looks at the drawn solids, not at the boxes of the metadata, by points within each of them: at rest,
-and with each door, drawer and lid opened in turn, which shows what is inside and moves what opens. Two objects
-interpenetrate if a point of one lies deeper than a centimetre (for thin boards: beyond their middle) in a solid of the
+with each door, drawer and lid opened in turn, which shows what is inside and moves what opens, and where an agent put
+things. Two objects interpenetrate if a point of one lies deeper than a centimetre (for thin boards: beyond their middle) in a solid of the
 other, or if a solid crosses the wall of a vessel. Counted are pairs of which at least one is loose, or has just been
 opened, or which are not built into one another, and things that go through a wall of the room. It prints one JSON
 object: rooms, pairs by where they are seen, the most frequent pairs of types, and objects per room.
@@ -236,7 +236,38 @@ def faults(world: Any) -> dict[str, set[tuple[str, str]]]:
     return found
 
 
-def count(n_rooms: int) -> dict[str, Any]:
+def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[tuple[str, str]]:
+    """Return the pairs that arise when an agent puts loose things into or onto what takes them, one after the other."""
+    from infthor_eval.sim.object_types import allowed_in
+    from infthor_eval.sim.scenes.catalogue import Catalogue
+    from infthor_eval.sim.server import SimulatorServer
+    from infthor_eval.sim.simulation import Simulation
+
+    server = SimulatorServer(sim := Simulation(Catalogue()))
+    server.run({"action": "Reset", "sceneName": scene})
+    server.run({"action": "Initialize"})
+    room, world, found = Room(sim.world), sim.world, set[tuple[str, str]]()
+    before = {(a, b) for a, b, _ in room.pairs()}
+    for _ in range(n_puts):
+        loose = [o for o in world.objects.values() if o.type.pickupable]
+        item = loose[int(random.integers(len(loose)))]
+        homes = [o for o in world.objects.values() if allowed_in(item.object_type, o.object_type) and o is not item
+                 and o not in world.descendants(item)]  # fmt: skip
+        if not homes:
+            continue
+        home = homes[int(random.integers(len(homes)))]
+        server.run({"action": "PickupObject", "objectId": item.object_id, "forceAction": True})
+        if home.type.openable and home.state.openness == 0:
+            server.run({"action": "OpenObject", "objectId": home.object_id, "forceAction": True})
+        server.run({"action": "PutObject", "objectId": home.object_id, "forceAction": True, "placeStationary": True})
+        if world.held is not None:  # there was no room
+            server.run({"action": "DropHandObject", "forceAction": True})
+            continue
+        found |= {(a, b) for a, b, _ in room.pairs({item.object_id})} - before
+    return found
+
+
+def count(n_rooms: int, n_puts: int) -> dict[str, Any]:
     """Return all numbers, see the module's docstring."""
     from infthor_eval.sim.scenes.procedural import build_scene
 
@@ -246,7 +277,7 @@ def count(n_rooms: int) -> dict[str, Any]:
         kind, seed = _KINDS[index % 4], 1000 + index // 4
         world = build_scene(kind, seed)
         n_objects += len(world.objects)
-        found = faults(world)
+        found = {**faults(world), "put": faults_of_puts(f"{kind}-{seed}", n_puts, np.random.default_rng(index))}
         with_fault += any(found.values())
         for where, listed in found.items():
             pairs[where] += len(listed)
@@ -265,15 +296,16 @@ def main() -> None:
     """Parse the arguments and print the numbers."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rooms", type=int, default=200, help="rooms, of the four kinds in turn, from seed 1000")
+    parser.add_argument("--puts", type=int, default=10, help="things that an agent puts somewhere, in each room")
     parser.add_argument("--against", metavar="CHECKOUT", help="also count with the simulator of another checkout")
     parser.add_argument("--examples", action="store_true", help="name a pair of objects of each kind of pair")
     options = parser.parse_args()
-    result = count(options.rooms)
+    result = count(options.rooms, options.puts)
     if not options.examples:
         del result["examples"]
     if options.against:
         # This file, with the other checkout's simulator.
-        command = [sys.executable, __file__, "--rooms", str(options.rooms)]
+        command = [sys.executable, __file__, "--rooms", str(options.rooms), "--puts", str(options.puts)]
         environment = {**os.environ, "PYTHONPATH": str(Path(options.against).resolve())}
         result = {
             "other": json.loads(subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout),

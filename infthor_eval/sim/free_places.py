@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,54 @@ _BELOW_HAND = 0.15  # metres below the agent's own height of the surface that is
 _CLEARANCE = 0.008  # metres between neighbours
 _SQUEEZE = 0.02  # metres by which recorded insides may be higher than their boxes
 _SOFT = 0.01  # metres that covers and cushions rise above the surface they lie on
+_TOUCH = 0.004  # metres that what a thing stands on may reach into its box
 _ON_IT = 0.05  # metres between a surface and the underside of what stands on it
 
 PointFilter = Callable[[Array], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class _Obstacles:
+    """What is in the way on a surface.
+
+    Attributes:
+        loose: boxes of things that may be squeezed against.
+        fixed: boxes of what is solid.
+        walls: round walls between which a thing must fit.
+    """
+
+    loose: list[Box]
+    fixed: list[Box]
+    walls: list[Wall]
+
+    def clear_of(self, points: Array, size: Array, ghost: SimObject, overlap: float) -> NDArray[np.bool_]:
+        """Return at which of some points (n, 3) a thing of a size (3,) metres stands clear of all.
+
+        Args:
+            ghost: the thing, turned as it will be.
+            overlap: share of their size by which loose things may overlap.
+        """
+        free = _apart(points, size, self.fixed, 0.0) & _apart(points, size, self.loose, overlap)
+        for wall in self.walls:
+            free &= wall.holds(points, outline(ghost))
+        return free
+
+
+def _apart(points: Array, size: Array, boxes: list[Box], overlap: float) -> NDArray[np.bool_]:
+    """Return at which points (n, 3) the middle of the underside of a box of a size (3,) is clear of all of `boxes`."""
+    free = np.ones(len(points), dtype=bool)
+    if not len(points):
+        return free
+    level = float(points[0, 1])
+    half, gap = size / 2 * (1 - overlap), _CLEARANCE * (1 - overlap)
+    for low, high in boxes:
+        if low[1] > level + size[1] or high[1] < level + _TOUCH:
+            continue  # above or below what is to stand here
+        middle, other = (low + high) / 2, (high - low) / 2 * (1 - overlap)
+        free &= (np.abs(points[:, 0] - middle[0]) > half[0] + other[0] + gap) | (
+            np.abs(points[:, 2] - middle[2]) > half[2] + other[2] + gap
+        )
+    return free
 
 
 def find_place(
@@ -46,12 +92,14 @@ def find_place(
     ghost = item.duplicate(item.object_id)
     for surface in _sort_by_reach(world, surfaces(receptacle)):
         if world.coarse:
-            fixed, walls = [] if among_fixed else [o.bounds() for o in _fixed_on(world, receptacle, surface)], []
+            fixed = [] if among_fixed else [o.bounds() for o in _fixed_on(world, receptacle, surface)]
+            obstacles = _Obstacles([*boxes, *fixed], [], [])  # recorded boxes are too large to be taken for solid
         else:
-            fixed, walls = list(_solid_boxes(world, item, receptacle, surface)), _inner_walls(receptacle)
+            fixed = list(_solid_boxes(world, item, receptacle, surface))
+            obstacles = _Obstacles(boxes, fixed, _inner_walls(receptacle))
         for turn in (0.0, 90.0):
             ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
-            place = _free_point(world, ghost, surface, boxes + fixed, walls, overlap, random, point_filter)
+            place = _free_point(world, ghost, surface, obstacles, overlap, random, point_filter)
             if place is not None:
                 ghost.place_bottom(place)
                 return ghost
@@ -163,13 +211,12 @@ def _free_point(
     world: World,
     ghost: SimObject,
     surface: Surface,
-    boxes: list[Box],
-    walls: list[Wall],
+    obstacles: _Obstacles,
     overlap: float,
     random: np.random.Generator | None,
     point_filter: PointFilter | None,
 ) -> Array | None:
-    """Return the point (3,) of a surface for the underside of `ghost`, clear of `boxes`, within `walls`, or None."""
+    """Return the point (3,) of a surface for the underside of `ghost`, clear of obstacles; None if there is none."""
     low, high = ghost.bounds()
     height = high[1] - low[1]
     if height > surface.headroom + (_SQUEEZE if world.coarse else 0.0):
@@ -181,19 +228,7 @@ def _free_point(
         return None
     if point_filter is not None:
         points = points[point_filter(points + np.array([0.0, height / 2, 0.0]))]
-    half = (high - low) / 2 * (1 - overlap)
-    gap = _CLEARANCE * (1 - overlap)
-    free = np.ones(len(points), dtype=bool)
-    for wall in walls:
-        free &= wall.holds(points, outline(ghost))
-    for other_low, other_high in boxes:
-        if other_low[1] > surface.center[1] + height or other_high[1] < surface.center[1] + 0.004:
-            continue  # above or below what is to stand here
-        middle, other = (other_low + other_high) / 2, (other_high - other_low) / 2 * (1 - overlap)
-        free &= (np.abs(points[:, 0] - middle[0]) > half[0] + other[0] + gap) | (
-            np.abs(points[:, 2] - middle[2]) > half[2] + other[2] + gap
-        )
-    chosen = points[free]
+    chosen = points[obstacles.clear_of(points, high - low, ghost, overlap)]
     if not len(chosen):
         return None
     return chosen[0] if random is None else chosen[int(random.integers(len(chosen)))]
