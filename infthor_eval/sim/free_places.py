@@ -1,13 +1,14 @@
 """Free places in and on receptacles: clear of other things, of what the furniture is drawn of, and of its doors."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array, aabb_overlap, yaw_matrix
+from infthor_eval.sim.object_types.record import PLAIN_BOX
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.receptacles import Surface, drawer_offset, surfaces
 from infthor_eval.sim.solids import Box, Wall, as_open, opening_space, outline, part_boxes, vessel_walls
@@ -135,22 +136,19 @@ def _solid_boxes(world: World, item: SimObject, receptacle: SimObject, surface: 
     reach = float(np.hypot(*surface.half) + item.box_size.max())
     low = surface.center - np.array([reach, -_SOFT, reach])
     high = surface.center + np.array([reach, item.box_size.max() * 2, reach])
-    around = {id(outer) for outer in (receptacle, *world.ancestors(receptacle))}
+    around = {outer.object_id for outer in world.ancestors(receptacle)}
+    boxes = _inner_boxes(receptacle)
     for other in world.objects.values():
-        boxes: Iterable[Box]
-        if id(other) in around:
-            boxes = _inner_boxes(other)
-        elif other.type.pickupable or other.object_type == "Floor":
-            continue
-        else:
-            boxes = _outer_boxes(other, surface, low, high)
-        yield from (box for box in boxes if aabb_overlap(*box, low, high))
+        apart = other is not receptacle and other.object_id not in around
+        if apart and not other.type.pickupable and other.object_type != "Floor":
+            boxes += _outer_boxes(other, surface, low, high)
+    yield from (box for box in boxes if aabb_overlap(*box, low, high))
     yield from _room_walls(world, surface.center)
 
 
 def _inner_boxes(receptacle: SimObject) -> list[Box]:
     """Return the boxes of a receptacle's own parts, as if it were open; none where things hang over or stick out."""
-    if receptacle.type.overhang:
+    if receptacle.type.overhang or receptacle.type.shape == PLAIN_BOX:
         return []
     opened = as_open(receptacle, 1.0) if receptacle.type.encloses else receptacle
     back = drawer_offset(opened) - drawer_offset(receptacle)

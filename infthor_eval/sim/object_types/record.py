@@ -8,7 +8,10 @@ from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Any
 
-__all__ = ["ObjectType", "Unfolding", "portable"]
+__all__ = ["PLAIN_BOX", "ObjectType", "Unfolding", "portable"]
+
+PLAIN_BOX = "box"
+"""The shape of types that name none: a box as large as they are."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ class ObjectType:
     name: str
     size: tuple[float, float, float] = (0.3, 0.3, 0.3)
     _: KW_ONLY
-    shape: str = "box"
+    shape: str = PLAIN_BOX
     categories: tuple[str, ...] = ()
     # abilities, as in AI2-THOR's metadata
     pickupable: bool = False
