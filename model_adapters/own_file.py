@@ -9,6 +9,7 @@ from typing import Any
 
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.digests import digest
+from infthor_eval.plugins import collecting_no_garbage
 
 __all__ = ["file_identity", "load_from_file", "name_in_file", "names_a_file"]
 
@@ -71,6 +72,9 @@ def _module(path: Path, source: bytes) -> ModuleType:
     module = ModuleType(f"infthor_eval_own_{digest(source)}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses resolve annotations through it
-    with wrap_errors(f"{path}: fails when it is imported", "fix it", catch=Exception, raise_as=ModelError):
+    with (
+        wrap_errors(f"{path}: fails when it is imported", "fix it", catch=Exception, raise_as=ModelError),
+        collecting_no_garbage(),
+    ):
         exec(compile(source, path, "exec"), vars(module))
     return module

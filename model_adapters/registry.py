@@ -6,7 +6,6 @@ be a file and a class in it, `./my_adapter.py:MyModel`.
 """
 
 import dataclasses
-import importlib
 import re
 from collections.abc import Mapping
 from importlib.metadata import EntryPoint, entry_points
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from infthor_eval.errors import ModelError, UsageError, unknown_name
+from infthor_eval.plugins import import_target
 from model_adapters.adapter_identity import package_identity
 from model_adapters.built_in import BUILT_IN
 from model_adapters.check.clauses import ContractError, check_members
@@ -213,21 +213,16 @@ def _options(name: str) -> type:
     """Return the dataclass of a model's options, without importing a built-in adapter, which may import torch."""
     if name not in BUILT_IN:
         return _adapter(name).Options
-    return cast(type, _import_target(BUILT_IN[name].options))
+    return cast(type, import_target(BUILT_IN[name].options))
 
 
 def _adapter(name: str) -> type[Adapter]:
     target = name if names_a_file(name) else _target(name)
     try:
-        adapter = load_from_file(name) if names_a_file(name) else _import_target(target)
+        adapter = load_from_file(name) if names_a_file(name) else import_target(target)
     except (ImportError, AttributeError) as error:
         raise ModelError(f"model {name} cannot be imported from {target} ({error})") from error
     missing = [member for member in ("Options", "build") if not hasattr(adapter, member)]
     if missing:
         raise ModelError(f"model {name}: {target} has no {' and '.join(missing)}; {_HELP}")
     return cast(type[Adapter], adapter)
-
-
-def _import_target(target: str) -> Any:
-    module, _, attribute = target.partition(":")
-    return getattr(importlib.import_module(module), attribute)

@@ -1,7 +1,6 @@
 """Entry point: the commands, and how errors are printed."""
 
 import difflib
-import importlib
 import io
 import os
 import signal
@@ -15,6 +14,7 @@ from infthor_eval.cli.help import ExampleGroup
 from infthor_eval.cli.options.repeated import refuse_repeated_options
 from infthor_eval.cli.progress.stopping import handle_signal
 from infthor_eval.errors import InfthorError, in_one_line, unknown_name
+from infthor_eval.plugins import import_target
 from infthor_eval.terminal import print_error
 
 __all__ = ["main"]
@@ -71,7 +71,7 @@ class _Commands(ExampleGroup):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _NAMES:
             return None
-        command = importlib.import_module(f"infthor_eval.cli.commands.{cmd_name.replace('-', '_')}").command
+        command = import_target(f"infthor_eval.cli.commands.{cmd_name.replace('-', '_')}:command")
         assert isinstance(command, click.Command)
         return command
 
