@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from scipy import special  # not scipy.stats, which takes a second to import and gives the same quantiles
+import scipy  # its submodules are imported at their first use
 
 from infthor_eval.errors import DataError
 
@@ -97,10 +97,13 @@ def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> MeanEstimate:
 
 @cache
 def _t_quantile(n_clusters: int) -> float:
-    return float(special.stdtrit(n_clusters - 1, 0.5 + _LEVEL / 2))
+    # Not scipy.stats, which takes a second to import and gives the same quantiles.
+    return float(scipy.special.stdtrit(n_clusters - 1, 0.5 + _LEVEL / 2))
 
 
-_NORMAL_QUANTILE = float(special.ndtri(0.5 + _LEVEL / 2))
+@cache
+def _normal_quantile() -> float:
+    return float(scipy.special.ndtri(0.5 + _LEVEL / 2))
 
 
 def _effective_size(estimate: MeanEstimate) -> float:
@@ -115,7 +118,7 @@ def _effective_size(estimate: MeanEstimate) -> float:
     # At least 1: clusters that happen to be more alike than chance are no evidence for more than `n` questions.
     measured = max(1.0, stderr**2 * estimate.n / variance) if variance > 0 else worst
     # The effect is itself estimated on few clusters, which widens the interval as in a t interval.
-    measured *= (_t_quantile(estimate.n_clusters) / _NORMAL_QUANTILE) ** 2
+    measured *= (_t_quantile(estimate.n_clusters) / _normal_quantile()) ** 2
     # Only the rarer outcome tells how strongly clusters agree. Where it is rare, the measured effect is unreliable and
     # the worst case gets more weight: that of one question beside `n_rare` observed ones.
     n_rare = estimate.n * min(estimate.mean, 1 - estimate.mean)
@@ -127,9 +130,9 @@ def _wilson(mean: float, n: float) -> tuple[float, float]:
 
     centre = (mean + z²/2n) / (1 + z²/n), margin = z / (1 + z²/n) * sqrt(mean (1 - mean) / n + z²/4n²)
     """
-    spread = _NORMAL_QUANTILE**2 / n
+    spread = _normal_quantile() ** 2 / n
     centre = (mean + spread / 2) / (1 + spread)
-    margin = _NORMAL_QUANTILE / (1 + spread) * math.sqrt(mean * (1 - mean) / n + spread / (4 * n))
+    margin = _normal_quantile() / (1 + spread) * math.sqrt(mean * (1 - mean) / n + spread / (4 * n))
     # The interval holds the mean and lies within [0, 1] exactly; rounding alone could break both at 0 and 1.
     return max(0.0, min(mean, centre - margin)), min(1.0, max(mean, centre + margin))
 
@@ -169,7 +172,7 @@ def paired_difference(first: Sequence[float], second: Sequence[float], clusters:
     if estimate.stderr == 0:  # every question differs by the same amount: either by nothing, or never by chance
         return Difference(estimate, 1.0 if estimate.mean == 0 else 0.0)
     t = abs(estimate.mean / estimate.stderr)
-    return Difference(estimate, float(2 * special.stdtr(estimate.n_clusters - 1, -t)))
+    return Difference(estimate, float(2 * scipy.special.stdtr(estimate.n_clusters - 1, -t)))
 
 
 def _partition(scores: Sequence[float], clusters: Sequence[Hashable]) -> tuple[np.ndarray, np.ndarray]:

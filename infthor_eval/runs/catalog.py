@@ -125,8 +125,9 @@ class Catalog:
     @cached_property
     def _entries(self) -> dict[str, tuple[Path, dict[str, Any]]]:
         entries: dict[str, tuple[Path, dict[str, Any]]] = {}
+        reader = _Reader(self._shared)
         for path in self._files():
-            settings = _read(path, (), self._shared)
+            settings = reader.settings(path)
             with wrap_errors(f"{path}: holds what JSON cannot", _HINT, catch=(TypeError, ValueError)):
                 canonical_json(settings)  # a part of the run's config
             name = settings.get("group") or settings.get("task")
@@ -174,17 +175,33 @@ def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
     )
 
 
-def _read(path: Path, including: tuple[Path, ...], shared: Mapping[str, Path]) -> dict[str, Any]:
+class _Reader:
+    """Reads task files with those that they include, each file once."""
+
+    def __init__(self, shared: Mapping[str, Path]) -> None:
+        """Take the files that tasks of any folder may include, by name."""
+        self._shared = shared
+        self._contents: dict[Path, Mapping[str, Any]] = {}
+
+    def settings(self, path: Path, including: tuple[Path, ...] = ()) -> dict[str, Any]:
+        """Return a file's settings over those of what it includes; `including` has the files that include it."""
+        if path not in self._contents:
+            self._contents[path] = _read(path)
+        config = dict(self._contents[path])
+        included = config.pop("include", None)
+        if included is None:
+            return config
+        if not isinstance(included, str):
+            raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_HINT}")
+        beside = path.parent / included
+        other = (beside if beside.exists() else self._shared.get(included, beside)).resolve()
+        if other in (*including, path.resolve()):
+            raise DataError(f"{path}: includes {included}, which includes it; {_HINT}")
+        return {**self.settings(other, (*including, path.resolve())), **config}
+
+
+def _read(path: Path) -> dict[str, Any]:
     config = read_yaml(path, _HINT, _Loader)
     if not isinstance(config, dict) or not all(isinstance(key, str) for key in config):
         raise DataError(f"{path}: not a mapping of settings; {_HINT}")
-    included = config.pop("include", None)
-    if included is None:
-        return config
-    if not isinstance(included, str):
-        raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_HINT}")
-    beside = path.parent / included
-    other = (beside if beside.exists() else shared.get(included, beside)).resolve()
-    if other in (*including, path.resolve()):
-        raise DataError(f"{path}: includes {included}, which includes it; {_HINT}")
-    return {**_read(other, (*including, path.resolve()), shared), **config}
+    return config
