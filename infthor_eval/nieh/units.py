@@ -1,27 +1,54 @@
 """The unit of NIEH: a question in one variant of its context."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from msgspec.structs import replace as replace_fields
 
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
-from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.records import Guess, NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.shown_clues import shown_clues
-from infthor_eval.runs import Unit, UnitKey
+from infthor_eval.runs import Unit, UnitKey, UnitRecord
 
 __all__ = ["NiehUnit"]
 
 
 @dataclass(frozen=True)
 class NiehUnit(Unit[NiehAnswer]):
-    """A unit that asks the question of a sample."""
+    """A unit that asks the question of a sample.
+
+    What can be guessed of the question is in its records, and not in `payload`: no question waits until it is learned.
+
+    Attributes:
+        sample: the sample.
+        find_guess: returns what can be guessed of the question, or None.
+    """
 
     sample: Sample
+    find_guess: Callable[[], Guess | None] = field(repr=False, compare=False)
 
     @classmethod
     def of(cls, task: str, task_samples: TaskSamples, sample: Sample, repeat: int = 1) -> "NiehUnit":
-        """Return the unit of a task's sample, with what can be guessed of it and how much of its evidence is shown."""
-        question = sample.question
-        guesses = find_guesses(task_samples.data, visible_knowledge(task_samples.context_name))
-        payload = NiehAnswer.of(question, guesses.get(question.id), shown_clues(task_samples, sample))
-        return cls(UnitKey(task, question.id, sample.variant, repeat), question.traj_id, payload, sample)
+        """Return the unit of a task's sample, with how much of its evidence is shown."""
+        question, knowledge = sample.question, visible_knowledge(task_samples.context_name)
+        return cls(
+            UnitKey(task, question.id, sample.variant, repeat),
+            question.traj_id,
+            NiehAnswer.of(question, shown_clues=shown_clues(task_samples, sample)),
+            sample,
+            lambda: find_guesses(task_samples.data, knowledge).get(question.id),
+        )
+
+    def record(self, fingerprint: str, payload: NiehAnswer, **envelope: Any) -> UnitRecord[NiehAnswer]:
+        """See `Unit.record`."""
+        return super().record(fingerprint, self._with_guess(payload), **envelope)
+
+    def without_inputs(self) -> Unit[NiehAnswer]:
+        """See `Unit.without_inputs`."""
+        return Unit(self.key, self.cluster, self._with_guess(self.payload))
+
+    def _with_guess(self, payload: NiehAnswer) -> NiehAnswer:
+        return replace_fields(payload, guess=self.find_guess())

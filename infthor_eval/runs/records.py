@@ -176,6 +176,10 @@ class Unit(Generic[P]):
     cluster: str
     payload: P
 
+    def without_inputs(self) -> "Unit[P]":
+        """Return what can record its failure in another process, without the inputs that only the suite needs."""
+        return Unit(self.key, self.cluster, self.payload)
+
     def record(self, fingerprint: str, payload: P, **envelope: Any) -> UnitRecord[P]:
         """Return its record; further fields of the envelope (see `UnitRecord`) are keywords."""
         return UnitRecord(

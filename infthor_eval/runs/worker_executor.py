@@ -89,8 +89,7 @@ class _Evaluator(Generic[U, P]):
     @property
     def greeting(self) -> _Greeting:
         workload = self._bound.evaluation.workload
-        # Units without the inputs that only the suite needs.
-        groups = [Group([Unit(u.key, u.cluster, u.payload) for u in g.units], g.frames) for g in workload.groups]
+        groups = [Group([unit.without_inputs() for unit in group.units], group.frames) for group in workload.groups]
         parts = (workload.skipped, workload.config, workload.costs, workload.warnings)
         return _Greeting(self._bound.header, Workload(groups, *parts))
 

@@ -5,6 +5,7 @@ from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
+from threading import Lock
 
 import msgspec
 
@@ -33,13 +34,21 @@ def visible_knowledge(context: str) -> Knowledge:
     return Knowledge.WORDS | Knowledge.NUMBER if context == "clues" else Knowledge.WORDS
 
 
-@lru_cache(maxsize=8)
+_LEARNING = Lock()  # questions that are asked at once need the same guesses: one learns them, the others wait
+
+
 def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
     """Return by id of a question what can be guessed of it by guessers that know no more than that.
 
     Of each file and form the guesser with the highest mean counts, for each scorer of its own; so the guess is rather
-    too good than too bad. They are kept in the user's cache, as learning takes seconds before the first question.
+    too good than too bad. They are kept in the user's cache, as learning takes seconds.
     """
+    with _LEARNING:
+        return _find_guesses(data, knowledge)
+
+
+@lru_cache(maxsize=8)
+def _find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
     path = user_cache("guesses") / f"{_key(data, knowledge)}.json"
     try:
         return msgspec.json.decode(path.read_bytes(), type=dict[str, Guess])

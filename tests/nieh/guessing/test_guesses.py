@@ -1,5 +1,9 @@
 """The best guess at each question of a set."""
 
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from threading import Barrier, BrokenBarrierError
+
 import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
@@ -98,3 +102,18 @@ def test_no_guesser_is_above_guessing_and_the_best_is_there(make_set):
 
 def test_a_question_on_its_clue_frames_has_them_in_order():
     assert sample_on_clues(asked("t", PRESENCE, "yes", (5, 2))).frames == (2, 5)
+
+
+def test_questions_that_are_asked_at_once_wait_for_the_one_that_learns(make_set, monkeypatch):
+    data, started, n_learned = make_set(test=constant(OPEN, ("yes", "no"))), Barrier(2), []
+
+    def learn(*_):
+        n_learned.append(1)
+        with suppress(BrokenBarrierError):
+            started.wait(0.2)  # a second one that learned too would be here meanwhile
+        return {}
+
+    monkeypatch.setattr(guesses, "_learn_guesses", learn)
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda _: find_guesses(data, Knowledge.WORDS), range(2)))
+    assert len(n_learned) == 1

@@ -1,0 +1,46 @@
+"""The units of NIEH: what can be guessed of a question is learned for its record, and no question waits for it."""
+
+import pytest
+
+from infthor_eval.nieh import units
+from infthor_eval.nieh.answering import BaselineAnswerer
+from infthor_eval.nieh.records import Guess
+from infthor_eval.runs import Unit, execute
+from infthor_eval.runs.binding import bind_run
+
+
+class _Guesses(dict):
+    def get(self, key, default=None):
+        return Guess(form=key, scores={}, form_scores={})
+
+
+@pytest.fixture
+def events(monkeypatch):
+    """What happens, in order: a question is "asked", guesses are "learned"."""
+    happened = []
+    answer = BaselineAnswerer.answer
+    monkeypatch.setattr(units, "find_guesses", lambda *_: happened.append("learned") or _Guesses())
+    monkeypatch.setattr(BaselineAnswerer, "answer", lambda *given: happened.append("asked") or answer(*given))
+    return happened
+
+
+def test_a_question_is_asked_before_guesses_are_learned(prepared, events):
+    outcome = execute(prepared())
+    assert events[0] == "asked"
+    assert [record.payload.guess.form for record in outcome.records] == [record.id for record in outcome.records]
+
+
+def test_every_record_of_a_unit_has_its_guess(prepared, events):
+    unit = bind_run(prepared()).evaluation.workload.groups[0].units[0]
+    assert unit.payload.guess is None
+    assert events == []
+    elsewhere = unit.without_inputs()
+    assert type(elsewhere) is Unit
+    records = [
+        unit.record("", unit.payload.with_reply("yes", {}, None)),
+        unit.record_failure("a fault"),
+        unit.record_exclusion("a reason", ""),
+        elsewhere.record_failure("a lost worker"),
+    ]
+    assert {record.payload.guess.form for record in records} == {unit.key.id}
+    assert records[1].payload == records[3].payload
