@@ -1,4 +1,4 @@
-"""Commands that only print something import nothing that takes seconds."""
+"""Commands import nothing that takes seconds and that they do not need, or not yet."""
 
 import os
 import pkgutil
@@ -36,6 +36,48 @@ def test_listings_and_help_are_printed_at_once(typed: str) -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout
     assert not HEAVY & set(done.stderr.splitlines()[-1].split())
+
+
+# Runs a command up to its first question, and prints what is imported by then.
+FIRST_QUESTION = """
+import os, sys
+from infthor_eval.cli import main
+from infthor_eval.nieh import answering
+
+def print_modules(*_):
+    print(*sorted(sys.modules), flush=True)
+    os._exit(0)
+
+answering.ModelAnswerer.answer = answering.BaselineAnswerer.answer = print_modules
+main(sys.argv[1:])
+"""
+AFTER_THE_QUESTIONS = {"lm_eval", "scipy.special"}  # for the results
+OF_OTHERS = {
+    *("ai2thor", "cv2", "datasets", "matplotlib", "networkx", "numba", "openai", "pandas", "peft", "ray", "sklearn"),
+    *("scipy.optimize", "scipy.stats", "torchvision", "vllm", "infthor_eval.report.figures", "infthor_eval.report.web"),
+}
+OF_MODELS = {"torch", "transformers", "tokenizers", "accelerate", "safetensors", "huggingface_hub"}
+
+
+@pytest.mark.parametrize(
+    ("model", "not_needed"),
+    [
+        ("oracle", AFTER_THE_QUESTIONS | OF_OTHERS | OF_MODELS),
+        ("blind", AFTER_THE_QUESTIONS | OF_OTHERS | OF_MODELS),
+        ("qwen2.5-vl-nano", AFTER_THE_QUESTIONS | OF_OTHERS),
+    ],
+)
+def test_the_first_question_is_asked_without_what_it_does_not_need(
+    model: str, not_needed: set[str], tmp_path: Path
+) -> None:
+    typed = ["--model", model, "--tasks", "nieh_mini", "--limit", "1", "--output", str(tmp_path)]
+    done = subprocess.run(
+        [sys.executable, "-c", FIRST_QUESTION, *typed], capture_output=True, text=True, check=False, timeout=600
+    )
+    assert done.returncode == 0, done.stderr
+    loaded = set(done.stdout.split())
+    assert "infthor_eval.nieh.answering" in loaded
+    assert sorted(not_needed & loaded) == []
 
 
 @pytest.mark.parametrize(
