@@ -3,9 +3,10 @@
     python benchmarks/start_up.py [--rounds 5] [--against CHECKOUT] [--only NAME ...]
 
 It prints one JSON object: for each command the median seconds and processor seconds until the first question is asked
-and until its reply is there (on nieh_mini), or until the command has ended. The files are cached by a first round that
-does not count. With --against each round runs both checkouts by turns, so that whatever else the machine does hits
-both; processor seconds vary less than seconds.
+and until its reply is there (on nieh_mini), or until the command has ended. A "first run" has an empty user cache: what
+can be guessed of the questions is not known yet. A first round, which does not count, puts all files into memory. With
+--against each round runs both checkouts by turns, so that whatever else the machine does hits both; processor seconds
+vary less than seconds.
 """
 
 import argparse
@@ -27,8 +28,10 @@ from typing import Any
 _RUN = ("--tasks", "nieh_mini", "--threads", "1")
 _COMMANDS: dict[str, tuple[str, ...]] = {
     "oracle": ("--model", "oracle", "--tasks", "nieh_mini"),
+    "oracle, first run": ("--model", "oracle", "--tasks", "nieh_mini"),
     "blind": ("--model", "blind", "--tasks", "nieh_mini"),
     "nano": ("--model", "qwen2.5-vl-nano", *_RUN),
+    "nano, first run": ("--model", "qwen2.5-vl-nano", *_RUN),
     "tiny": ("--model", "qwen2.5-vl-tiny", *_RUN),
     "help": ("--help",),
     "ls models": ("ls", "models"),
@@ -95,16 +98,18 @@ def execute(arguments: list[str]) -> None:
     stopwatch.leave()
 
 
-def measure(checkout: Path, arguments: tuple[str, ...], output: Path, shown: Path) -> dict[str, float]:
+def measure(checkout: Path, name: str, output: Path, shown: Path) -> dict[str, float]:
     """Return seconds and processor seconds until each event, of one command by one checkout."""
+    arguments = _COMMANDS[name]
     with tempfile.TemporaryDirectory(dir=output) as folder:
         where = ("--output", folder) if "--tasks" in arguments else ()
-        if arguments == ("show",):
+        if name == "show":
             where = tuple(map(str, shown.glob("*/*")))
+        cache = folder if name.endswith("first run") else str(output / "cache")
         start = time.time()
         done = subprocess.run(
             [sys.executable, __file__, "--execute", *arguments, *where],
-            env=os.environ | {"PYTHONPATH": str(checkout), "OMP_NUM_THREADS": "1"},
+            env=os.environ | {"PYTHONPATH": str(checkout), "OMP_NUM_THREADS": "1", "XDG_CACHE_HOME": cache},
             capture_output=True, text=True, check=True,
         )  # fmt: skip
     times = json.loads(done.stdout.splitlines()[-1])
@@ -128,7 +133,7 @@ def compare(checkouts: dict[str, Path], names: list[str], rounds: int) -> dict[s
         for number in range(rounds + 1):
             for name in names:
                 for at, checkout in checkouts.items():
-                    times = measure(checkout, _COMMANDS[name], output, shown)
+                    times = measure(checkout, name, output, shown)
                     if number:
                         taken[name][at].append(times)
     return {

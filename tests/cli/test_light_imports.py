@@ -66,6 +66,7 @@ OF_MODELS = {"torch", "transformers", "tokenizers", "accelerate", "safetensors",
         ("blind", AFTER_THE_QUESTIONS | OF_OTHERS | OF_MODELS),
         ("qwen2.5-vl-nano", AFTER_THE_QUESTIONS | OF_OTHERS),
     ],
+    ids=["oracle", "blind", "qwen2.5-vl-nano"],
 )
 def test_the_first_question_is_asked_without_what_it_does_not_need(
     model: str, not_needed: set[str], tmp_path: Path
