@@ -8,16 +8,16 @@ import numpy as np
 
 from infthor_eval.sim.geometry import Array
 
-__all__ = ["crease_factors"]
+__all__ = ["DARKEST", "LIGHTEST", "ROWS", "STRENGTH", "crease_factors"]
 
-_STRENGTH = 7.0
-_DARKEST, _LIGHTEST = 0.68, 1.1
-_ROWS = 150  # of the picture for each pixel to the neighbours: shadows are as wide in pictures of any size
+STRENGTH = 7.0
+DARKEST, LIGHTEST = 0.68, 1.1
+ROWS = 150  # of the picture for each pixel to the neighbours: shadows are as wide in pictures of any size
 
 
 def crease_factors(depth: Array) -> Array:
     """Return factors of brightness (h, w): below 1 behind an outline and in a crease, above 1 along an edge."""
-    step = max(1, depth.shape[0] // _ROWS)
+    step = max(1, depth.shape[0] // ROWS)
     # In place where possible: temporaries of a whole picture cost more than the sums.
     inverse = np.pad(1.0 / depth, step, mode="edge")
     around = inverse[: -2 * step, step:-step] + inverse[2 * step :, step:-step]
@@ -25,6 +25,6 @@ def crease_factors(depth: Array) -> Array:
     around += inverse[step:-step, 2 * step :]
     around *= depth
     around -= 4.0
-    around *= -_STRENGTH
+    around *= -STRENGTH
     around += 1.0
-    return np.clip(around, _DARKEST, _LIGHTEST, out=around)
+    return np.clip(around, DARKEST, LIGHTEST, out=around)

@@ -9,20 +9,18 @@ from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.camera import PinholeCamera, Projection, project
-from infthor_eval.sim.render.creases import crease_factors
 from infthor_eval.sim.render.kernel_cache import drop_stale_kernels
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import INSTANCE
-from infthor_eval.sim.render.smoothing import find_jagged
 
 __all__ = ["Picture", "Rasterizer", "cast_picture", "choose_rasterizer", "colour_picture"]
 
 Cast = Callable[[Array, Projection, PinholeCamera], tuple[Array, NDArray[np.int32]]]
 Pixels = NDArray[np.uint8]
-Places = tuple[NDArray[np.int64], NDArray[np.int64]]
+Creases = Callable[[Array], Array]
 Shade = Callable[[Array, Projection, PinholeCamera, Array, NDArray[np.int32], Array, Lights], Pixels]
 IsVisible = Callable[[Array, Projection, PinholeCamera, NDArray[np.bool_], int], bool]
-Smooth = Callable[[Array, Projection, PinholeCamera, NDArray[np.int32], Array, Lights, Places, Pixels], None]
+Smooth = Callable[[Array, Projection, PinholeCamera, NDArray[np.int32], Array, Lights, Pixels], None]
 
 
 @dataclass(frozen=True)
@@ -32,6 +30,7 @@ class Rasterizer:
     Attributes:
         name: `numba` or `numpy`.
         cast: function that returns depth and nearest primitive of each pixel.
+        creases: function that returns factors of brightness from the depth.
         shade: function that returns the colours of cast pixels.
         smooth: function that smooths jagged pixels of an RGB picture in place.
         is_visible: function that returns whether enough pixels show some of the primitives.
@@ -39,6 +38,7 @@ class Rasterizer:
 
     name: str
     cast: Cast
+    creases: Creases
     shade: Shade
     smooth: Smooth
     is_visible: IsVisible
@@ -73,17 +73,27 @@ def choose_rasterizer(name: str | None = None) -> Rasterizer:
     if chosen != "numpy":
         drop_stale_kernels()  # before the imports, which load cached kernels
         try:
-            from infthor_eval.sim.render import probe_numba, raster_numba, shading_numba, smoothing_numba
+            from infthor_eval.sim.render import (
+                creases_numba,
+                probe_numba,
+                raster_numba,
+                shading_numba,
+                smoothing_numba,
+            )
         except ModuleNotFoundError:
             if chosen == "numba":
                 raise
         else:
             return Rasterizer(
-                "numba", raster_numba.cast, shading_numba.shade, smoothing_numba.smooth, probe_numba.is_visible
-            )
-    from infthor_eval.sim.render import probe_numpy, raster_numpy, shading_numpy, smoothing_numpy
+                "numba", raster_numba.cast, creases_numba.crease_factors, shading_numba.shade, smoothing_numba.smooth,
+                probe_numba.is_visible,
+            )  # fmt: skip
+    from infthor_eval.sim.render import creases, probe_numpy, raster_numpy, shading_numpy, smoothing_numpy
 
-    return Rasterizer("numpy", raster_numpy.cast, shading_numpy.shade, smoothing_numpy.smooth, probe_numpy.is_visible)
+    return Rasterizer(
+        "numpy", raster_numpy.cast, creases.crease_factors, shading_numpy.shade, smoothing_numpy.smooth,
+        probe_numpy.is_visible,
+    )  # fmt: skip
 
 
 def cast_picture(
@@ -123,9 +133,9 @@ def cast_picture(
 
 def colour_picture(picture: Picture, lights: Lights, rasterizer: Rasterizer, antialias: bool = True) -> Pixels:
     """Return RGB (h, w, 3) of a picture; with `antialias`, its jagged pixels smoothed."""
-    factors = crease_factors(picture.depth)
+    factors = rasterizer.creases(picture.depth)
     prims, projection, camera, nearest = picture.prims, picture.projection, picture.camera, picture.nearest
     rgb = rasterizer.shade(prims, projection, camera, picture.depth, nearest, factors, lights)
     if antialias:
-        rasterizer.smooth(prims, projection, camera, nearest, factors, lights, find_jagged(rgb), rgb)
+        rasterizer.smooth(prims, projection, camera, nearest, factors, lights, rgb)
     return rgb

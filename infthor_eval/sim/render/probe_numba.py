@@ -27,7 +27,7 @@ def is_visible(
     return bool(enough)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _depth(profiles: Array, origin: Array, steps: Array, k: int, u: float, v: float, clip: float) -> float:
     o, step = origin[k], steps[k]
     dx = (step[0, 0] + u * step[1, 0]) + v * step[2, 0]
@@ -36,12 +36,12 @@ def _depth(profiles: Array, origin: Array, steps: Array, k: int, u: float, v: fl
     return hit(profiles[k, 0], profiles[k, 1], profiles[k, 2], o[0], o[1], o[2], dx, dy, dz, clip)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _covers(box: NDArray[np.int64], k: int, x: int, y: int) -> bool:
     return box[k, 0] <= x <= box[k, 1] and box[k, 2] <= y <= box[k, 3]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _is_visible(
     profiles: Array,
     origin: Array,

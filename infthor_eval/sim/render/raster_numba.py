@@ -7,7 +7,7 @@ some parentheses), and numba's `fastmath`, which would reorder them, stays off.
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
@@ -17,7 +17,6 @@ from infthor_eval.sim.render.primitives import BOTTOM, FORM, TOP, Form
 __all__ = ["cast", "hit"]
 
 _TINY = 1e-12  # takes the place of smaller components of directions, which are divided by
-_BANDS = 8  # of rows, drawn in parallel
 _BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
 
 
@@ -34,12 +33,12 @@ def cast(prims: Array, projection: Projection, camera: PinholeCamera) -> tuple[A
     return depth, nearest
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _nonzero(d: float) -> float:
     return _TINY if -_TINY < d < _TINY else d
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _hit_box(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> float:
     # Slab method: the ray is inside the box where it is between all three pairs of faces.
     inverse = 1.0 / _nonzero(dx)
@@ -54,7 +53,7 @@ def _hit_box(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -
     return enter if enter <= leave else math.inf
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _hit_sphere(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> float:
     a = dx * dx + dy * dy + dz * dz
     b = ox * dx + oy * dy + oz * dz
@@ -63,7 +62,7 @@ def _hit_sphere(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
     return (-b - math.sqrt(disc)) / a if disc >= 0.0 else math.inf
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _hit_bowl(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, clip: float) -> float:
     # In this frame a bowl is the lower half of the unit sphere. Where the near side is cut off the far side counts, as
     # one sees the inside through the opening.
@@ -82,7 +81,7 @@ def _hit_bowl(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, 
     return math.inf
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _hit_cylinder(
     ox: float,
     oy: float,
@@ -123,7 +122,7 @@ def _hit_cylinder(
     return best
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def hit(
     form: float,
     bottom: float,
@@ -146,7 +145,7 @@ def hit(
     return _hit_cylinder(ox, oy, oz, dx, dy, dz, bottom, top, form == _CUP, clip)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy")
 def _cast(
     profiles: Array,
     origin: Array,
@@ -160,28 +159,24 @@ def _cast(
     depth: Array,
     nearest: NDArray[np.int32],
 ) -> None:
-    height = len(vs)
-    # Threads share out rows and not primitives: each pixel has one writer, so their number does not change the picture.
-    for band in prange(_BANDS):
-        low, high = band * height // _BANDS, (band + 1) * height // _BANDS
-        depth[low:high] = far
-        nearest[low:high] = -1
-        for order in range(len(profiles)):
-            form, bottom, top = profiles[order, 0], profiles[order, 1], profiles[order, 2]
-            ox, oy, oz = origin[order, 0], origin[order, 1], origin[order, 2]
-            step = steps[order]
-            for y in range(max(low, box[order, 2]), min(high, box[order, 3] + 1)):
-                v = vs[y]
-                for x in range(box[order, 0], box[order, 1] + 1):
-                    limit = depth[y, x]
-                    if limit <= near[order]:  # hidden for sure, as most pixels of far primitives are
-                        continue
-                    u = us[x]
-                    dx = (step[0, 0] + u * step[1, 0]) + v * step[2, 0]
-                    dy = (step[0, 1] + u * step[1, 1]) + v * step[2, 1]
-                    dz = (step[0, 2] + u * step[1, 2]) + v * step[2, 2]
-                    t = hit(form, bottom, top, ox, oy, oz, dx, dy, dz, clip)
-                    # Strictly nearer: where surfaces coincide the earlier primitive stays.
-                    if clip < t < limit:
-                        depth[y, x] = t
-                        nearest[y, x] = order
+    depth[:] = far
+    nearest[:] = -1
+    for order in range(len(profiles)):
+        form, bottom, top = profiles[order, 0], profiles[order, 1], profiles[order, 2]
+        ox, oy, oz = origin[order, 0], origin[order, 1], origin[order, 2]
+        step, closest = steps[order], near[order]
+        for y in range(box[order, 2], box[order, 3] + 1):
+            v = vs[y]
+            for x in range(box[order, 0], box[order, 1] + 1):
+                limit = depth[y, x]
+                if limit <= closest:  # hidden for sure, as most pixels of far primitives are
+                    continue
+                u = us[x]
+                dx = (step[0, 0] + u * step[1, 0]) + v * step[2, 0]
+                dy = (step[0, 1] + u * step[1, 1]) + v * step[2, 1]
+                dz = (step[0, 2] + u * step[1, 2]) + v * step[2, 2]
+                t = hit(form, bottom, top, ox, oy, oz, dx, dy, dz, clip)
+                # Strictly nearer: where surfaces coincide the earlier primitive stays.
+                if clip < t < limit:
+                    depth[y, x] = t
+                    nearest[y, x] = order

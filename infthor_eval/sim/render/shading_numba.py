@@ -4,28 +4,33 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render import patterns
 from infthor_eval.sim.render.camera import PinholeCamera, Projection
-from infthor_eval.sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY, SUN, SUN_DIRECTION, Lights
+from infthor_eval.sim.render.lighting import AMBIENT, HEADLIGHT, LAMP_REACH, SKY, SUN, Lights
 from infthor_eval.sim.render.primitives import AXES, BOTTOM, COLOR, EMISSION, FORM, HALF, MATERIAL, TOP, Form, Material
+from infthor_eval.sim.render.table import INVERSE, ORIGIN, STEPS, SUNWARD, shading_table
 
-__all__ = ["brightness_at", "shade"]
+__all__ = ["brightness_at", "eye_of", "shade"]
 
 _RIM = 1.0 - 1e-6  # |y| of hits that count as on a cylinder's flat end, with a margin for rounding
-_BANDS = 8  # of rows, shaded in parallel
 _BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
-_SUN_X, _SUN_Y, _SUN_Z = SUN_DIRECTION
 _WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)
 _FABRIC, _STONE, _METAL = int(Material.FABRIC), int(Material.STONE), int(Material.METAL)
 _GLASS, _PAPER, _CARPET = int(Material.GLASS), int(Material.PAPER), int(Material.CARPET)
 # Compiled here and not in `patterns`, which must work without numba.
-_wood, _planks, _tiles = (njit(cache=True)(f) for f in (patterns.wood, patterns.planks, patterns.tiles))
-_fabric, _stone, _metal = (njit(cache=True)(f) for f in (patterns.fabric, patterns.stone, patterns.metal))
-_glass, _paper, _carpet = (njit(cache=True)(f) for f in (patterns.glass, patterns.paper, patterns.carpet))
+_wood, _planks, _tiles = (
+    njit(cache=True, error_model="numpy")(f) for f in (patterns.wood, patterns.planks, patterns.tiles)
+)
+_fabric, _stone, _metal = (
+    njit(cache=True, error_model="numpy")(f) for f in (patterns.fabric, patterns.stone, patterns.metal)
+)
+_glass, _paper, _carpet = (
+    njit(cache=True, error_model="numpy")(f) for f in (patterns.glass, patterns.paper, patterns.carpet)
+)
 
 
 def shade(
@@ -40,14 +45,17 @@ def shade(
     """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
-    _shade(
-        prims[projection.index], projection.origin, projection.steps, camera.position, camera.matrix, us, vs,
-        depth, nearest, factors, lights.lamps, lights.daylight, rgb,
-    )  # fmt: skip
+    table = shading_table(prims, projection, lights)
+    _shade(table, len(projection.index), eye_of(camera), us, vs, depth, nearest, factors, lights.daylight, rgb)
     return rgb
 
 
-@njit(cache=True)
+def eye_of(camera: PinholeCamera) -> tuple[float, ...]:
+    """Return a camera's position, and its forward, right and up vectors, as plain numbers (12,)."""
+    return tuple(np.concatenate([camera.position, camera.matrix[:, [2, 0, 1]].T.ravel()]).tolist())
+
+
+@njit(cache=True, error_model="numpy")
 def _pattern(material: float, a: float, b: float) -> float:  # noqa: PLR0911 - one line per material
     if material == _WOOD:
         return _wood(a, b)
@@ -70,101 +78,102 @@ def _pattern(material: float, a: float, b: float) -> float:  # noqa: PLR0911 - o
     return 1.0
 
 
-@njit(cache=True, inline="always")
-def _surface(prims: Array, order: int, x: float, y: float, z: float) -> Any:
-    """Return the world normal and the two surface coordinates in metres of a hit point in the scaled frame."""
-    hx, hy, hz = prims[order, HALF], prims[order, HALF + 1], prims[order, HALF + 2]
-    ax, ay, az = abs(x), abs(y), abs(z)
-    nx, ny, nz = x, y, z  # of the sphere; other forms change it below
-    a, b = x * hx + z * hz, y * hy
-    if prims[order, FORM] == _BOX:
-        # The hit is on the face whose coordinate is nearest to 1. At an edge x wins over y over z, as in numpy.
-        if ax >= ay and ax >= az:
-            ny, nz, a = 0.0, 0.0, z * hz
-        elif ay >= az:
-            nx, nz, a, b = 0.0, 0.0, x * hx, z * hz
-        else:
-            nx, ny, a = 0.0, 0.0, x * hx
-    elif prims[order, FORM] == _BOWL:
-        ny = (y - 1.0) * 0.25
-    elif prims[order, FORM] != _ELLIPSOID:
-        if ay >= _RIM and not (y > 0 and prims[order, FORM] == _CUP):
-            nx, nz = 0.0, 0.0
-        else:
-            k = (prims[order, TOP] - prims[order, BOTTOM]) * 0.5  # gradient of x^2 + z^2 - (m + k * y)^2
-            m = (prims[order, BOTTOM] + prims[order, TOP]) * 0.5
-            ny = -k * (m + k * y)
-    # Normals scale by the inverse of the half extents, unlike points.
-    nx, ny, nz = nx / hx, ny / hy, nz / hz
-    wx = prims[order, AXES] * nx + prims[order, AXES + 3] * ny + prims[order, AXES + 6] * nz
-    wy = prims[order, AXES + 1] * nx + prims[order, AXES + 4] * ny + prims[order, AXES + 7] * nz
-    wz = prims[order, AXES + 2] * nx + prims[order, AXES + 5] * ny + prims[order, AXES + 8] * nz
-    length = math.sqrt(wx * wx + wy * wy + wz * wz) + 1e-12
-    return wx / length, wy / length, wz / length, a, b
+@njit(cache=True, error_model="numpy")
+def _lamp_light(
+    table: Array, first: int, k: int, nx: float, ny: float, nz: float, u: float, v: float, t: float, eye: Any
+) -> float:
+    """Return the light of the lamps at depth t on the ray (u, v), on a surface of unit normal (nx, ny, nz).
 
-
-@njit(cache=True)
-def _light(n: Any, r: Any, w: Any, lamps: Array, daylight: float) -> float:
-    nx, ny, nz = n
-    length = math.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
-    facing = (nx * r[0] + ny * r[1] + nz * r[2]) / length
-    if facing > 0.0:  # the surface is seen from behind, as the inside of a cup
-        nx, ny, nz = -nx, -ny, -nz
-    sun = nx * _SUN_X + ny * _SUN_Y + nz * _SUN_Z
-    light = (AMBIENT + SKY * ny + SUN * max(sun, 0.0) + HEADLIGHT * abs(facing)) * daylight
-    for i in range(len(lamps)):
-        lx, ly, lz = lamps[i, 0] - w[0], lamps[i, 1] - w[1], lamps[i, 2] - w[2]
+    The normal is given along the axes of primitive `k`; the lamps are the table's rows from `first` on.
+    """
+    mx = table[k, AXES] * nx + table[k, AXES + 3] * ny + table[k, AXES + 6] * nz
+    my = table[k, AXES + 1] * nx + table[k, AXES + 4] * ny + table[k, AXES + 7] * nz
+    mz = table[k, AXES + 2] * nx + table[k, AXES + 5] * ny + table[k, AXES + 8] * nz
+    x = eye[0] + t * ((eye[3] + u * eye[6]) + v * eye[9])
+    y = eye[1] + t * ((eye[4] + u * eye[7]) + v * eye[10])
+    z = eye[2] + t * ((eye[5] + u * eye[8]) + v * eye[11])
+    light = 0.0
+    for i in range(first, len(table)):
+        lx, ly, lz = table[i, 0] - x, table[i, 1] - y, table[i, 2] - z
         square = lx * lx + ly * ly + lz * lz
-        cosine = (nx * lx + ny * ly + nz * lz) / (math.sqrt(square) + 1e-6)
-        light = light + lamps[i, 3] * max(cosine, 0.0) * (LAMP_REACH / (LAMP_REACH + square))
+        cosine = (mx * lx + my * ly + mz * lz) / (math.sqrt(square) + 1e-6)
+        light = light + table[i, 3] * max(cosine, 0.0) * (LAMP_REACH / (LAMP_REACH + square))
     return light
 
 
-@njit(cache=True, inline="always")
-def brightness_at(
-    prims: Array, origin: Array, steps: Array, order: int, ray: Any, eye: Array, view: Array, lamps: Array, day: float
-) -> float:
-    """Return the brightness of primitive `order` at depth t on the ray (u, v, t)."""
-    # Arrays are indexed in full: numba creates a view object for `steps[k]`, which costs more than the arithmetic.
-    u, v, t = ray
-    k = order
-    lx = origin[k, 0] + t * ((steps[k, 0, 0] + u * steps[k, 1, 0]) + v * steps[k, 2, 0])
-    ly = origin[k, 1] + t * ((steps[k, 0, 1] + u * steps[k, 1, 1]) + v * steps[k, 2, 1])
-    lz = origin[k, 2] + t * ((steps[k, 0, 2] + u * steps[k, 1, 2]) + v * steps[k, 2, 2])
-    nx, ny, nz, a, b = _surface(prims, k, lx, ly, lz)
-    rx = (view[0, 2] + u * view[0, 0]) + v * view[0, 1]
-    ry = (view[1, 2] + u * view[1, 0]) + v * view[1, 1]
-    rz = (view[2, 2] + u * view[2, 0]) + v * view[2, 1]
-    w = (eye[0] + t * rx, eye[1] + t * ry, eye[2] + t * rz)
-    light = _light((nx, ny, nz), (rx, ry, rz), w, lamps, day)
-    glow = prims[k, EMISSION]
-    return glow * 1.15 + (1.0 - glow) * (light * _pattern(prims[k, MATERIAL], a, b))
+@njit(cache=True, error_model="numpy", inline="always")
+def _round_normal(table: Array, k: int, x: float, y: float, z: float) -> Any:
+    """Return the normal of a round primitive at a hit point, in its scaled frame, of any length."""
+    if table[k, FORM] == _BOWL:
+        return x, (y - 1.0) * 0.25, z
+    if table[k, FORM] == _ELLIPSOID:
+        return x, y, z
+    if abs(y) >= _RIM and not (y > 0 and table[k, FORM] == _CUP):
+        return 0.0, y, 0.0
+    slope = (table[k, TOP] - table[k, BOTTOM]) * 0.5  # gradient of x^2 + z^2 - (m + slope * y)^2
+    m = (table[k, BOTTOM] + table[k, TOP]) * 0.5
+    return x, -slope * (m + slope * y), z
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy", inline="always")
+def brightness_at(table: Array, first: int, k: int, u: float, v: float, t: float, eye: Any, day: float) -> float:
+    """Return the brightness of primitive `k` at depth t on the ray (u, v); lamps are the rows from `first` on."""
+    # What can be told in the primitive's own frame is: the ray's direction d and the normal n have the product
+    # sum(d * n) there whatever the primitive's size, as d is scaled by the inverse of what n is scaled by.
+    dx = (table[k, STEPS] + u * table[k, STEPS + 3]) + v * table[k, STEPS + 6]
+    dy = (table[k, STEPS + 1] + u * table[k, STEPS + 4]) + v * table[k, STEPS + 7]
+    dz = (table[k, STEPS + 2] + u * table[k, STEPS + 5]) + v * table[k, STEPS + 8]
+    x, y, z = table[k, ORIGIN] + t * dx, table[k, ORIGIN + 1] + t * dy, table[k, ORIGIN + 2] + t * dz
+    hx, hy, hz = table[k, HALF], table[k, HALF + 1], table[k, HALF + 2]
+    nx, ny, nz = 0.0, 0.0, 0.0
+    if table[k, FORM] == _BOX:
+        # The hit is on the face whose coordinate is nearest to 1. At an edge x wins over y over z, as in numpy. The
+        # normal is one of the axes, of the sign that faces the camera.
+        ax, ay, az = abs(x), abs(y), abs(z)
+        if ax >= ay and ax >= az:
+            nx, facing, sun, up, a, b = 1.0, dx * hx, table[k, SUNWARD], table[k, AXES + 1], z * hz, y * hy
+        elif ay >= az:
+            ny, facing, sun, up, a, b = 1.0, dy * hy, table[k, SUNWARD + 1], table[k, AXES + 4], x * hx, z * hz
+        else:
+            nz, facing, sun, up, a, b = 1.0, dz * hz, table[k, SUNWARD + 2], table[k, AXES + 7], x * hx, y * hy
+    else:
+        a, b = x * hx + z * hz, y * hy
+        nx, ny, nz = _round_normal(table, k, x, y, z)
+        facing = nx * dx + ny * dy + nz * dz
+        # Normals scale by the inverse of the half extents, unlike points.
+        nx, ny, nz = nx * table[k, INVERSE], ny * table[k, INVERSE + 1], nz * table[k, INVERSE + 2]
+        shrink = 1.0 / (math.sqrt(nx * nx + ny * ny + nz * nz) + 1e-12)
+        nx, ny, nz, facing = nx * shrink, ny * shrink, nz * shrink, facing * shrink
+        sun = nx * table[k, SUNWARD] + ny * table[k, SUNWARD + 1] + nz * table[k, SUNWARD + 2]
+        up = nx * table[k, AXES + 1] + ny * table[k, AXES + 4] + nz * table[k, AXES + 7]
+    if facing > 0.0:  # the normal points away from the camera: another face, or the inside of a cup
+        nx, ny, nz, sun, up = -nx, -ny, -nz, -sun, -up
+    headlight = HEADLIGHT * abs(facing) / math.sqrt(1.0 + u * u + v * v)
+    light = (AMBIENT + SKY * up + SUN * max(sun, 0.0) + headlight) * day
+    if first < len(table):
+        light = light + _lamp_light(table, first, k, nx, ny, nz, u, v, t, eye)
+    glow = table[k, EMISSION]
+    return glow * 1.15 + (1.0 - glow) * (light * _pattern(table[k, MATERIAL], a, b))
+
+
+@njit(cache=True, error_model="numpy")
 def _shade(
-    prims: Array,
-    origin: Array,
-    steps: Array,
-    eye: Array,
-    view: Array,
+    table: Array,
+    first: int,
+    eye: Any,
     us: Array,
     vs: Array,
     depth: Array,
     nearest: NDArray[np.int32],
     factors: Array,
-    lamps: Array,
     daylight: float,
     rgb: NDArray[np.uint8],
 ) -> None:
-    height = len(vs)
-    for band in prange(_BANDS):
-        for y in range(band * height // _BANDS, (band + 1) * height // _BANDS):
-            for x in range(len(us)):
-                order = nearest[y, x]
-                if order < 0:
-                    continue
-                ray = (us[x], vs[y], depth[y, x])
-                level = brightness_at(prims, origin, steps, order, ray, eye, view, lamps, daylight) * factors[y, x]
-                for i in range(3):
-                    rgb[y, x, i] = np.uint8(min(prims[order, COLOR + i] * level * 255.0, 255.0))
+    for y in range(len(vs)):
+        for x in range(len(us)):
+            order = nearest[y, x]
+            if order < 0:
+                continue
+            level = brightness_at(table, first, order, us[x], vs[y], depth[y, x], eye, daylight) * factors[y, x]
+            for i in range(3):
+                rgb[y, x, i] = np.uint8(min(table[order, COLOR + i] * level * 255.0, 255.0))

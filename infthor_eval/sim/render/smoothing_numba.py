@@ -1,9 +1,10 @@
 """Smoothing of jagged pixels, compiled by numba."""
 
 import math
+from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from infthor_eval.sim.geometry import Array
@@ -11,12 +12,12 @@ from infthor_eval.sim.render.camera import PinholeCamera, Projection
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import BOTTOM, COLOR, FORM, TOP
 from infthor_eval.sim.render.raster_numba import hit
-from infthor_eval.sim.render.shading_numba import brightness_at
-from infthor_eval.sim.render.smoothing import NEIGHBOURS, SUBPIXELS
+from infthor_eval.sim.render.shading_numba import brightness_at, eye_of
+from infthor_eval.sim.render.smoothing import JUMP, NEIGHBOURS, SUBPIXELS
+from infthor_eval.sim.render.table import ORIGIN, STEPS, shading_table
 
 __all__ = ["smooth"]
 
-_BANDS = 8  # parts of the list of pixels, smoothed in parallel
 _NEIGHBOURS, _SUBPIXELS = np.array(NEIGHBOURS), np.array(SUBPIXELS)
 
 
@@ -27,90 +28,111 @@ def smooth(
     nearest: NDArray[np.int32],
     factors: Array,
     lights: Lights,
-    places: tuple[NDArray[np.int64], NDArray[np.int64]],
     rgb: NDArray[np.uint8],
 ) -> None:
-    """Give the pixels at `places` (rows, columns) of `rgb` the mean colour of their rays, in place."""
+    """Give the jagged pixels of `rgb` the mean colour of their rays, in place."""
     us, vs = camera.rays()
+    table = shading_table(prims, projection, lights)
     _smooth(
-        prims[projection.index], projection.origin, projection.steps, camera.position, camera.matrix, us, vs,
-        camera.near, camera.far, nearest, factors, lights.lamps, lights.daylight, places[0], places[1], rgb,
+        table, len(projection.index), eye_of(camera), us, vs, camera.near, camera.far, nearest, factors,
+        lights.daylight, _find_jagged(rgb), rgb,
     )  # fmt: skip
 
 
-@njit(cache=True, inline="always")
-def _candidates(nearest: NDArray[np.int32], y: int, x: int, slots: NDArray[np.int64]) -> int:
-    """Write to `slots` the indices of neighbours that show different primitives; return how many there are."""
+@njit(cache=True, error_model="numpy")
+def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return the row and column (n, 2) of each pixel that differs much from a neighbour."""
+    height, width, _ = rgb.shape
+    total = np.empty((height, width), dtype=np.int16)
+    for y in range(height):
+        for x in range(width):
+            total[y, x] = np.int16(rgb[y, x, 0]) + np.int16(rgb[y, x, 1]) + np.int16(rgb[y, x, 2])
+    marked = np.zeros((height, width), dtype=np.uint8)
+    for y in range(height):
+        for x in range(width - 1):
+            jump = np.uint8(abs(total[y, x + 1] - total[y, x]) > JUMP)
+            marked[y, x] |= jump
+            marked[y, x + 1] |= jump
+    for y in range(height - 1):
+        for x in range(width):
+            jump = np.uint8(abs(total[y + 1, x] - total[y, x]) > JUMP)
+            marked[y, x] |= jump
+            marked[y + 1, x] |= jump
+    places, count = np.empty((height * width, 2), dtype=np.int64), 0
+    for y in range(height):
+        for x in range(width):
+            if marked[y, x]:
+                places[count, 0], places[count, 1] = y, x
+                count += 1
+    return places[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def _candidates(nearest: NDArray[np.int32], y: int, x: int, orders: NDArray[np.int32], at: NDArray[np.int64]) -> int:
+    """Write the primitives that a pixel and its neighbours show to `orders`, and where to `at`; return how many."""
     count = 0
     for j in range(len(_NEIGHBOURS)):
         yy, xx = y + _NEIGHBOURS[j, 0], x + _NEIGHBOURS[j, 1]
         if yy < 0 or xx < 0 or yy >= nearest.shape[0] or xx >= nearest.shape[1] or nearest[yy, xx] < 0:
             continue
-        listed = False
+        order, listed = nearest[yy, xx], False
         for k in range(count):
-            slot = slots[k]
-            listed = listed or nearest[y + _NEIGHBOURS[slot, 0], x + _NEIGHBOURS[slot, 1]] == nearest[yy, xx]
+            listed = listed or orders[k] == order
         if not listed:
-            slots[count] = j
+            orders[count], at[count, 0], at[count, 1] = order, yy, xx
             count += 1
     return count
 
 
-@njit(cache=True, inline="always")
-def _depth(prims: Array, origin: Array, steps: Array, k: int, u: float, v: float, clip: float) -> float:
-    dx = (steps[k, 0, 0] + u * steps[k, 1, 0]) + v * steps[k, 2, 0]
-    dy = (steps[k, 0, 1] + u * steps[k, 1, 1]) + v * steps[k, 2, 1]
-    dz = (steps[k, 0, 2] + u * steps[k, 1, 2]) + v * steps[k, 2, 2]
-    ox, oy, oz = origin[k, 0], origin[k, 1], origin[k, 2]
-    return hit(prims[k, FORM], prims[k, BOTTOM], prims[k, TOP], ox, oy, oz, dx, dy, dz, clip)
+@njit(cache=True, error_model="numpy", inline="always")
+def _depth(table: Array, k: int, u: float, v: float, clip: float) -> float:
+    dx = (table[k, STEPS] + u * table[k, STEPS + 3]) + v * table[k, STEPS + 6]
+    dy = (table[k, STEPS + 1] + u * table[k, STEPS + 4]) + v * table[k, STEPS + 7]
+    dz = (table[k, STEPS + 2] + u * table[k, STEPS + 5]) + v * table[k, STEPS + 8]
+    ox, oy, oz = table[k, ORIGIN], table[k, ORIGIN + 1], table[k, ORIGIN + 2]
+    return hit(table[k, FORM], table[k, BOTTOM], table[k, TOP], ox, oy, oz, dx, dy, dz, clip)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy")
 def _smooth(
-    prims: Array,
-    origin: Array,
-    steps: Array,
-    eye: Array,
-    view: Array,
+    table: Array,
+    first: int,
+    eye: Any,
     us: Array,
     vs: Array,
     clip: float,
     far: float,
     nearest: NDArray[np.int32],
     factors: Array,
-    lamps: Array,
     daylight: float,
-    ys: NDArray[np.int64],
-    xs: NDArray[np.int64],
+    jagged: NDArray[np.int64],
     rgb: NDArray[np.uint8],
 ) -> None:
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
-    # Each pixel reads and writes only its own colour: smoothing in place, in parallel, needs no copy.
-    for band in prange(_BANDS):
-        slots = np.empty(len(_NEIGHBOURS), dtype=np.int64)
-        for place in range(band * len(ys) // _BANDS, (band + 1) * len(ys) // _BANDS):
-            y, x = ys[place], xs[place]
-            count = _candidates(nearest, y, x, slots)
-            red, green, blue = 0.0, 0.0, 0.0
-            for part in range(len(_SUBPIXELS)):
-                u, v = us[x] + _SUBPIXELS[part, 0] * pixel, vs[y] + _SUBPIXELS[part, 1] * pixel
-                best, chosen = math.inf, -1
-                for k in range(count):
-                    order = nearest[y + _NEIGHBOURS[slots[k], 0], x + _NEIGHBOURS[slots[k], 1]]
-                    t = _depth(prims, origin, steps, order, u, v, clip)
-                    if clip < t < far and t < best:
-                        best, chosen = t, k
-                if chosen < 0:  # the ray misses all candidates: the pixel's own colour is taken
-                    red, green, blue = red + rgb[y, x, 0], green + rgb[y, x, 1], blue + rgb[y, x, 2]
-                    continue
-                # The crease factor is that of the pixel that showed the primitive, as there is no depth around the ray.
-                yy, xx = y + _NEIGHBOURS[slots[chosen], 0], x + _NEIGHBOURS[slots[chosen], 1]
-                order = nearest[yy, xx]
-                level = brightness_at(prims, origin, steps, order, (u, v, best), eye, view, lamps, daylight)
-                level = level * factors[yy, xx]
-                red += min(prims[order, COLOR] * level * 255.0, 255.0)
-                green += min(prims[order, COLOR + 1] * level * 255.0, 255.0)
-                blue += min(prims[order, COLOR + 2] * level * 255.0, 255.0)
-            rgb[y, x, 0] = np.uint8(red / len(_SUBPIXELS))
-            rgb[y, x, 1] = np.uint8(green / len(_SUBPIXELS))
-            rgb[y, x, 2] = np.uint8(blue / len(_SUBPIXELS))
+    # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
+    orders = np.empty(len(_NEIGHBOURS), dtype=np.int32)
+    at = np.empty((len(_NEIGHBOURS), 2), dtype=np.int64)
+    for place in range(len(jagged)):
+        y, x = jagged[place, 0], jagged[place, 1]
+        count = _candidates(nearest, y, x, orders, at)
+        red, green, blue = 0.0, 0.0, 0.0
+        for part in range(len(_SUBPIXELS)):
+            u, v = us[x] + _SUBPIXELS[part, 0] * pixel, vs[y] + _SUBPIXELS[part, 1] * pixel
+            best, chosen = math.inf, -1
+            for k in range(count):
+                t = _depth(table, orders[k], u, v, clip)
+                if clip < t < far and t < best:
+                    best, chosen = t, k
+            if chosen < 0:  # the ray misses all candidates: the pixel's own colour is taken
+                red, green, blue = red + rgb[y, x, 0], green + rgb[y, x, 1], blue + rgb[y, x, 2]
+                continue
+            order = orders[chosen]
+            # The crease factor is that of the pixel that showed the primitive, as there is no depth around the ray.
+            level = brightness_at(table, first, order, u, v, best, eye, daylight)
+            level = level * factors[at[chosen, 0], at[chosen, 1]]
+            red += min(table[order, COLOR] * level * 255.0, 255.0)
+            green += min(table[order, COLOR + 1] * level * 255.0, 255.0)
+            blue += min(table[order, COLOR + 2] * level * 255.0, 255.0)
+        rgb[y, x, 0] = np.uint8(red / len(_SUBPIXELS))
+        rgb[y, x, 1] = np.uint8(green / len(_SUBPIXELS))
+        rgb[y, x, 2] = np.uint8(blue / len(_SUBPIXELS))
