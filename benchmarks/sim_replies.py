@@ -59,15 +59,15 @@ def digests(steps: int) -> dict[str, Any]:
     done = Counter[str]()
     for room in _ROOMS:
         server, random = SimulatorServer(Simulation(Catalogue())), np.random.default_rng(7)
-        server.answer({"action": "Reset", "sceneName": room})
+        server.run({"action": "Reset", "sceneName": room})
         init = {"gridSize": 0.25, "visibilityDistance": 1.5, "fieldOfView": 60, "fastActionEmit": False}
         images = {"renderInstanceSegmentation": True, "renderDepthImage": True}
-        replies = server.answer({"action": "Initialize", **init, **images})
+        replies = list(server.answer({"action": "Initialize", **init, **images}))
         metadata, pixels = hashlib.sha256(), hashlib.sha256()
         for step in range(steps // len(_ROOMS)):
             event = msgpack.unpackb(bytes(dict(replies)[FieldType.METADATA]))["agents"][0]
             action = next_action(step, event["objects"], random)
-            replies = server.answer({**action, "sequenceId": step})
+            replies = list(server.answer({**action, "sequenceId": step}))
             for field_type, body in replies:
                 (metadata if field_type == FieldType.METADATA else pixels).update(body)
             outcome = msgpack.unpackb(bytes(dict(replies)[FieldType.METADATA]))["agents"][0]

@@ -61,9 +61,9 @@ def echo(scene: str, full: bool) -> None:
     from infthor_eval.sim.simulation import Simulation
 
     peer = SimulatorServer(Simulation(Catalogue()))
-    peer.answer({"action": "Reset", "sceneName": scene, "sequenceId": 0})
-    peer.answer({"action": "Initialize", "sequenceId": 1, "fieldOfView": 60, **(_FULL if full else {})})
-    replies = {n: peer.answer({"action": "Pass", "sequenceId": n}) for n in (0, 1)}
+    peer.run({"action": "Reset", "sceneName": scene})
+    peer.run({"action": "Initialize", "fieldOfView": 60, **(_FULL if full else {})})
+    replies = {n: list(peer.answer({"action": "Pass", "sequenceId": n})) for n in (0, 1)}
     head, metadata = replies[1][0]
     marker = b"\xaasequenceId\x01"
     assert bytes(metadata).count(marker) == 1

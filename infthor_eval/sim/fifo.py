@@ -4,12 +4,13 @@ A frame is a header `!BI` (field type, length of the body) and a body; a message
 """
 
 import errno
+import fcntl
 import json
 import os
 import select
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from infthor_eval.errors import SimulatorError
 __all__ = ["FieldType", "FifoPipes"]
 
 _HEADER = struct.Struct("!BI")
+_ROOM = 1 << 20  # bytes; the most that Linux grants without privileges
 _PAUSE = 0.01  # seconds between two attempts at a pipe that the other side has not opened yet
 
 
@@ -65,8 +67,8 @@ class FifoPipes:
         if self._in is not None:
             os.close(self._in)
 
-    def send(self, frames: Sequence[tuple[FieldType, bytes | memoryview]]) -> None:
-        """Write one message of these frames."""
+    def send(self, frames: Iterable[tuple[FieldType, bytes | memoryview]]) -> None:
+        """Write one message of these frames, each as soon as it is there."""
         for field_type, body in frames:
             view = memoryview(body).cast("B")
             self._write(_HEADER.pack(field_type, len(view)))
@@ -116,6 +118,7 @@ class FifoPipes:
                 time.sleep(_PAUSE)
             else:
                 os.set_blocking(pipe, True)
+                _widen(pipe)
                 return pipe
 
     def _open_in(self) -> int | None:
@@ -148,6 +151,14 @@ class FifoPipes:
             parts.append(part)
             size -= len(part)
         return b"".join(parts)
+
+
+def _widen(pipe: int) -> None:
+    """Give a pipe room for a whole reply, so that its writer goes on while the reader still reads."""
+    try:
+        fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _ROOM)
+    except PermissionError:
+        return  # more than the system grants: the pipe stays as it is, which is slower and nothing else
 
 
 def _parse(field_type: int, body: bytes) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The process's loop: receive an action, run it, reply with the metadata and the requested pictures."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from infthor_eval.sim.simulation import Simulation
 
 __all__ = ["SimulatorServer"]
 
-Frames = list[tuple[FieldType, bytes | memoryview]]
+Frames = Iterator[tuple[FieldType, bytes | memoryview]]
 _AGENT = (FieldType.RGB, FieldType.DEPTH, FieldType.NORMALS, FieldType.IDS, FieldType.CLASSES)
 _THIRD = (
     FieldType.THIRD_PARTY_RGB,
@@ -44,12 +44,15 @@ class SimulatorServer:
             pipes.send(self.answer(message))
 
     def answer(self, message: Mapping[str, Any]) -> Frames:
-        """Run one action and return the frames of the reply."""
+        """Run one action and return the frames of the reply, which are made as they are asked for.
+
+        So the client reads the metadata while the pictures are drawn.
+        """
         sequence = int(message.get("sequenceId", 0))
         outcome, query = self.run(message)
         # Unity's fast emit: after a query the client keeps its last frame and gets only what the action returned.
         if query and self._sim.settings.fast_emit:
-            return [(FieldType.METADATA_PATCH, self._packer.patch(outcome))]
+            return iter([(FieldType.METADATA_PATCH, self._packer.patch(outcome))])
         return self._reply(outcome, sequence, message)
 
     def run(self, message: Mapping[str, Any]) -> tuple[Outcome, bool]:
@@ -79,22 +82,19 @@ class SimulatorServer:
             "classes": message.get("renderSemanticSegmentation", sim.settings.classes),
         }
         segmented = bool(requested["ids"] or requested["classes"])
-        frames: Frames = [(FieldType.METADATA, self._packer.message(sim, outcome, sequence, segmented))]
-        frames += self._pictures(sim.views.agent_frame(), requested, _AGENT)
+        yield FieldType.METADATA, self._packer.message(sim, outcome, sequence, segmented)
+        yield from self._pictures(sim.views.agent_frame(), requested, _AGENT)
         for camera in sim.cameras:
-            frames += self._pictures(sim.views.third_party(camera), requested, _THIRD)
-        return frames
+            yield from self._pictures(sim.views.third_party(camera), requested, _THIRD)
 
     def _pictures(self, picture: Picture, requested: Mapping[str, Any], field_types: tuple[FieldType, ...]) -> Frames:
-        frames: Frames = []
         if requested["rgb"]:
-            frames.append((field_types[0], self._sim.views.colours(picture).data))
+            yield field_types[0], self._sim.views.colours(picture).data
         if requested["depth"]:
-            frames.append((field_types[1], picture.depth.astype(np.float32).data))
+            yield field_types[1], picture.depth.astype(np.float32).data
         if requested["normals"]:
-            frames.append((field_types[2], normal_image(picture).data))
+            yield field_types[2], normal_image(picture).data
         if requested["ids"]:
-            frames.append((field_types[3], instance_image(picture).data))
+            yield field_types[3], instance_image(picture).data
         if requested["classes"]:
-            frames.append((field_types[4], class_image(picture, self._sim.world).data))
-        return frames
+            yield field_types[4], class_image(picture, self._sim.world).data
