@@ -46,7 +46,7 @@ def _move(
             raise ActionError(f"Agent movement would bring it beyond the max distance of {objectId}: {away:.4f}")
     _check_path(sim, target, offset, forceAction)
     agent.position = target
-    _carry(sim, manualInteract)
+    sim.world.carry(manualInteract)
 
 
 for _name, _angle in _DIRECTIONS.items():
@@ -81,7 +81,7 @@ def _rotate(
     agent = sim.world.agent
     # The second modulus turns a 360.0 that rounding produced into 0.
     agent.yaw = round((agent.yaw + sign * amount) % 360.0, 6) % 360.0
-    _carry(sim, manualInteract)
+    sim.world.carry(manualInteract)
 
 
 for _name, _sign in (("RotateRight", 1.0), ("RotateLeft", -1.0)):
@@ -106,7 +106,7 @@ def _look(
     if target < -MAX_UP:
         raise ActionError(f"can't look up beyond {MAX_UP:g} degrees above the forward horizon", ErrorCode.LOOK_UP_LIMIT)
     agent.horizon = target
-    _carry(sim, manualInteract)
+    sim.world.carry(manualInteract)
 
 
 for _name, _sign in (("LookDown", 1.0), ("LookUp", -1.0)):
@@ -119,7 +119,7 @@ def rotate_look(sim: Simulation, rotation: Vector3 | None = None, horizon: float
     agent = sim.world.agent
     agent.yaw = float((rotation or Vector3()).get("y", 0.0)) % 360.0
     agent.horizon = float(horizon)
-    _carry(sim)
+    sim.world.carry()
 
 
 @action("Crouch")
@@ -128,7 +128,6 @@ def crouch(sim: Simulation) -> None:
     if not sim.world.agent.standing:
         raise ActionError("Already crouching")
     sim.world.agent.standing = False
-    sim.world.mark_changed()
 
 
 @action("Stand")
@@ -137,15 +136,8 @@ def stand(sim: Simulation) -> None:
     if sim.world.agent.standing:
         raise ActionError("Already standing")
     sim.world.agent.standing = True
-    sim.world.mark_changed()
 
 
 @action("Pass", "Done", "NoOp", "Stop")
 def wait(sim: Simulation) -> None:
     """Do nothing."""
-
-
-def _carry(sim: Simulation, keep_grip: bool = False) -> None:
-    """Take what the agent holds along with it."""
-    sim.world.carry(keep_grip)
-    sim.world.mark_changed()

@@ -36,7 +36,6 @@ def teleport(
     agent.position, agent.yaw, agent.horizon = target, turn % 360.0, tilt
     agent.standing = agent.standing if standing is None else standing
     sim.world.carry()
-    sim.world.mark_changed()
 
 
 @action("TeleportFull", forms=(("position",), ("x", "y", "z")))

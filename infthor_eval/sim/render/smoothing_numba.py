@@ -12,7 +12,7 @@ from infthor_eval.sim.render.camera import PinholeCamera, Projection
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.primitives import BOTTOM, COLOR, FORM, TOP
 from infthor_eval.sim.render.raster_numba import hit
-from infthor_eval.sim.render.shading_numba import brightness_at, eye_of
+from infthor_eval.sim.render.shading_numba import brightness, eye_of
 from infthor_eval.sim.render.smoothing import JUMP, NEIGHBOURS, SUBPIXELS
 from infthor_eval.sim.render.table import ORIGIN, STEPS, shading_table
 
@@ -84,15 +84,6 @@ def _candidates(nearest: NDArray[np.int32], y: int, x: int, orders: NDArray[np.i
     return count
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _depth(table: Array, k: int, u: float, v: float, clip: float) -> float:
-    dx = (table[k, STEPS] + u * table[k, STEPS + 3]) + v * table[k, STEPS + 6]
-    dy = (table[k, STEPS + 1] + u * table[k, STEPS + 4]) + v * table[k, STEPS + 7]
-    dz = (table[k, STEPS + 2] + u * table[k, STEPS + 5]) + v * table[k, STEPS + 8]
-    ox, oy, oz = table[k, ORIGIN], table[k, ORIGIN + 1], table[k, ORIGIN + 2]
-    return hit(table[k, FORM], table[k, BOTTOM], table[k, TOP], ox, oy, oz, dx, dy, dz, clip)
-
-
 @njit(cache=True, error_model="numpy")
 def _smooth(
     table: Array,
@@ -110,29 +101,47 @@ def _smooth(
 ) -> None:
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
     # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
+    parts = len(_SUBPIXELS)
+    shown = np.full(len(jagged) * parts, -1, dtype=np.int32)  # the primitive that each ray hits; -1 for none
+    ray_u, ray_v, depths = np.empty(len(shown)), np.empty(len(shown)), np.empty(len(shown))
+    crease, levels = np.empty(len(shown)), np.empty(len(shown))
     orders = np.empty(len(_NEIGHBOURS), dtype=np.int32)
     at = np.empty((len(_NEIGHBOURS), 2), dtype=np.int64)
     for place in range(len(jagged)):
         y, x = jagged[place, 0], jagged[place, 1]
         count = _candidates(nearest, y, x, orders, at)
-        red, green, blue = 0.0, 0.0, 0.0
-        for part in range(len(_SUBPIXELS)):
+        for part in range(parts):
             u, v = us[x] + _SUBPIXELS[part, 0] * pixel, vs[y] + _SUBPIXELS[part, 1] * pixel
             best, chosen = math.inf, -1
             for k in range(count):
-                t = _depth(table, orders[k], u, v, clip)
+                order = orders[k]
+                dx = (table[order, STEPS] + u * table[order, STEPS + 3]) + v * table[order, STEPS + 6]
+                dy = (table[order, STEPS + 1] + u * table[order, STEPS + 4]) + v * table[order, STEPS + 7]
+                dz = (table[order, STEPS + 2] + u * table[order, STEPS + 5]) + v * table[order, STEPS + 8]
+                ox, oy, oz = table[order, ORIGIN], table[order, ORIGIN + 1], table[order, ORIGIN + 2]
+                t = hit(table[order, FORM], table[order, BOTTOM], table[order, TOP], ox, oy, oz, dx, dy, dz, clip)
                 if clip < t < far and t < best:
                     best, chosen = t, k
-            if chosen < 0:  # the ray misses all candidates: the pixel's own colour is taken
+            if chosen >= 0:
+                i = place * parts + part
+                shown[i], ray_u[i], ray_v[i], depths[i] = orders[chosen], u, v, best
+                # The crease factor is that of the pixel that showed it, as there is no depth around the ray.
+                crease[i] = factors[at[chosen, 0], at[chosen, 1]]
+    brightness(table, first, eye, daylight, shown, ray_u, ray_v, depths, levels)
+    for place in range(len(jagged)):
+        y, x = jagged[place, 0], jagged[place, 1]
+        red, green, blue = 0.0, 0.0, 0.0
+        for i in range(place * parts, (place + 1) * parts):
+            order = shown[i]
+            if order < 0:  # the ray misses all candidates: the pixel's own colour is taken
                 red, green, blue = red + rgb[y, x, 0], green + rgb[y, x, 1], blue + rgb[y, x, 2]
                 continue
-            order = orders[chosen]
-            # The crease factor is that of the pixel that showed the primitive, as there is no depth around the ray.
-            level = brightness_at(table, first, order, u, v, best, eye, daylight)
-            level = level * factors[at[chosen, 0], at[chosen, 1]]
+            level = levels[i] * crease[i]
             red += min(table[order, COLOR] * level * 255.0, 255.0)
             green += min(table[order, COLOR + 1] * level * 255.0, 255.0)
             blue += min(table[order, COLOR + 2] * level * 255.0, 255.0)
-        rgb[y, x, 0] = np.uint8(red / len(_SUBPIXELS))
-        rgb[y, x, 1] = np.uint8(green / len(_SUBPIXELS))
-        rgb[y, x, 2] = np.uint8(blue / len(_SUBPIXELS))
+        rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = (
+            np.uint8(red / parts),
+            np.uint8(green / parts),
+            np.uint8(blue / parts),
+        )
