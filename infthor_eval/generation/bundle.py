@@ -92,7 +92,7 @@ def build_bundle(
     with ScratchFolder() as folder:
         _raise_first(generate_set(jobs, simulator, folder, progress).failures)
         replayed = replay_set(select([folder]), simulator, out, progress)
-    _raise_first([f"{item.place}: {item.message}" for item in replayed.failures])
+    _raise_first([item.message for item in replayed.failures])
     generated = generate_questions(
         out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory, further=manifest.further
     )

@@ -37,7 +37,12 @@ Item = tuple[TrajectorySource, Trajectory]
 
 @dataclass(frozen=True)
 class ReplayFailure:
-    """A trajectory that could not be replayed at all."""
+    """A trajectory that could not be replayed at all.
+
+    Attributes:
+        place: its file and line.
+        message: the reason in one line, which names the place too.
+    """
 
     place: str
     message: str
@@ -81,7 +86,7 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
             break
         try:
             trajectory = source.read()
-            with _wrap_malformed(source):
+            with _wrap_malformed(f"{source.place}: "):
                 agent_path(trajectory)  # read for all scenes before the first replay, so an error must show here
         except DataError as error:
             selection.failures.append(ReplayFailure(source.place, str(error)))
@@ -185,7 +190,7 @@ def _collect(
 def _replay_one(item: Item, simulator: Simulator, metadata: Path, frames: int) -> _ReplayOutcome:
     source, trajectory = item
     try:
-        with freeze_existing_objects(), _wrap_malformed(source):
+        with freeze_existing_objects(), _wrap_malformed():
             return _replay_or_check(source, trajectory, simulator, metadata, frames)
     except InfthorError as error:
         return _failure_outcome(item, error)
@@ -193,7 +198,7 @@ def _replay_one(item: Item, simulator: Simulator, metadata: Path, frames: int) -
 
 def _failure_outcome(item: Item, error: InfthorError) -> _ReplayOutcome:
     source, trajectory = item
-    return _ReplayOutcome(failure=ReplayFailure(source.place, f"{trajectory.traj_id}: {error}"))
+    return _ReplayOutcome(failure=ReplayFailure(source.place, f"{source.place}: {trajectory.traj_id}: {error}"))
 
 
 def _all_sources(paths: Iterable[Path], failures: list[ReplayFailure]) -> Iterator[TrajectorySource]:
@@ -212,12 +217,10 @@ def _all_sources(paths: Iterable[Path], failures: list[ReplayFailure]) -> Iterat
                 failures.append(ReplayFailure(str(file), str(error)))
 
 
-def _wrap_malformed(source: TrajectorySource) -> AbstractContextManager[None]:
+def _wrap_malformed(place: str = "") -> AbstractContextManager[None]:
     """Convert the errors of a trajectory that has the documented form but inconsistent content."""
     wrong = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
-    return wrap_errors(
-        f"{source.place}: not a trajectory that can be replayed", "restore it or leave it out", catch=wrong
-    )
+    return wrap_errors(f"{place}not a trajectory that can be replayed", "restore it or leave it out", catch=wrong)
 
 
 def _replay_or_check(

@@ -96,6 +96,7 @@ def test_one_bad_trajectory_does_not_stop_the_others(generated, tmp_path):
         replayed = replay_set(select([path]), simulator, tmp_path / "set")
     assert len(replayed.reports) == 1
     assert sorted(failure.place.rpartition(":")[2] for failure in replayed.failures) == ["1", "2"]
+    assert all(failure.message.count(str(path)) == 1 for failure in replayed.failures)
     assert [folder.name for folder in (tmp_path / "set/metadata").iterdir()] == [JOB.traj_id]
 
 

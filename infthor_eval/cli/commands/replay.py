@@ -74,7 +74,7 @@ def command(
     else:
         _print(summarise(replayed), console())
     for failure in replayed.failures[:_MAX_SHOWN]:
-        notes.print(f"not replayed: {failure.place}: {failure.message}", style="red")
+        notes.print(f"not replayed: {failure.message}", style="red")
     context.exit(1 if replayed.failures else 0)
 
 
