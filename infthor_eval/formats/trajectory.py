@@ -16,6 +16,7 @@ from msgspec import Meta
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest
+from infthor_eval.formats.limits import OBJECT_POSES
 from infthor_eval.formats.reading import lines_of, read_bytes
 
 __all__ = [
@@ -222,11 +223,14 @@ class TrajectorySource:
         """Decode and check the trajectory; a missing `traj_id` becomes the task's id, else the file's name.
 
         Raises:
-            DataError: the text is not JSON, or not of the documented form.
+            DataError: the text is not JSON, not of the documented form, or has more object poses than the limit.
         """
         catch = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
         with wrap_errors(f"{self.place}: not a trajectory", _HINT, catch=catch):
             trajectory = msgspec.convert(_normalize(msgspec.json.decode(self.raw)), type=Trajectory)
+        n_poses = len(trajectory.scene.object_poses)
+        if n_poses > OBJECT_POSES.value:
+            raise DataError(f"{self.place}: {n_poses:,} object_poses are too many for a scene; {OBJECT_POSES.hint}")
         stem = self.path.name.split(".")[0]
         in_file = stem if self.line is None else f"{stem}-{self.line}"
         trajectory.traj_id = trajectory.traj_id or trajectory.task_id or in_file

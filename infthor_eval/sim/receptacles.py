@@ -114,18 +114,20 @@ def _parent_cost(receptacle: SimObject, point: Array, item: SimObject) -> float 
 
     Hollow receptacles come before surfaces, small before large ones, and the floor last.
     """
-    low, high = (corner + drawer_offset(receptacle) for corner in receptacle.bounds())
+    low, high = receptacle.bounds()
+    if receptacle.type.slides:
+        low, high = low + drawer_offset(receptacle), high + drawer_offset(receptacle)
     if not (low[0] - 0.01 <= point[0] <= high[0] + 0.01 and low[2] - 0.01 <= point[2] <= high[2] + 0.01):
         return None
     if receptacle.object_type == "Floor":
         return 5.0
-    volume = float(np.prod(np.maximum(high - low, 0.02)))
     if receptacle.type.encloses or receptacle.type.open_top:
         top = (low[1] + high[1]) / 2 if receptacle.type.slides else high[1] - 0.005
         inside = low[1] - _depth_below(receptacle) <= point[1] <= top
-        if receptacle.type.pickupable and float(np.prod(item.box_size)) > volume:
+        volume = float(np.prod(np.maximum(high - low, 0.02)))
+        if not inside or (receptacle.type.pickupable and float(np.prod(item.box_size)) > volume):
             return None
-        return 0.01 * volume if inside else None
+        return 0.01 * volume
     gap = point[1] - receptacle.surface_height()
     if -0.12 <= gap <= 0.25:
         return 0.1 + abs(gap)

@@ -166,9 +166,12 @@ class World:
 
     def descendants(self, item: SimObject) -> Iterator[SimObject]:
         """Yield everything inside or on `item`, at any depth."""
-        for child in self.children(item):
-            yield child
-            yield from self.descendants(child)
+        # Not recursive: recorded poses can pile up a thousand plates.
+        rest = self.children(item)[::-1]
+        while rest:
+            part = rest.pop()
+            yield part
+            rest += self.children(part)[::-1]
 
     def ancestors(self, item: SimObject) -> Iterator[SimObject]:
         """Yield what contains `item`, from the nearest outwards."""

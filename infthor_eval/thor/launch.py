@@ -5,6 +5,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from infthor_eval.formats.limits import ACTION_SECONDS, UNITY_ACTION_SECONDS
+
 __all__ = ["Launch", "embedded_launch", "unity_launch"]
 
 
@@ -17,6 +19,7 @@ class Launch:
         executable: command line of the simulator; None for the build that ai2thor downloads.
         platform: name of ai2thor's platform for its own build ("CloudRendering" needs no X server).
         timeout: time limit of one reply, seconds.
+        timeout_hint: the way to raise it, for messages.
         start_timeout: time limit of the first message, seconds.
     """
 
@@ -24,30 +27,48 @@ class Launch:
     label: str = "unity"
     platform: str | None = None
     timeout: float = 100.0
+    timeout_hint: str = ""
     start_timeout: float = 300.0
 
 
 def embedded_launch(
-    data: Path | None = None, supplement: Path | None = None, *, timeout: float = 60.0, start_timeout: float = 300.0
+    data: Path | None = None, supplement: Path | None = None, *, start_timeout: float = 300.0
 ) -> Launch:
     """Return the launch of the simulator in this package.
 
     Args:
         data: folder of recorded floor plans; without it there are only procedural scenes.
         supplement: file with additions to the floor plans from trajectories (see `supplement`).
-        timeout: time limit of one reply, seconds.
         start_timeout: time limit of the first message, seconds. The first start of an installation compiles the
             renderer, which takes ten seconds of a processor. Several at once on a busy machine take minutes, and one
             that is stopped in the middle would have to restart from the beginning.
+
+    Raises:
+        UsageError: the time limit of an action, `limits.ACTION_SECONDS`, is set to no number.
     """
     words = [sys.executable, "-m", "infthor_eval.sim"]
     if data is not None:
         words += ["--data", str(Path(data).resolve())]
     if supplement is not None:
         words += ["--supplement", str(Path(supplement).resolve())]
-    return Launch(shlex.join(words), "embedded", timeout=timeout, start_timeout=start_timeout)
+    return Launch(
+        shlex.join(words),
+        "embedded",
+        timeout=ACTION_SECONDS.value,
+        timeout_hint=ACTION_SECONDS.hint,
+        start_timeout=start_timeout,
+    )
 
 
 def unity_launch(executable: Path | None = None, *, platform: str | None = None) -> Launch:
-    """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor downloads."""
-    return Launch(None if executable is None else shlex.quote(str(executable)), platform=platform)
+    """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor downloads.
+
+    Raises:
+        UsageError: the time limit of an action, `limits.UNITY_ACTION_SECONDS`, is set to no number.
+    """
+    return Launch(
+        None if executable is None else shlex.quote(str(executable)),
+        platform=platform,
+        timeout=UNITY_ACTION_SECONDS.value,
+        timeout_hint=UNITY_ACTION_SECONDS.hint,
+    )

@@ -264,6 +264,8 @@ class Simulator:
         self.close()
         self._failures += 1
         if self._failures > self._max_restarts:
-            raise SimulatorError(f"{fault} (failure {self._failures} since the last mark, giving up)") from fault
+            hint = f"; {self._launch.timeout_hint}" if fault.fault_type == "hung" and self._launch.timeout_hint else ""
+            message = f"{fault} (failure {self._failures} since the last mark, giving up){hint}"
+            raise SimulatorError(message) from fault
         self.restarts += 1
         _LOG.warning("%s; starting it again (%d of %d)", fault, self._failures, self._max_restarts)

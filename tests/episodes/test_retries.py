@@ -7,6 +7,7 @@ import pytest
 
 from infthor_eval.episodes.retries import with_retries
 from infthor_eval.errors import SceneError, SimulatorError
+from infthor_eval.formats.limits import ACTION_SECONDS
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
@@ -81,3 +82,27 @@ def test_a_scene_that_is_not_there_is_not_tried_again(simulator):
 def test_other_errors_are_nobodys_to_mend(simulator):
     with pytest.raises(ZeroDivisionError):
         with_retries(simulator, lambda: 1 / 0, lambda: None)
+
+
+def test_a_simulator_that_stops_answering_is_replaced_and_told(monkeypatch):
+    monkeypatch.setenv(ACTION_SECONDS.name, "3")
+    with Simulator(embedded_launch(), image=False, instances=False) as simulator:
+        simulator.reset("bedroom-1")
+        before = simulator.step("RotateRight").agent
+        stopped = simulator._controller.server.unity_proc
+        os.kill(stopped.pid, signal.SIGSTOP)
+        agent, faults = with_retries(simulator, lambda: simulator.step("RotateLeft").agent, lambda: None)
+        assert faults[0].startswith("simulator started again: ")
+        assert stopped.poll() is not None
+        assert (agent.position, agent.rotation) == (before.position, simulator.reset("bedroom-1").agent.rotation)
+
+
+def test_a_hang_that_stays_names_the_limit(monkeypatch):
+    monkeypatch.setenv(ACTION_SECONDS.name, "1")
+    with Simulator(embedded_launch(), image=False, instances=False, max_restarts=0) as simulator:
+        simulator.reset("bedroom-1")
+        os.kill(simulator._controller.server.unity_proc.pid, signal.SIGSTOP)
+        with pytest.raises(
+            SimulatorError, match=r"no answer within 1 s .* set INFTHOR_EVAL_MAX_ACTION_SECONDS to more"
+        ):
+            simulator.step("RotateLeft")

@@ -4,6 +4,8 @@ import itertools
 
 import pytest
 
+from infthor_eval.formats.limits import OBJECT_POSES
+
 from .harness import Bench
 
 
@@ -245,3 +247,21 @@ def test_random_placement_follows_its_seed(bench):
         drawn.append(places())
     assert drawn[0] == drawn[1]
     assert drawn[0] != third
+
+
+def test_a_pile_of_plates_is_carried_however_high_it_is(bench):
+    world = bench.sim.world
+    pile = [world.objects[bench.first("Plate")]]
+    for number in range(2000):
+        plate = pile[-1].duplicate(f"Plate|{number}")
+        world.add(plate)
+        world.attach(plate, pile[-1])
+        pile.append(plate)
+    assert list(world.descendants(pile[0])) == pile[1:]
+
+
+def test_more_poses_than_a_scene_has_are_refused(bench, monkeypatch):
+    monkeypatch.setenv(OBJECT_POSES.name, "1")
+    pose = {"objectName": "Mug_1", "position": {"x": 0, "y": 1, "z": 0}}
+    bench.ok("SetObjectPoses", objectPoses=[pose])
+    assert "2 entries, too many for a scene" in bench.refused("SetObjectPoses", objectPoses=[pose, pose])

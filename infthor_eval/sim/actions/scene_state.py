@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from infthor_eval.formats.limits import OBJECT_POSES
 from infthor_eval.sim.actions.interaction import set_openness
 from infthor_eval.sim.actions.registry import action
 from infthor_eval.sim.errors import ActionError
@@ -24,6 +25,8 @@ def set_object_poses(
     skipMoveable: bool = False,
 ) -> None:
     """Place the listed objects by name; a name listed twice is copied, pickupable objects not listed vanish."""
+    if len(objectPoses) > OBJECT_POSES.value:
+        raise ActionError(f"objectPoses has {len(objectPoses):,} entries, too many for a scene; {OBJECT_POSES.hint}")
     set_poses(sim.world, [_named_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
 
 
@@ -41,13 +44,15 @@ def _named_pose(entry: Any) -> NamedPose:
 @action("SetObjectToggles")
 def set_object_toggles(sim: Simulation, objectToggles: list[Any]) -> None:
     """Switch all objects of the listed types on or off."""
+    switched: dict[str, bool] = {}
     for entry in objectToggles:
         if not isinstance(entry, Mapping) or not isinstance(entry.get("objectType"), str):
             raise ActionError(f"objectToggles needs entries with objectType and isOn, not {entry!r}")
-        for item in sim.world.objects.values():
-            if item.object_type == entry["objectType"] and item.type.toggleable:
-                item.state.toggled = bool(entry.get("isOn", False))
-                sim.world.mark_changed(item)
+        switched[entry["objectType"]] = bool(entry.get("isOn", False))
+    for item in sim.world.objects.values():
+        if item.object_type in switched and item.type.toggleable:
+            item.state.toggled = switched[item.object_type]
+            sim.world.mark_changed(item)
 
 
 class _StateChange(NamedTuple):
