@@ -3,22 +3,36 @@
 import csv
 import io
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import read_text
 
-__all__ = ["read_rows", "unshield", "write_sheet"]
+__all__ = ["CsvRow", "read_rows", "unshield", "write_sheet"]
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a cell that begins so is a formula to a spreadsheet
 _SHIELD = "'"  # a cell that begins so is text to a spreadsheet
 
 
-def read_rows(
-    path: Path, columns: Sequence[str], hint: str, *, line_breaks: bool = False
-) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the rows of a CSV file: the place of each (for messages) and its cells by column.
+@dataclass(frozen=True)
+class CsvRow:
+    """One row.
+
+    Attributes:
+        line: number of its last line in the file, from 1.
+        cells: its cells by column; empty where it has fewer.
+        problem: the reason why the row cannot be used, and how to fix it; None if it can.
+    """
+
+    line: int
+    cells: dict[str, str]
+    problem: str | None
+
+
+def read_rows(path: Path, columns: Sequence[str], hint: str, *, line_breaks: bool = False) -> Iterator[CsvRow]:
+    """Yield the rows of a CSV file.
 
     Args:
         path: the file.
@@ -27,8 +41,7 @@ def read_rows(
         line_breaks: True if a cell may have several lines; otherwise a line break means an unclosed quote.
 
     Raises:
-        DataError: the file cannot be read, lacks a column or has it twice, has a row with more cells than columns, or
-            an unclosed quote.
+        DataError: the file cannot be read, lacks a column or has it twice, or has a quote that is never closed.
     """
     text = read_text(path, hint)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -36,16 +49,15 @@ def read_rows(
         header = next(reader, [])
         _check_header(path, header, columns, hint)
         for cells in reader:
-            place = f"{path}, line {reader.line_num}"
             if not cells:
                 continue
-            if len(cells) > len(header):
-                raise DataError(f"{place}: has {len(cells)} cells for {len(header)} columns; {hint}")
-            row = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False))
+            row, problem = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False)), None
             broken = next((name for name, cell in row.items() if "\n" in cell or "\r" in cell), None)
-            if broken is not None and not line_breaks:
-                raise DataError(f"{place}: {broken} has several lines; close its quote before the end of the line")
-            yield place, row
+            if len(cells) > len(header):
+                problem = f"has {len(cells)} cells for {len(header)} columns; {hint}"
+            elif broken is not None and not line_breaks:
+                problem = f"{broken} has several lines; close its quote before the end of the line"
+            yield CsvRow(reader.line_num, row, problem)
 
 
 def _check_header(path: Path, header: Sequence[str], columns: Sequence[str], hint: str) -> None:

@@ -10,7 +10,7 @@ Question files alone, without `metadata/`, are a set too: for whatever needs no 
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
@@ -21,12 +21,12 @@ from infthor_eval.formats.action_log import read_action_log
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
 from infthor_eval.formats.qa_csv import read_questions
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.set_info import simulator_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.video import Video, read_video
 
-__all__ = ["NiehSet", "SkippedQuestion"]
+__all__ = ["NiehSet"]
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -38,15 +38,6 @@ _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
 
-@dataclass(frozen=True)
-class SkippedQuestion:
-    """A question that cannot be asked, with the reason; in one variant of the task, or in all if `variant` is empty."""
-
-    question: Question
-    reason: str
-    variant: str = ""
-
-
 class NiehSet:
     """Questions and frames of one folder. A trajectory is read when it is first needed, and cached.
 
@@ -54,7 +45,8 @@ class NiehSet:
         root: folder of the set, or one question file.
         has_frames: False if there are question files alone.
         trajectories: folder of its trajectories (`<traj_id>.json` or `.txt`), or None if they are inside the set.
-        files: all questions by the name of their file, in its order, also those that cannot be asked.
+        files: all questions by the name of their file, in its order, also those that cannot be asked; rows that are no
+            question are `SkippedQuestion`.
         simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does not say.
     """
 
@@ -62,8 +54,8 @@ class NiehSet:
         """Read the questions of the set in `root`, which may have none if they are not needed.
 
         Raises:
-            DataError: a folder or file is missing, the set has another format version, or a question file is
-                malformed.
+            DataError: a folder or file is missing, the set has another format version, or a question file has no
+                row that is a question.
         """
         if not root.exists():
             raise DataError(f"{root}: no such folder; {_GIVE_A_SET}")
@@ -93,10 +85,18 @@ class NiehSet:
         rows: list[Question | SkippedQuestion] = []
         seen = set()
         for question in chain.from_iterable(self.files.values()):
+            if isinstance(question, SkippedQuestion):
+                rows.append(question)
+                continue
             reason = "is in the files twice" if question.id in seen else self._problem(question)
             seen.add(question.id)
             rows.append(SkippedQuestion(question, reason) if reason else question)
         return tuple(rows)
+
+    @property
+    def malformed(self) -> list[SkippedQuestion]:
+        """Rows of the question files that are no question, in the order of the files."""
+        return [row for row in chain.from_iterable(self.files.values()) if isinstance(row, SkippedQuestion)]
 
     @cached_property
     def skipped(self) -> tuple[SkippedQuestion, ...]:
@@ -121,9 +121,11 @@ class NiehSet:
                 digest.update(f"{traj_id}/{index}:{frame.path.name}:{_size(frame.path)}\n".encode())
         return digest.hexdigest()
 
-    def _read_file(self, file: Path) -> tuple[Question, ...]:
+    def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
         name = file.stem if len(self._files) > 1 else ""
-        return tuple(replace(question, file=name) for question in read_questions(file))
+        return tuple(
+            row if isinstance(row, SkippedQuestion) else replace(row, file=name) for row in read_questions(file)
+        )
 
     def reasons(self) -> Counter[str]:
         """Return the number of skipped questions by reason."""

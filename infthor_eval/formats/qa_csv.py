@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.csv_files import read_rows
+from infthor_eval.formats.csv_files import CsvRow, read_rows
 from infthor_eval.formats.files import write_atomically
-from infthor_eval.formats.question import PublishedColumns, Question
+from infthor_eval.formats.question import PublishedColumns, Question, SkippedQuestion
 
 __all__ = ["encode_questions", "read_questions", "write_questions"]
 
@@ -34,15 +34,19 @@ _CLUE_FILES = ("single", "multi")  # in the names of the published files, before
 _LARGEST = 2**63  # JSON readers refuse larger numbers
 
 
-def read_questions(path: Path) -> list[Question]:
-    """Read a question file.
+def read_questions(path: Path) -> list[Question | SkippedQuestion]:
+    """Read a question file; a row with a malformed cell is a `SkippedQuestion` that names its line.
 
     Raises:
-        DataError: the file cannot be read, is not a CSV file of this form, or a cell is malformed.
+        DataError: the file cannot be read, is not a CSV file of this form, or no row of it is a question.
     """
     hint = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
     file = next((name for name in _CLUE_FILES if f"{name}_clue" in path.stem), None)
-    return [_question(row, place, file) for place, row in read_rows(path, _COLUMNS, hint)]
+    found = [_question_or_reason(row, path, file) for row in read_rows(path, _COLUMNS, hint)]
+    if found and not any(isinstance(item, Question) for item in found):
+        reason = next(item.reason for item in found if isinstance(item, SkippedQuestion))
+        raise DataError(f"{path}: no row is a question ({reason})")
+    return found
 
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
@@ -64,17 +68,30 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
     return text.getvalue().encode()
 
 
-def _question(row: dict[str, str], place: str, file: str | None) -> Question:
+def _question_or_reason(row: CsvRow, path: Path, file: str | None) -> Question | SkippedQuestion:
+    # The file's name alone, without its folder: reasons are in a run's identity.
+    place, cells = f"{path.name}, line {row.line}", row.cells
+    try:
+        if row.problem is not None:
+            raise DataError(row.problem)
+        return _question(cells, file)
+    except DataError as error:
+        shown = Question(cells["traj_id"].strip(), cells["question"].strip(), (), ())
+        return SkippedQuestion(shown, f"{place}: {error}")
+
+
+# Messages say nothing of a cell's content, so that rows with one mistake are counted together.
+def _question(row: dict[str, str], file: str | None) -> Question:
     for name in _COLUMNS:
         if not row[name].strip():
-            raise DataError(f"{place}: {name} is empty; fill it or remove the row")
+            raise DataError(f"{name} is empty; fill it or remove the row")
     absence = row.get(_ABSENCE, "").strip().lower()
     if absence not in {"", "yes", "no"}:
-        raise DataError(f"{place}: {_ABSENCE} is {_short(absence)}; write yes, no or nothing")
-    clues = _literal_list(row["gt_img_idx"], f"{place}: gt_img_idx", int)
-    answers = _literal_list(row["answer"], f"{place}: answer", (str, int, float))
+        raise DataError(f"{_ABSENCE} is neither yes nor no; write one of them, or nothing")
+    clues = _literal_list(row, "gt_img_idx", int)
+    answers = _literal_list(row, "answer", (str, int, float))
     if not all(map(_is_answerable, answers)):
-        raise DataError(f"{place}: answer has an entry that no reply can match: {_short(row['answer'])}; write it out")
+        raise DataError("answer has an entry that no reply can match; write it out")
     return Question(
         traj_id=row["traj_id"].strip(),
         text=row["question"].strip(),
@@ -82,11 +99,11 @@ def _question(row: dict[str, str], place: str, file: str | None) -> Question:
         answers=tuple(answers),
         question_type=row.get(_TYPE, "").strip() or None,
         absence=absence == "yes",
-        published=_published(row, place, file),
+        published=_published(row, file),
     )
 
 
-def _published(row: dict[str, str], place: str, file: Any) -> PublishedColumns | None:
+def _published(row: dict[str, str], file: Any) -> PublishedColumns | None:
     if file is None:
         return None
     cells = {name: cell.strip() for name, cell in row.items() if name in _PUBLISHED and cell.strip()}
@@ -94,10 +111,10 @@ def _published(row: dict[str, str], place: str, file: Any) -> PublishedColumns |
         n_evidence = int(cells["num_evidence"]) if "num_evidence" in cells else None
         matches = tuple((name, float(cells[name])) for name in _MATCHES if name in cells)
     except ValueError:
-        raise DataError(f"{place}: num_evidence or one of match1 to match4 is not a number; fix it") from None
+        raise DataError("num_evidence or one of match1 to match4 is not a number; fix it") from None
     if not all(math.isfinite(score) for _, score in matches):
-        raise DataError(f"{place}: one of match1 to match4 is not finite; fix it")
-    steps = _literal_list(cells.get("gt_steps", "[]"), f"{place}: gt_steps", int)
+        raise DataError("one of match1 to match4 is not finite; fix it")
+    steps = _literal_list({"gt_steps": "[]"} | cells, "gt_steps", int)
     return PublishedColumns(file, cells.get("qid"), n_evidence, tuple(steps), matches)
 
 
@@ -107,15 +124,15 @@ def _published_cells(published: PublishedColumns) -> list[object]:
     return [published.qid or "", n_evidence, list(published.steps), *(matches.get(name, "") for name in _MATCHES)]
 
 
-def _literal_list(cell: str, place: str, types: type | tuple[type, ...]) -> list[Any]:
+def _literal_list(row: dict[str, str], name: str, types: type | tuple[type, ...]) -> list[Any]:
     try:
-        value = ast.literal_eval(cell.strip())
+        value = ast.literal_eval(row[name].strip())
     except (ValueError, SyntaxError, MemoryError, RecursionError):
         value = None
     if not isinstance(value, list):
-        raise DataError(f"{place} is not a list: {_short(cell)}; write it as in [12, 13] or ['yes']")
+        raise DataError(f"{name} is not a list; write it as in [12, 13] or ['yes']")
     if not all(isinstance(item, types) and not isinstance(item, bool) for item in value):
-        raise DataError(f"{place} has an entry of the wrong type: {_short(cell)}; write it as in [12, 13] or ['yes']")
+        raise DataError(f"{name} has an entry of the wrong type; write it as in [12, 13] or ['yes']")
     return value
 
 
@@ -125,8 +142,3 @@ def _is_answerable(answer: str | int | float) -> bool:
         return math.isfinite(answer) and abs(answer) < _LARGEST
     # Lone surrogates cannot be encoded, so no file of results could hold them.
     return bool(answer.strip()) and not any("\ud800" <= letter <= "\udfff" for letter in answer)
-
-
-def _short(cell: str) -> str:
-    text = repr(cell)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -6,7 +6,7 @@ from typing import Literal
 
 from infthor_eval.formats.digests import digest
 
-__all__ = ["ABSENCE", "Answer", "PublishedColumns", "Question"]
+__all__ = ["ABSENCE", "Answer", "PublishedColumns", "Question", "SkippedQuestion"]
 
 Answer = str | int | float
 ABSENCE = "absence"  # column of the absence questions (no frame is evidence)
@@ -82,3 +82,12 @@ class Question:
             return self.published.qid
         key = repr((self.text, self.clues, self.answers))
         return f"{self.traj_id}/{digest(key, 6)}"
+
+
+@dataclass(frozen=True)
+class SkippedQuestion:
+    """A question that cannot be asked, with the reason; in one variant of the task, or in all if `variant` is empty."""
+
+    question: Question
+    reason: str
+    variant: str = ""

@@ -9,7 +9,7 @@ from typing import Any
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.options import SHOWN
@@ -153,8 +153,8 @@ def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, 
     return task, {"context": context}
 
 
-def _questions_of(data: NiehSet, name: re.Match[str] | None) -> Sequence[Question]:
-    """Return the questions whose rows a log counts: those of the file in its name, else of the whole set."""
+def _questions_of(data: NiehSet, name: re.Match[str] | None) -> Sequence[Question | SkippedQuestion]:
+    """Return the rows that a log counts: those of the file in its name, else of the whole set."""
     if name is None or name["file"] not in data.files:
         return [question for questions in data.files.values() for question in questions]
     return data.files[name["file"]]
@@ -172,10 +172,10 @@ def _add_log(
     run: ImportedRun,
     log: Path,
     rows: Sequence[LoggedReply | UnreadRow],
-    questions: Sequence[Question],
+    questions: Sequence[Question | SkippedQuestion],
     known: _Known,
 ) -> None:
-    by_id = {question.id: question for question in questions}
+    by_id = {question.id: question for question in questions if isinstance(question, Question)}
     answered = {record.id for record in run.records}
     n_before, refused = len(run.records), []
     for row in rows:
@@ -197,7 +197,7 @@ def _add_log(
 
 
 def _find_question(
-    row: LoggedReply | UnreadRow, questions: Sequence[Question], by_id: Mapping[str, Question]
+    row: LoggedReply | UnreadRow, questions: Sequence[Question | SkippedQuestion], by_id: Mapping[str, Question]
 ) -> Question | str:
     """Return the question of a row, or the reason why it has none."""
     if isinstance(row, UnreadRow):
@@ -207,6 +207,8 @@ def _find_question(
     if row.row is None or not 0 <= row.row < len(questions):
         return f"answers question {row.row}; the file has {len(questions)}"
     question, said = questions[row.row], row.published
+    if isinstance(question, SkippedQuestion):
+        return question.reason
     if said and (said.traj_id, said.text, said.clues, said.answers) != (
         question.traj_id,
         question.text,

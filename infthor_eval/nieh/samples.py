@@ -9,9 +9,9 @@ from typing import Any
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.hub_data import default_folder
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts import Context, ContextPart, ContextSettings, Sample, context_named
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.runs.limiting import spread

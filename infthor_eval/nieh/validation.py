@@ -148,8 +148,11 @@ def read_decisions(path: Path) -> dict[str, str]:
     """
     decisions: dict[str, str] = {}
     hint = "fill the list that `validate` wrote"
-    for place, row in read_rows(path, ("question_id", "decision"), hint, line_breaks=True):
-        name, decision = unshield(row["question_id"]), row["decision"].strip().lower()
+    for row in read_rows(path, ("question_id", "decision"), hint, line_breaks=True):
+        place = f"{path}, line {row.line}"
+        if row.problem is not None:
+            raise DataError(f"{place}: {row.problem}")
+        name, decision = unshield(row.cells["question_id"]), row.cells["decision"].strip().lower()
         if decision and decision not in DECISIONS:
             raise DataError(f"{place}: decision is {decision!r:.60}; write keep or drop")
         if decisions.get(name, decision) != decision:

@@ -15,6 +15,7 @@ import pytest
 import torch
 from PIL import Image
 
+from infthor_eval.formats.limits import OBJECT_POSES
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.trajectory import DiscreteAction, HighAction, PlannerAction
@@ -65,6 +66,8 @@ SETS = {
     "two frames have one name": (_twice, 3, 2),
     "the images are gone": (lambda data: shutil.rmtree(data / "metadata/traj_b/img"), 3, 2),
     "a frame too many": (lambda data: shutil.copy(_frame(data, "traj_b", 0), _frame(data, "traj_b", 77)), 3, 2),
+    "a row has no answer": (lambda data: _row(data, 2, answer=""), 4, 1),
+    "rows have cells of another form": (lambda data: (_row(data, 0, answer="a"), _row(data, 3, gt_img_idx="1")), 3, 2),
     "a trajectory's name is too long": (lambda data: _ask(data, "n" * 300), 5, 1),
     "a trajectory's name has a null": (lambda data: _ask(data, "a\0b"), 5, 1),
     "a trajectory's name climbs": (lambda data: _ask(data, "../metadata/traj_b"), 5, 1),
@@ -87,6 +90,17 @@ def _rename(data, field, value):
     for entry in entries[:2]:
         entry[field] = value
     path.write_text(json.dumps(entries))
+
+
+def _row(data, number, **changes):
+    (path,) = data.glob("qa_set*.csv")
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    rows[number].update(changes)
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def _ask(data, traj_id):
@@ -262,7 +276,14 @@ def _odd_turn():
     return json.dumps(_trajectory(plan={"low_actions": [turn]})).encode()
 
 
+def _posed(n_poses):
+    pose = {"objectName": "Plate_1", "position": {"x": 0.0, "y": 0.9, "z": 0.0}}
+    sound = _trajectory()
+    return json.dumps(sound | {"scene": sound["scene"] | {"object_poses": [pose] * n_poses}}).encode()
+
+
 MALFORMED = {
+    "object poses without end": _posed(100_000),
     "no JSON": b"{",
     "deep": b"[" * 200_000,
     "of another form": b"[]",
@@ -277,6 +298,16 @@ def test_a_malformed_trajectory_leaves_the_others_to_be_replayed(tmp_path, name)
     found = select([tmp_path])
     assert [trajectory.traj_id for _, trajectory in found.items] == ["sound"]
     assert [failure.place for failure in found.failures] == [str(tmp_path / "a.json")]
+    assert found.failures[0].message.count(str(tmp_path)) == 1
+
+
+def test_as_many_poses_as_the_limit_are_read(tmp_path, monkeypatch):
+    (tmp_path / "a.json").write_bytes(_posed(3))
+    monkeypatch.setenv(OBJECT_POSES.name, "3")
+    assert len(select([tmp_path]).items) == 1
+    monkeypatch.setenv(OBJECT_POSES.name, "2")
+    (failure,) = select([tmp_path]).failures
+    assert f"3 object_poses are too many for a scene; if this is intended, set {OBJECT_POSES.name}" in failure.message
 
 
 @pytest.mark.parametrize("damage", [os.mkfifo, lambda path: path.write_bytes(b"no gzip")])

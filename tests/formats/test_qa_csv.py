@@ -64,8 +64,11 @@ def test_all_columns_of_the_published_files_are_kept(tmp_path_factory, file, pub
 def test_a_bad_cell_of_a_published_column_is_named(tmp_path, column, cell, said):
     path = tmp_path / "qa_set_nieh_single_clue.csv"
     path.write_text(f"traj_id,question,gt_img_idx,answer,{column}\nt,q,[1],['a'],{cell}\n")
-    with pytest.raises(DataError, match=f"line 2: {said}"):
-        read_questions(path)
+    with path.open("a") as file:
+        file.write("t,q,[1],['a'],\n")
+    bad, good = read_questions(path)
+    assert f"qa_set_nieh_single_clue.csv, line 2: {said}" in bad.reason
+    assert good.answers == ("a",)
 
 
 def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
@@ -84,7 +87,7 @@ def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
         ("traj_id,question,gt_img_idx,answer\nt,q,[1],__import__('os')\n", "line 2: answer is not a list"),
         ("traj_id,question,gt_img_idx,answer\nt,q,['x'],['a']\n", "line 2: gt_img_idx has an entry of the wrong type"),
         ("traj_id,question,gt_img_idx,answer\nt,q,[True],['a']\n", "wrong type"),
-        ("traj_id,question,gt_img_idx,answer,absence\nt,q,[1],['no'],maybe\n", "line 2: absence is 'maybe'"),
+        ("traj_id,question,gt_img_idx,answer,absence\nt,q,[1],['no'],maybe\n", "line 2: absence is neither yes nor no"),
         ("traj_id,question,gt_img_idx,answer\nt,,[1],['a']\n", "line 2: question is empty"),
         ("traj_id,question,gt_img_idx,answer\nt,q\n", "line 2: gt_img_idx is empty"),
         ("traj_id,question,gt_img_idx,answer\nt,q," + "[" * 5000 + ",['a']\n", "gt_img_idx is not a list"),
@@ -99,6 +102,31 @@ def test_a_malformed_file_is_refused_in_one_line(tmp_path, content, said):
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < len(str(path)) + 200
+
+
+ROWS = {  # rows among good ones: what is said of each
+    "t,q,[1],": "answer is empty; fill it or remove the row",
+    ",q,[1],['a']": "traj_id is empty",
+    "t,q,[1],['a'],x,y,z": "has 7 cells for 5 columns",
+    "t,q,[1],['a'],perhaps": "absence is neither yes nor no",
+    "t,\"q\nq\",[1],['a']": "question has several lines; close its quote",
+    "t,q,[1],[nan]": "answer is not a list",
+    "t,q,[1],[1e999]": "answer has an entry that no reply can match",
+    "t,q,1,['a']": "gt_img_idx is not a list",
+}
+
+
+def test_a_bad_row_costs_itself_alone_and_names_its_line(tmp_path):
+    path, good = tmp_path / "qa_set.csv", "t,q,[1],['a'],"
+    lines = [line for row in ROWS for line in (row, good)]
+    path.write_text("\n".join(["traj_id,question,gt_img_idx,answer,absence", *lines]) + "\n")
+    found = read_questions(path)
+    assert [isinstance(item, Question) for item in found] == [False, True] * len(ROWS)
+    line = 2
+    for item, (row, said) in zip(found[::2], ROWS.items(), strict=True):
+        line += row.count("\n")
+        assert item.reason.startswith(f"qa_set.csv, line {line}: {said}")
+        line += 2
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path):

@@ -24,6 +24,7 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
     SET is a folder with question files, or one of them. It needs no frames. Guessers know the words of a question, the
     number of its clue frames or their place, and learn from questions on other trajectories.
     """
+    from infthor_eval.cli.progress.left_out import print_left_out
     from infthor_eval.cli.progress.notes import print_note
     from infthor_eval.errors import DataError, UsageError
     from infthor_eval.formats.files import prepare_file, refuse_overwrite
@@ -37,8 +38,7 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
     if balanced is not None:
         prepare_file(balanced, "--balanced")
     data = NiehSet(set_folder)
-    for reason, n in sorted(data.reasons().items()):
-        print_note(f"{set_folder}: {n} question(s) left out: {reason}")
+    print_left_out(data.root, data.skipped)
     if not data.questions:
         raise DataError(f"{set_folder}: no question can be audited; fix the set, or give another")
     summaries = [_read_summary(folder) for folder in runs]

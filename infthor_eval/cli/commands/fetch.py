@@ -20,11 +20,11 @@ def command(what: str, folder: Path | None, token: str | None, endpoint: str | N
 
     Tasks such as `--tasks nieh` find it without --data; after --dir DIR, they need --data DIR.
     """
+    from infthor_eval.cli.progress.left_out import print_left_out
     from infthor_eval.formats.files import prepare_folder
     from infthor_eval.formats.hub_data import default_folder, fetch_nieh
-    from infthor_eval.terminal import error_console, print_line
+    from infthor_eval.terminal import print_line
 
     data = fetch_nieh(prepare_folder(folder or default_folder(), "--dir"), token, endpoint)
     print_line(f"{what}: {len(data.questions)} questions in {data.root}")
-    for reason, n in data.reasons().most_common():
-        error_console().print(f"skipped {n}: {reason}")
+    print_left_out(data.root, data.skipped)

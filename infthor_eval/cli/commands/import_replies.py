@@ -50,6 +50,7 @@ def _import_replies(
     logs: Sequence[Path], data: Path, model: str | None, output: Path
 ) -> Iterator[tuple["RunResults", int]]:
     """Yield the results of the runs of logs of replies, and the number of rows that are not imported."""
+    from infthor_eval.cli.progress.left_out import print_left_out
     from infthor_eval.cli.progress.notes import print_note
     from infthor_eval.cli.progress.refused_lines import print_refused
     from infthor_eval.cli.results import RunResults
@@ -59,6 +60,7 @@ def _import_replies(
     from infthor_eval.runs.stored_run import store_run
 
     questions, suite = NiehSet(data), NiehSuite()
+    print_left_out(data, questions.malformed)
     for run in import_logs(logs, questions, model):
         stored = store_run(output, run.header(questions), suite, run.make_records, run.n_missing)
         name = f"{run.model}, {run.task}"

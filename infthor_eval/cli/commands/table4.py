@@ -17,8 +17,11 @@ def command(set_folder: Path) -> None:
 
     SET is a folder with both files. It needs no frames.
     """
+    from infthor_eval.cli.progress.left_out import print_left_out
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.table4 import table4
     from infthor_eval.report.terminal import print_table, table_console
 
-    print_table(table4(NiehSet(set_folder)), table_console())
+    data = NiehSet(set_folder)
+    print_left_out(data.root, data.skipped)
+    print_table(table4(data), table_console())

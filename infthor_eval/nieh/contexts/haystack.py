@@ -12,8 +12,8 @@ A question without a needle (an absence) has no depth either: it is asked once, 
 import random
 from collections.abc import Sequence
 
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample, clue_positions
 
 __all__ = ["haystack", "sampling_pool"]

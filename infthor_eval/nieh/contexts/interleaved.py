@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
+from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.outline import Outline
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
 __all__ = ["interleaved", "interleaved_parts"]

@@ -9,8 +9,8 @@ from typing import Any
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.memory import accepted_options, memory_identity
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 from infthor_eval.nieh.recall_settings import RecallSettings

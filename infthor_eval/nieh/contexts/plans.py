@@ -6,8 +6,8 @@ from pathlib import Path
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
 __all__ = ["interleaved_plans", "plans_parts"]

@@ -6,8 +6,8 @@ The retriever is imported where it is needed: that takes seconds, which other ta
 from typing import TYPE_CHECKING, Any
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
 if TYPE_CHECKING:

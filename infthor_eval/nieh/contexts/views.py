@@ -1,7 +1,7 @@
 """Contexts that show frames of the trajectory without choosing by the needle: clues, whole, its end."""
 
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts.base import ContextSettings, Sample
 
 __all__ = ["clues", "trajectory", "truncate_head"]

@@ -89,3 +89,33 @@ def test_who_sees_nothing_scores_this_on_the_published_files(tmp_path, run, file
     assert (totals["oracle"]["n"], totals["oracle"]["scores"]["strict"]["mean"]) == (n, 1.0)
     for metric, accuracy in (("reference", reference), ("strict", strict)):
         assert round(100 * totals["blind"]["scores"][metric]["mean"], 2) == accuracy
+
+
+def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_files(tmp_path, run):
+    """One of two files of the published form has a bad row; whatever counts rows counts it, and goes on."""
+    scores = tuple((f"match{number}", 1.0) for number in (1, 2, 3, 4))
+    for name, asked in zip(FILES, ([(1,), (2,), (3,)], [(1, 2), (1, 2, 3)]), strict=True):
+        kind = "single" if "single" in name else "multi"
+        questions = [
+            Question(
+                f"t{number}", f"Is there a mug {number}?", clues, ("yes",),
+                published=PublishedColumns(kind, f"{kind}{number}", matches=scores),
+            )
+            for number, clues in enumerate(asked)
+        ]  # fmt: skip
+        write_questions(tmp_path / name, questions)
+    path = tmp_path / FILES[0]
+    path.write_text(path.read_text().replace("t1,Is there a mug 1?,[2],['yes']", "t1,Is there a mug 1?,[2],"))
+    log = tmp_path / "log.jsonl"
+    log.write_text("".join(json.dumps({"question_id": f"single{n}", "reply": "yes"}) + "\n" for n in range(3)))
+    said = f"{FILES[0]}, line 3: answer is empty; fill it or remove the row"
+    commands = {
+        ("table4", tmp_path): 0,
+        ("audit", tmp_path): 0,
+        ("import-replies", log, "--data", tmp_path, "--model", "m", "--output", tmp_path / "out"): 1,
+        ("--model", "oracle", "--tasks", "nieh_gt", "--data", tmp_path, "--output", tmp_path / "out"): 0,
+    }
+    for command, code in commands.items():
+        found, _, err = run(*command)
+        assert (found, said in " ".join(err.split())) == (code, True), (command, err)
+        assert command[0] != "import-replies" or "2 replies imported, 2 of 4 questions without one" in err

@@ -4,8 +4,8 @@ import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 
 QUESTION = Question("t", "Where is it?", (1,), ("Shelf",))

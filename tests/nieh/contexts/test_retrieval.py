@@ -8,8 +8,8 @@ from transformers import AutoImageProcessor, AutoTokenizer, CLIPModel
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.nieh_set import NiehSet, SkippedQuestion
-from infthor_eval.formats.question import Question
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.recalling import recall_all
 from infthor_eval.nieh.samples import find_samples
