@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import digest_of_file
@@ -100,12 +100,18 @@ class FrameRef:
         require_file(self.path, _HINT)
         with (
             wrap_errors(f"{self.path}: not a readable image", _HINT, catch=_DAMAGED),
-            Image.open(self.path, formats=("PNG", "JPEG")) as image,
+            self._opened() as image,
         ):
             problem = self._wrong_size(*image.size)
             if problem is not None:
                 raise DataError(f"{problem}; {_HINT}")
             yield image
+
+    def _opened(self) -> Image.Image:
+        try:
+            return Image.open(self.path, formats=("PNG", "JPEG"))
+        except UnidentifiedImageError as error:  # its message is the path
+            raise DataError(f"{self.path}: not a readable image (neither PNG nor JPEG); {_HINT}") from error
 
     def _wrong_size(self, width: int, height: int) -> str | None:
         """Return why an image of this size is refused: it would fill the memory, or no image processor accepts it."""

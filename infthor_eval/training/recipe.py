@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from infthor_eval.errors import UsageError, unknown_name, wrap_errors
+from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import read_yaml
@@ -175,12 +175,14 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe |
 
     Raises:
         UsageError: the recipe does not exist, or a setting is unknown or not valid.
-        DataError: the file is not YAML.
+        DataError: the file is not YAML, or no mapping.
     """
     path = Path(name) if name.endswith(".yaml") else packaged_folder(_FOLDER) / f"{name}.yaml"
     if not path.is_file() and not name.endswith(".yaml"):
         raise unknown_name("recipe", name, recipe_names())
     document = read_yaml(path, "see infthor_eval/training/recipes for examples")
+    if not isinstance(document, dict):
+        raise DataError(f"{path}: not a recipe (no mapping of settings); see infthor_eval/training/recipes for examples")
     wrong, settings = (msgspec.ValidationError, TypeError), changes or {}
     with wrap_errors(f"{path}: not a recipe", "fix the setting", catch=wrong, raise_as=UsageError):
         if settings.get("model", document.get("model")) != document.get("model"):

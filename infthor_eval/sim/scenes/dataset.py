@@ -19,6 +19,7 @@ __all__ = ["FloorPlanData"]
 
 _OBJECTS = Path("thor_scenes/objects.jsonl.gz")
 _LAYOUTS = Path("alfred/layouts")
+_FAR = 1e5  # metres from the origin that no recorded cell is
 _KEY = '{"scene":"'  # the usual start of a line
 
 
@@ -60,6 +61,8 @@ class FloorPlanData:
             raise DataError(f"{path}: not a readable layout ({error})") from error
         if cells.ndim != 2 or cells.shape[1] != 2:
             raise DataError(f"{path}: must be an array (n, 2), not {cells.shape}")
+        if cells.dtype.kind not in "fiu" or not bool((np.abs(cells) < _FAR).all()):
+            raise DataError(f"{path}: must be numbers in metres; record the floor plan again")
         return cells
 
     def _index(self) -> dict[str, str]:

@@ -1,0 +1,1 @@
+"""Damaged inputs for every reader of the project: `python -m tests.fuzz --help`."""

@@ -1,0 +1,95 @@
+"""Read damaged inputs for some minutes, and report how many were tried and what was found.
+
+    python -m tests.fuzz --list
+    python -m tests.fuzz --reader trajectory --minutes 10
+    python -m tests.fuzz --minutes 10            each reader in turn
+
+Exit code 1 if anything was found. Every finding is printed with the file that shows it.
+"""
+
+import argparse
+import collections
+import resource
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from pathlib import Path
+
+from hypothesis import HealthCheck, Phase, Verbosity, given, seed, settings
+
+from .damage import damaged
+from .reader import Reader
+from .readers import READERS
+
+_BATCH = 200  # inputs between two looks at the clock
+_MEMORY = 8 * 2**30  # bytes of address space beyond which an input is said to fill the memory
+_FOUND = Path(tempfile.gettempdir()) / "infthor-fuzz"
+
+
+def main() -> int:
+    """Run the command; return its exit code."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__.splitlines()[0])
+    parser.add_argument("--list", action="store_true", help="print the names of the readers")
+    parser.add_argument("--reader", action="append", choices=sorted(READERS), help="reader to try; default: all")
+    parser.add_argument("--minutes", type=float, default=10.0, help="time for each reader")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the first batch")
+    options = parser.parse_args()
+    if options.list:
+        print("\n".join(READERS))
+        return 0
+    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    warnings.simplefilter("ignore")
+    found = [_campaign(READERS[name], options.minutes, options.seed) for name in options.reader or READERS]
+    return int(any(found))
+
+
+def _campaign(reader: Reader, minutes: float, first_seed: int) -> int:
+    """Try one reader; return the number of different findings."""
+    counts: collections.Counter[str] = collections.Counter()
+    findings: collections.Counter[str] = collections.Counter()
+    end = time.monotonic() + 60 * minutes
+    number = first_seed
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch).resolve()
+        file = reader.make(folder)
+        sound = file.read_bytes()
+        reader.read(folder)
+
+        def attempt(content: bytes) -> None:
+            counts["tried"] += 1
+            try:
+                counts["refused"] += reader.hold(folder, file, content)
+            except Exception as error:  # noqa: BLE001 - this is what is looked for
+                _note(reader, error, content, findings)
+
+        quiet = settings(
+            max_examples=_BATCH, deadline=None, database=None, phases=(Phase.generate,), verbosity=Verbosity.quiet,
+            suppress_health_check=list(HealthCheck),
+        )  # fmt: skip
+        while time.monotonic() < end:
+            seed(number)(quiet(given(damaged(sound, reader.form))(attempt)))()
+            number += 1
+    print(f"{reader.name}: {counts['tried']:,} inputs in {minutes:g} min, {counts['refused']:,} refused; "
+          f"{len(findings)} different findings")  # fmt: skip
+    return len(findings)
+
+
+def _note(reader: Reader, error: Exception, content: bytes, findings: collections.Counter[str]) -> None:
+    """Count a finding, and print and keep the first input that shows it."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    ours = [item for item in traceback.extract_tb(error.__traceback__) if "infthor_eval" in item.filename or "model_adapters" in item.filename]
+    place = f"{Path((ours or [frame])[-1].filename).name}:{(ours or [frame])[-1].lineno}"
+    what = f"{type(error).__name__} at {place}"
+    findings[what] += 1
+    if findings[what] > 1:
+        return
+    _FOUND.mkdir(exist_ok=True)
+    kept = _FOUND / f"{reader.name.replace(' ', '-')}-{len(findings)}"
+    kept.write_bytes(content)
+    print(f"{reader.name}: {what}: {str(error)[:200]!r}: {kept}", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

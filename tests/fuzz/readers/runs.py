@@ -1,0 +1,95 @@
+"""Runs: their journals, results and commands, by what lists, shows and reports them."""
+
+import contextlib
+import io
+import json
+import shutil
+from functools import cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import SimpleNamespace
+
+import yaml
+
+from infthor_eval.cli import main
+from infthor_eval.cli.results import read_run_results
+from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.report.runs import read_report_runs
+from infthor_eval.runs.run_search import StoredRun, find_runs
+from infthor_eval.suites import find_presenter, find_suite
+
+from ..damage import Form
+from ..reader import Reader
+from .samples import make_set, trajectory_document
+
+__all__ = ["READERS"]
+
+
+@cache
+def _run(model: str) -> Path:
+    """Return the folder of a run of a baseline on the small set, made once."""
+    scratch = TemporaryDirectory()
+    _kept.append(scratch)
+    root = Path(scratch.name)
+    words = ["--model", model, "--tasks", "nieh_gt", "--data", str(make_set(root / "set")), "--output", str(root / "out")]
+    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+        main(words)
+    (folder,) = (root / "out" / model).iterdir()
+    return folder
+
+
+_kept: list[TemporaryDirectory[str]] = []
+
+
+def _make(pattern: str, folder: Path) -> Path:
+    for model in ("oracle", "blind"):
+        shutil.copytree(_run(model), folder / model)
+    (file,) = (folder / "oracle").glob(pattern)
+    if file.suffix == ".yaml":
+        file.write_text(json.dumps(yaml.safe_load(file.read_text())))
+    return file
+
+
+def _find(folder: Path) -> None:
+    runs = list(find_runs(folder))
+    assert any(isinstance(run, StoredRun) and run.folder.name == "blind" for run in runs), "the good run is not listed"
+
+
+def _show(folder: Path) -> None:
+    read_run_results(folder / "oracle")
+
+
+def _report(folder: Path) -> None:
+    runs = read_report_runs([folder / "oracle", folder / "blind"], find_suite, find_presenter)
+    presenter = runs[0].presenter
+    list(presenter.sections(runs))
+    list(presenter.charts(runs))
+    for record in runs[0].records:
+        presenter.describe(record), presenter.details(record), presenter.reply(record), list(presenter.steps(record))
+
+
+def _make_replayed(folder: Path) -> Path:
+    """Write a trajectory, and the report of its replay as if it had been replayed."""
+    (folder / "a.json").write_text(json.dumps(trajectory_document("t")))
+    report = folder / "set/metadata/t/replay.json"
+    report.parent.mkdir(parents=True)
+    refusal = {"step": 0, "action": "pick up the mug", "error": "no"}
+    overlap = {"step": 0, "action": "PickupObject", "type": "Mug", "iou": 0.5}
+    document = {"traj_id": "t", "digest": "x", "floor_plan": "bedroom-1", "accepted": {"MoveAhead": 1}}
+    report.write_text(json.dumps(document | {"refusals": [refusal], "overlaps": [overlap]}))
+    return report
+
+
+def _continue(folder: Path) -> None:
+    replay_set(select([folder / "a.json"]), SimpleNamespace(label="embedded"), folder / "set")  # type: ignore[arg-type]
+
+
+READERS = (
+    Reader("journal, listed", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _find),
+    Reader("journal, shown", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _show),
+    Reader("journal, reported", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _report),
+    Reader("results, listed", Form.JSON, partial(_make, "results.json"), _find),
+    Reader("results, shown", Form.JSON, partial(_make, "results.json"), _show),
+    Reader("stored command", Form.JSON, partial(_make, "run.yaml"), _report),
+    Reader("replay report", Form.JSON, _make_replayed, _continue),
+)
