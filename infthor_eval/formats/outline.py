@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.reading import NOT_JSON, read_bytes
 
 __all__ = ["Outline", "find_outline", "read_outline", "read_states"]
 
@@ -87,9 +88,8 @@ def read_outline(path: Path) -> Outline:
     Raises:
         DataError: the file cannot be read, or is not a trajectory.
     """
-    with wrap_errors(f"{path}: cannot be read", "restore it"):
-        content = path.read_bytes()
-    with wrap_errors(f"{path}: not a trajectory", "restore it", catch=(msgspec.DecodeError, UnicodeDecodeError)):
+    content = read_bytes(path, "restore it")
+    with wrap_errors(f"{path}: not a trajectory", "restore it", catch=NOT_JSON):
         outline = msgspec.json.decode(content, type=Outline, strict=False)
     ranges = [item.low_pddl_idx for item in outline.sub_trajs]
     if any(not 0 <= first <= end <= len(outline.plan.low_actions) for first, end in ranges):
@@ -103,9 +103,8 @@ def read_states(path: Path) -> dict[int, str]:
     Raises:
         DataError: the file cannot be read, or has another form.
     """
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=dict[int, str], strict=False)
-    except FileNotFoundError:
+    if not path.exists():
         return {}
-    except (OSError, msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"{path}: not a mapping of low-level actions to states ({error}); replay it again") from error
+    content = read_bytes(path, "replay it again")
+    with wrap_errors(f"{path}: not a mapping of low-level actions to states", "replay it again", catch=NOT_JSON):
+        return msgspec.json.decode(content, type=dict[int, str], strict=False)

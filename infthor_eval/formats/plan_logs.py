@@ -7,7 +7,6 @@ A total of 0 says that the trajectory never came to its final task: the set-up f
 0 in every published row.
 """
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.formats.digests import digest
-from infthor_eval.formats.reading import lines_of
+from infthor_eval.formats.reading import json_value, lines_of
 from infthor_eval.formats.reply_logs import UnreadRow
 
 __all__ = ["LoggedPlans", "PlanCount", "PlanLog", "is_plan_log", "read_plan_log"]
@@ -102,7 +101,7 @@ def is_plan_log(path: Path) -> bool:
     """
     for _, line in lines_of(path, _HINT):
         try:
-            entry = json.loads(line)
+            entry = json_value(line)
         except (ValueError, RecursionError):
             continue
         if isinstance(entry, dict):
@@ -135,7 +134,7 @@ def read_plan_log(path: Path) -> PlanLog:
 
 def _read_line(number: int, line: bytes) -> LoggedPlans | UnreadRow:
     try:
-        return _read_row(number, json.loads(line))
+        return _read_row(number, json_value(line))
     except (ValueError, RecursionError) as error:  # msgspec's errors are ValueErrors
         return UnreadRow(number, f"has no counts of plans ({in_one_line(error)})")
 

@@ -20,8 +20,10 @@ from infthor_eval.formats.limits import FILE_MB, LINE_MB
 
 __all__ = [
     "DAMAGED",
+    "NOT_JSON",
     "file_problem",
     "json_lines_of",
+    "json_value",
     "lines_of",
     "read_bytes",
     "read_json",
@@ -34,6 +36,8 @@ T = TypeVar("T")
 
 # What the decoders of gzip, xz and zip raise on damaged content, beside OSError.
 DAMAGED = (EOFError, zlib.error, lzma.LZMAError)
+# What `msgspec` raises on what is not JSON of its type.
+NOT_JSON = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 _MB = 2**20
 
 
@@ -106,7 +110,7 @@ def read_json(path: Path, hint: str, form: Any = Any) -> Any:
     """
     content = read_bytes(path, hint)
     expected = "valid JSON" if form is Any else "in its documented form"
-    with wrap_errors(f"{path}: not {expected}", hint, catch=(msgspec.DecodeError, UnicodeDecodeError, RecursionError)):
+    with wrap_errors(f"{path}: not {expected}", hint, catch=NOT_JSON):
         return msgspec.json.decode(content, type=form)
 
 
@@ -133,6 +137,21 @@ def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
         raise DataError(f"{path}: cannot be read after line {number} ({in_one_line(error)}); {hint}") from error
 
 
+def json_value(text: bytes) -> Any:
+    """Return the value of a JSON text of others, with NaN where it has it, but without lone surrogates.
+
+    Python's decoder lets these through, and no file could hold what is made of them.
+
+    Raises:
+        ValueError: it is not JSON.
+        RecursionError: it is nested too deep.
+    """
+    value = json.loads(text)
+    if b"\xed" in text or b"\\u" in text:
+        json.dumps(value, ensure_ascii=False).encode()
+    return value
+
+
 def json_lines_of(path: Path, hint: str) -> Iterator[dict[str, Any]]:
     """Yield the JSON objects of a file that has one per line.
 
@@ -141,7 +160,7 @@ def json_lines_of(path: Path, hint: str) -> Iterator[dict[str, Any]]:
     """
     for number, line in lines_of(path, hint):
         with wrap_errors(f"{path}, line {number}: not JSON", hint, catch=(ValueError, RecursionError)):
-            entry = json.loads(line)
+            entry = json_value(line)
         if not isinstance(entry, dict):
             raise DataError(f"{path}, line {number}: not a JSON object; {hint}")
         yield entry

@@ -10,7 +10,6 @@ A published row repeats its question (`question`, `traj_id`, `gt_img_idx`, `gt_a
 may have `n_context_tokens`, `n_reply_tokens`, `seconds` and `frames_shown`, the numbers of the frames that were shown.
 """
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,7 @@ import msgspec
 
 from infthor_eval.errors import in_one_line
 from infthor_eval.formats.question import Question
-from infthor_eval.formats.reading import lines_of
+from infthor_eval.formats.reading import json_value, lines_of
 
 __all__ = ["LoggedReply", "UnreadRow", "read_reply_log"]
 
@@ -112,7 +111,7 @@ def read_reply_log(path: Path) -> Iterator[LoggedReply | UnreadRow]:
     """
     for number, line in lines_of(path, _HINT):
         try:
-            row = _read_row(number, json.loads(line))
+            row = _read_row(number, json_value(line))
         except (ValueError, RecursionError) as error:  # msgspec's errors are ValueErrors
             yield UnreadRow(number, f"is not a reply ({in_one_line(error)})")
             continue

@@ -132,6 +132,7 @@ def check_task_file(file: TaskFile) -> None:
         DataError: names the file and the setting.
         UsageError: likewise.
     """
+    file.require("dataset_kwargs")
     place = f"{file.path}: dataset_kwargs"
     given = file.settings["dataset_kwargs"]
     if not isinstance(given, Mapping) or not isinstance(given.get("context"), str):

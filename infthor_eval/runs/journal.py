@@ -26,10 +26,9 @@ import msgspec
 from infthor_eval.errors import DataError, UsageError, in_one_line, wrap_errors
 from infthor_eval.formats.digests import canonical_json
 from infthor_eval.formats.files import write_atomically
-from infthor_eval.formats.reading import require_file
+from infthor_eval.formats.reading import NOT_JSON, require_file
 from infthor_eval.runs.records import ArtifactRecord, P, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.shards import (
-    BAD,
     FOLDER,
     Decoder,
     RunLog,
@@ -250,7 +249,7 @@ def _recover_shard(path: Path, header: RunHeader, types: RecordTypes[Any]) -> in
 def _is_good(line: bytes, decoder: Decoder, *, is_first: bool) -> bool:
     try:
         return isinstance(decoder.decode(line), RunHeader) == is_first
-    except BAD:
+    except NOT_JSON:
         return False
 
 

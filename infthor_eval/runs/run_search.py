@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, wrap_errors
-from infthor_eval.formats.reading import read_bytes
+from infthor_eval.formats.reading import NOT_JSON, read_bytes
 from infthor_eval.rates import Rate
 from infthor_eval.runs.records import RunHeader
 from infthor_eval.runs.results import RESULTS
@@ -77,7 +77,7 @@ def read_results(folder: Path) -> Results | None:
     path, hint = folder / RESULTS, "run the same command again"
     if not path.is_file():
         return None
-    with wrap_errors(f"{path}: not the results of a run", hint, catch=msgspec.DecodeError):
+    with wrap_errors(f"{path}: not the results of a run", hint, catch=NOT_JSON):
         return msgspec.json.decode(read_bytes(path, hint), type=Results)
 
 

@@ -8,12 +8,11 @@ import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.digests import canonical_json
-from infthor_eval.formats.reading import read_bytes, require_file
+from infthor_eval.formats.reading import NOT_JSON, read_bytes, require_file
 from infthor_eval.runs.records import FORMAT, ArtifactRecord, P, RecordTypes, RunHeader, UnitKey, UnitRecord
 from infthor_eval.runs.usage import Usage
 
 __all__ = [
-    "BAD",
     "FOLDER",
     "Decoder",
     "RunLog",
@@ -30,7 +29,6 @@ __all__ = [
 
 FOLDER = "journal"  # within the run's folder
 Decoder = msgspec.json.Decoder[Any]
-BAD = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # raised on a line that is none of a journal's
 _FORMAT_1 = "journal.jsonl"  # the single file of format 1, in the run's folder
 _HINT = "run the same command with --recover to resume without such lines, or with --fresh to restart"
 
@@ -118,7 +116,7 @@ def read_failures(run: Path) -> dict[UnitKey, bool]:
     latest: dict[UnitKey, tuple[int, bool]] = {}
     for path in find_shards(run):
         for number, line in enumerate(read_lines(path), 1):
-            with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=BAD):
+            with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON):
                 unit = decoder.decode(line)
             if isinstance(unit, _UnitOutcome):
                 key, rank = UnitKey(unit.task, unit.id, unit.variant, unit.repeat), (unit.attempt, unit.failure is None)
@@ -160,7 +158,7 @@ def read_shard(path: Path, decoder: Decoder, log: RunLog[Any]) -> None:
         raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
     log.header = header
     for number, line in enumerate(lines[1:], 2):
-        with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=BAD):
+        with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON):
             record = decoder.decode(line)
         if isinstance(record, RunHeader):
             raise DataError(f"{path}, line {number}: a second header in the middle of the records; {_HINT}")
@@ -185,7 +183,7 @@ def check_format(path: Path, line: bytes) -> None:
     """
     try:
         version = msgspec.json.decode(line, type=_AnyFormat).format
-    except BAD:
+    except NOT_JSON:
         return
     if version != FORMAT:
         raise DataError(
@@ -196,5 +194,5 @@ def check_format(path: Path, line: bytes) -> None:
 def _read_header(path: Path, lines: list[bytes]) -> RunHeader:
     first = lines[0] if lines else b""
     check_format(path, first)
-    with wrap_errors(f"{path}, line 1: not the first line of a journal", _HINT, catch=BAD):
+    with wrap_errors(f"{path}, line 1: not the first line of a journal", _HINT, catch=NOT_JSON):
         return msgspec.json.decode(first, type=RunHeader)

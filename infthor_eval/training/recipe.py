@@ -182,7 +182,9 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe |
         raise unknown_name("recipe", name, recipe_names())
     document = read_yaml(path, "see infthor_eval/training/recipes for examples")
     if not isinstance(document, dict):
-        raise DataError(f"{path}: not a recipe (no mapping of settings); see infthor_eval/training/recipes for examples")
+        raise DataError(
+            f"{path}: not a recipe (no mapping of settings); see infthor_eval/training/recipes for examples"
+        )
     wrong, settings = (msgspec.ValidationError, TypeError), changes or {}
     with wrap_errors(f"{path}: not a recipe", "fix the setting", catch=wrong, raise_as=UsageError):
         if settings.get("model", document.get("model")) != document.get("model"):

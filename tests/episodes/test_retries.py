@@ -102,7 +102,5 @@ def test_a_hang_that_stays_names_the_limit(monkeypatch):
     with Simulator(embedded_launch(), image=False, instances=False, max_restarts=0) as simulator:
         simulator.reset("bedroom-1")
         os.kill(simulator._controller.server.unity_proc.pid, signal.SIGSTOP)
-        with pytest.raises(
-            SimulatorError, match=r"no answer within 1 s .* set INFTHOR_EVAL_MAX_ACTION_SECONDS"
-        ):
+        with pytest.raises(SimulatorError, match=r"no answer within 1 s .* set INFTHOR_EVAL_MAX_ACTION_SECONDS"):
             simulator.step("RotateLeft")

@@ -78,10 +78,10 @@ def _campaign(reader: Reader, minutes: float, first_seed: int) -> int:
 
 def _note(reader: Reader, error: Exception, content: bytes, findings: collections.Counter[str]) -> None:
     """Count a finding, and print and keep the first input that shows it."""
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    ours = [item for item in traceback.extract_tb(error.__traceback__) if "infthor_eval" in item.filename or "model_adapters" in item.filename]
-    place = f"{Path((ours or [frame])[-1].filename).name}:{(ours or [frame])[-1].lineno}"
-    what = f"{type(error).__name__} at {place}"
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = [frame for frame in frames if "infthor_eval" in frame.filename or "model_adapters" in frame.filename]
+    last = (ours or frames)[-1]
+    what = f"{type(error).__name__} at {Path(last.filename).name}:{last.lineno}"
     findings[what] += 1
     if findings[what] > 1:
         return

@@ -1,4 +1,4 @@
-"""Hypothesis strategies that damage a sound input: in its structure, so that it is still of its format, or in its bytes.
+"""Hypothesis strategies that damage a sound input: in its structure, so that it keeps its format, or in its bytes.
 
 A huge list and a deep nesting are written by name (`DEEP`, `MANY`) and put in as text at the end: Python's own encoder
 would not take them.
@@ -91,7 +91,7 @@ def _damaged_document(draw: st.DrawFn, sound: Any) -> Any:
         do = draw(st.sampled_from(("replace", "replace", "replace", "drop", "repeat", "rename", "text", "swap")))
         value = parent[key]
         if do == "replace" or parent is holder:
-            parent[key] = draw(st.sampled_from(_ODD))
+            parent[key] = copy.deepcopy(draw(st.sampled_from(_ODD)))
         elif do == "drop":
             del parent[key]
         elif do == "text":

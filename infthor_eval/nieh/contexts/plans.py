@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
 
-from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
+from infthor_eval.formats.reading import read_text
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 
 __all__ = ["interleaved_plans", "plans_parts"]
@@ -47,7 +47,4 @@ def plans_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> li
 
 
 def _sequence_text(folder: Path) -> str:
-    try:
-        return (folder / "traj.txt").read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise DataError(f"{folder / 'traj.txt'}: cannot be read ({error}); replay the trajectory again") from error
+    return read_text(folder / "traj.txt", "replay the trajectory again")

@@ -14,6 +14,7 @@ from infthor_eval.formats.digests import digest_of_files, fingerprint
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
+from infthor_eval.formats.reading import NOT_JSON
 from infthor_eval.formats.user_cache import user_cache
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.forms import form_of
@@ -52,7 +53,7 @@ def _find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
     path = user_cache("guesses") / f"{_key(data, knowledge)}.json"
     try:
         return msgspec.json.decode(path.read_bytes(), type=dict[str, Guess])
-    except (OSError, msgspec.DecodeError):  # not there yet
+    except (OSError, *NOT_JSON):  # not there yet, or damaged
         guesses = _learn_guesses(data, knowledge)
     with suppress(OSError):  # a cache that cannot be written costs only time
         path.parent.mkdir(parents=True, exist_ok=True)

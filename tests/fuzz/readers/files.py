@@ -80,11 +80,18 @@ def _make_replies(folder: Path) -> Path:
     (one, two, *_) = NiehSet(make_set(folder)).questions
     published = {
         "qidx": 0, "traj_id": one.traj_id, "question": one.text, "gt_img_idx": list(one.clues), "gt_answer": ["yes"],
-        "llm_response": "yes", "score": 1.0, "ctx_n_tokens": 7, "eval_mode": "full_traj", "ctx_size_k": 1.0, "n_imgs": 4,
-        "selected_img_indices": [0, 1],
+        "llm_response": "yes", "score": 1.0, "ctx_n_tokens": 7, "eval_mode": "full_traj", "ctx_size_k": 1.0,
+        "n_imgs": 4, "selected_img_indices": [0, 1],
     }  # fmt: skip
     rows = [
-        {"question_id": two.id, "reply": "Bed", "n_context_tokens": 9, "n_reply_tokens": 2, "seconds": 1.5, "frames_shown": [0]},
+        {
+            "question_id": two.id,
+            "reply": "Bed",
+            "n_context_tokens": 9,
+            "n_reply_tokens": 2,
+            "seconds": 1.5,
+            "frames_shown": [0],
+        },
         published,
         {"doc": {"question_id": one.id}, "resps": [["yes"]]},
     ]

@@ -31,7 +31,16 @@ def _run(model: str) -> Path:
     scratch = TemporaryDirectory()
     _kept.append(scratch)
     root = Path(scratch.name)
-    words = ["--model", model, "--tasks", "nieh_gt", "--data", str(make_set(root / "set")), "--output", str(root / "out")]
+    words = [
+        "--model",
+        model,
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        str(make_set(root / "set")),
+        "--output",
+        str(root / "out"),
+    ]
     with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
         main(words)
     (folder,) = (root / "out" / model).iterdir()

@@ -1,4 +1,4 @@
-"""NIEH sets: their files, by every context that needs no model of its own, and the questions that rules make of them."""
+"""NIEH sets: their files, by every context that needs no model of its own, and by the rules of questions."""
 
 from functools import partial
 from pathlib import Path

@@ -41,7 +41,9 @@ def _make_recipe(name: str, folder: Path) -> Path:
 def _make_task(name: str, folder: Path) -> Path:
     settings = read_yaml(packaged_folder("tasks") / f"{name}.yaml", "")
     more = {"generation_kwargs": {"max_gen_toks": 16, "until": ["\n"], "do_sample": False, "temperature": 0.0}}
-    return _make("a.yaml", more | settings | {"task": "mine", "include": settings["include"].rpartition("/")[2]}, folder)
+    return _make(
+        "a.yaml", more | settings | {"task": "mine", "include": settings["include"].rpartition("/")[2]}, folder
+    )
 
 
 def _check_task(folder: Path) -> None:

@@ -46,5 +46,5 @@ def test_takes_the_last_of_several_frames_of_an_action(folder):
     (folder / "traj.txt").write_text("Goal<image>")
     assert "traj.txt has 0 actions" in shown("interleaved_plans", folder.parents[1])
     (folder / "expert_log.json").write_text("{}")
-    with pytest.raises(DataError, match=r"expert_log\.json: not a log"):
+    with pytest.raises(DataError, match=r"expert_log\.json: not in its documented form"):
         shown("interleaved_plans", folder.parents[1])
