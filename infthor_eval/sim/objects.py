@@ -8,10 +8,11 @@ from infthor_eval.sim.footprints import Rect
 from infthor_eval.sim.geometry import Array, corners, euler_matrix
 from infthor_eval.sim.object_types import ObjectType
 
-__all__ = ["DOOR_SWING", "DRAWER_SLIDE", "SimObject", "SimObjectState"]
+__all__ = ["DOOR_SWING", "DRAWER_SLIDE", "WALL", "SimObject", "SimObjectState"]
 
 DOOR_SWING = 85.0  # degrees that a door opens
 DRAWER_SLIDE = 0.8  # share of its depth that a drawer comes out
+WALL = 0.02  # thickness in metres of the sides and floors of hollow things
 
 
 @dataclass
@@ -115,6 +116,19 @@ class SimObject:
         """Return the world height in metres of the surface that things stand on."""
         low, high = self.bounds()
         return float(high[1] if self.support is None else low[1] + self.support)
+
+    @property
+    def floors(self) -> tuple[float, ...]:
+        """Heights in metres above the underside of its box at which contents stand inside it, lowest first.
+
+        Placement and drawing both take them from here. Empty if nothing stands inside.
+        """
+        height = float(self.box_size[1])
+        if self.type.levels:
+            return tuple(share * height for share in self.type.levels)
+        if self.type.open_top:  # a vessel: its only surface is its bottom
+            return (max(min(WALL, height * 0.3), self.support or 0.0),)
+        return ()
 
     def place_bottom(self, point: Array) -> None:
         """Move the object so that the middle of the underside of its box is at `point` (world, metres)."""

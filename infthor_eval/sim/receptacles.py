@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from infthor_eval.sim.geometry import Array, yaw_matrix
-from infthor_eval.sim.objects import DRAWER_SLIDE, SimObject
+from infthor_eval.sim.objects import DRAWER_SLIDE, WALL, SimObject
 from infthor_eval.sim.world import World
 
 __all__ = ["Surface", "contains_box", "drawer_offset", "find_parent", "surfaces"]
 
-_WALL = 0.02  # thickness in metres of the sides and floors of hollow receptacles
 _TOUCH = 0.008  # metres by which what stands on a vessel's floor may reach into it
 
 
@@ -45,10 +44,8 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
     middle, half = (low + high) / 2, (receptacle.box_size[0] / 2, receptacle.box_size[2] / 2)
     yaw, overhang = float(receptacle.rotation[1]), math.inf if receptacle.type.overhang else 0.03
     if receptacle.type.open_top:  # a vessel: its only surface is its bottom
-        base = float(low[1]) + min(_WALL, (high[1] - low[1]) * 0.3)
-        if receptacle.support is not None:
-            base = max(base, float(low[1]) + receptacle.support)
-        inner = [max(side * receptacle.type.open_top - _WALL / 2, 0.015) for side in half]
+        base = float(low[1]) + receptacle.floors[0]
+        inner = [max(side * receptacle.type.open_top - WALL / 2, 0.015) for side in half]
         return [Surface(np.array([middle[0], base, middle[2]]), (inner[0], inner[1]), yaw, math.inf, overhang, True)]
     level = receptacle.surface_height()
     if not receptacle.pieces:
@@ -63,9 +60,9 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
 def _shelves(receptacle: SimObject) -> list[Surface]:
     """Return the floor and shelves inside a cabinet, fridge or the like, or the floor of a drawer where it is now."""
     low, high = receptacle.bounds()
-    inner = (max(receptacle.box_size[0] / 2 - _WALL, 0.02), max(receptacle.box_size[2] / 2 - _WALL, 0.02))
-    heights = [low[1] + share * (high[1] - low[1]) for share in receptacle.type.levels]
-    tops = [*heights[1:], float(high[1]) - _WALL]
+    inner = (max(receptacle.box_size[0] / 2 - WALL, 0.02), max(receptacle.box_size[2] / 2 - WALL, 0.02))
+    heights = [float(low[1]) + floor for floor in receptacle.floors]
+    tops = [*heights[1:], float(high[1]) - WALL]
     middle, yaw = (low + high) / 2 + drawer_offset(receptacle), float(receptacle.rotation[1])
     return [
         Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y, from_middle=True)
