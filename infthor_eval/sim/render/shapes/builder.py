@@ -6,12 +6,13 @@ from functools import partialmethod
 import numpy as np
 
 from infthor_eval.sim.geometry import Array, euler_matrix, yaw_matrix
-from infthor_eval.sim.objects import SimObject, SimObjectState
+from infthor_eval.sim.objects import WALL, SimObject, SimObjectState
 from infthor_eval.sim.render.primitives import Color, Form, Material, ShapePart
 
-__all__ = ["Builder", "shade_of"]
+__all__ = ["Builder", "Vector", "shade_of"]
 
-Vector = Sequence[float]
+Vector = Sequence[float] | Array
+_LINING = 0.003  # metres of the walls of open things that have the colour of their inside
 
 
 def shade_of(color: Color, factor: float) -> Color:
@@ -80,22 +81,72 @@ class Builder:
     cup = partialmethod(add, Form.CUP)
     bowl = partialmethod(add, Form.BOWL)
 
-    def open_front(self, color: Color, material: Material, wall: float, glow: float = 0.0) -> None:
-        """Add a box without its front: five boards `wall` metres thick; `glow` lights its inside."""
-        x, y, z = (self.thick(wall / 2, axis) for axis in range(3))
-        self.box((0, 0, -1 + z), (1, 1, z), color, material, glow=glow)
-        for side in (-1, 1):
-            self.box((side * (1 - x), 0, z), (x, 1, 1 - z), color, material, glow=glow)
-            self.box((0, side * (1 - y), z), (1 - 2 * x, y, 1 - z), color, material, glow=glow)
+    def level(self, metres: float) -> float:
+        """Return a height above the underside of the box, metres, as a position in fractions."""
+        return min(1.0, metres / max(float(self.half[1]), 1e-6) - 1)
 
-    def open_top(self, color: Color, material: Material, wall: float, glow: float = 0.0) -> None:
-        """Add a box without its lid: four sides `wall` metres thick on a thin bottom; `glow` lights its inside."""
+    @property
+    def floor(self) -> float:
+        """The height in fractions at which contents stand on the lowest floor inside it."""
+        return self.level(self.item.floors[0])
+
+    def span(
+        self, low: Vector, high: Vector, color: Color, material: Material = Material.PLAIN, *, glow: float = 0.0
+    ) -> None:
+        """Add a box between two corners in fractions."""
+        start, end = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+        self.box((start + end) / 2, (end - start) / 2, color, material, glow=glow)
+
+    def open_front(self, outside: Color, inside: Color, material: Material, floor: float, glow: float = 0.0) -> None:
+        """Add a box without its front: five boards, `WALL` thick with a lining in a colour of its own.
+
+        Args:
+            outside, inside: colours of the boards and of their lining.
+            material: surface pattern of both.
+            floor: thickness of the lower board, metres.
+            glow: share of light of its own of the lining.
+        """
+        board, below = WALL - _LINING, floor - _LINING
+        self._boards(0.0, 0.0, board, below, outside, material, 0.0)
+        self._boards(board, below, _LINING, _LINING, inside, material, glow)
+
+    def _boards(
+        self, inset: float, rise: float, thick: float, below: float, color: Color, material: Material, glow: float
+    ) -> None:
+        """Add back, sides, top and bottom, metres from sides and underside; `below`: thickness of the bottom."""
+        size = 2 * self.half
+        (x, y, z), (dx, dy, dz) = inset / size * 2, thick / size * 2
+        low, floor, back = self.level(rise), self.level(rise + below), -1 + z + dz
+        self.span((x - 1, low, z - 1), (1 - x, 1 - y, back), color, material, glow=glow)
+        self.span((x - 1, low, back), (x - 1 + dx, 1 - y, 1), color, material, glow=glow)
+        self.span((1 - x - dx, low, back), (1 - x, 1 - y, 1), color, material, glow=glow)
+        self.span((x - 1 + dx, 1 - y - dy, back), (1 - x - dx, 1 - y, 1), color, material, glow=glow)
+        self.span((x - 1 + dx, low, back), (1 - x - dx, floor, 1), color, material, glow=glow)
+
+    def open_top(self, color: Color, material: Material, wall: float, floor: float, glow: float = 0.0) -> None:
+        """Add a box without its lid: four sides `wall` metres thick and a bottom; `glow` lights its inside.
+
+        Args:
+            floor: height of the bottom's upper side in fractions.
+        """
         x, z = self.thick(wall / 2, 0), self.thick(wall / 2, 2)
-        y = self.thick(min(wall / 2, 0.004), 1)
-        self.box((0, -1 + y, 0), (1, y, 1), shade_of(color, 0.88), material, glow=glow)
+        self.span((-1, -1, -1), (1, floor, 1), shade_of(color, 0.88), material, glow=glow)
         for side in (-1, 1):
-            self.box((side * (1 - x), y, 0), (x, 1 - y, 1), color, material, glow=glow)
-            self.box((0, y, side * (1 - z)), (1 - 2 * x, 1 - y, z), color, material, glow=glow)
+            self.box((side * (1 - x), (1 + floor) / 2, 0), (x, (1 - floor) / 2, 1), color, material, glow=glow)
+            self.box((0, (1 + floor) / 2, side * (1 - z)), (1 - 2 * x, (1 - floor) / 2, z), color, material, glow=glow)
+
+    def coin(
+        self, axis: int, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, *,
+        glow: float = 0.0,
+    ) -> None:  # fmt: skip
+        """Add a round or oval disc whose flat sides face along `axis`; its half extents are fractions along x, y, z."""
+        metres = np.asarray(half, dtype=float) * self.half
+        tilt, order = {0: ((0.0, 0.0, 90.0), [1, 0, 2]), 1: ((0.0, 0.0, 0.0), [0, 1, 2]),
+                       2: ((90.0, 0.0, 0.0), [0, 2, 1])}[axis]  # fmt: skip
+        matrix = self._turn @ euler_matrix(tilt)
+        self.parts.append(
+            ShapePart(Form.CYLINDER, self.metric(at), metres[order], color, material, matrix, emission=glow)
+        )
 
     @property
     def longest(self) -> int:

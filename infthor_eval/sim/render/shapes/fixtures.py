@@ -24,7 +24,7 @@ def sink(b: Builder) -> None:
     """A rim of steel or ceramic around the basins; a hollow tub if the basins are no separate objects."""
     color = STEEL if b.style % 2 else _CERAMIC
     if not b.item.pieces:
-        b.open_top(color, Material.METAL, 0.02, glow=0.22)
+        b.open_top(color, Material.METAL, 0.02, b.floor, glow=0.22)
         return
     rim = b.thick(0.008, 1)
     cut_slab(b, 1 - rim, rim, color, Material.METAL)
@@ -45,9 +45,9 @@ def bathtub_basin(b: Builder) -> None:
 def _basin(b: Builder, steel: bool) -> None:
     """A tub with a drain."""
     color = shade_of(STEEL, 1.12) if steel else _CERAMIC
-    b.open_top(color, Material.METAL if steel else Material.PLAIN, 0.014, glow=0.22)
-    b.tube((0, -0.92, 0), (b.thick(0.04, 0), 0.02, b.thick(0.04, 2)), CHROME, Material.METAL)
-    b.tube((0, -0.9, 0), (b.thick(0.028, 0), 0.02, b.thick(0.028, 2)), DARK)
+    b.open_top(color, Material.METAL if steel else Material.PLAIN, 0.014, b.floor, glow=0.22)
+    b.tube((0, b.floor, 0), (b.thick(0.04, 0), b.thick(0.001, 1), b.thick(0.04, 2)), CHROME, Material.METAL)
+    b.tube((0, b.floor, 0), (b.thick(0.028, 0), b.thick(0.002, 1), b.thick(0.028, 2)), DARK)
 
 
 @draws
@@ -67,7 +67,7 @@ def faucet(b: Builder) -> None:
 @draws
 def bathtub(b: Builder) -> None:
     """A white tub; its basin may be a separate object."""
-    b.open_top(_CERAMIC, Material.PLAIN, 0.07, glow=0.15)
+    b.open_top(_CERAMIC, Material.PLAIN, 0.07, b.level(0.008), glow=0.15)
 
 
 @draws

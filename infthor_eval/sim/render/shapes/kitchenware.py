@@ -1,7 +1,7 @@
 """Dishes, pots, cutlery, bottles."""
 
 from infthor_eval.sim.render.primitives import Color, Form, Material
-from infthor_eval.sim.render.shapes.builder import Builder, shade_of
+from infthor_eval.sim.render.shapes.builder import Builder, Vector, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, CERAMICS, CHROME, DARK, GLASS, STEEL, WHITE, WOODS, pick
 from infthor_eval.sim.render.shapes.register import draws
 
@@ -14,6 +14,13 @@ def _liquid(b: Builder, level: float, radius: float, at: tuple[float, float] = (
         b.tube((at[0], level, at[1]), (radius, 0.02, radius), color)
 
 
+def _inner_floor(
+    b: Builder, radius: float, color: Color, at: Vector = (0.0, 0.0, 0.0), half: Vector = (1.0, 1.0, 1.0)
+) -> None:
+    """A disc in a vessel up to where its contents stand, with a share of its radius."""
+    b.tube((at[0], (b.floor - 1) / 2, at[2]), (half[0] * radius, (b.floor + 1) / 2, half[2] * radius), color)
+
+
 @draws
 def mug(b: Builder) -> None:
     """A cup with a handle on the longer side."""
@@ -21,7 +28,7 @@ def mug(b: Builder) -> None:
     ratio = b.slenderness
     at, half = b.lengthwise(ratio - 1, 0, 0), b.lengthwise(ratio, 1, 1)
     b.cup(at, half, color, bottom=0.85)
-    b.tube((at[0], -0.92, at[2]), (half[0] * 0.85, 0.08, half[2] * 0.85), shade_of(color, 0.8))
+    _inner_floor(b, 0.85, shade_of(color, 0.8), at, half)
     _liquid(b, 0.6, min(half[0], half[2]) * 0.9, (at[0], at[2]))
     reach = max(1 - (2 * ratio - 1), 0.25)
     for level in (-0.45, 0.45):
@@ -34,7 +41,7 @@ def cup(b: Builder) -> None:
     """A tumbler."""
     color = pick((GLASS, (0.4, 0.6, 0.75), (0.8, 0.5, 0.3)), b.style)
     b.cup((0, 0, 0), (1, 1, 1), color, Material.GLASS, bottom=0.75)
-    b.tube((0, -0.94, 0), (0.75, 0.05, 0.75), shade_of(color, 0.8))
+    _inner_floor(b, 0.75, shade_of(color, 0.8))
     _liquid(b, 0.4, 0.85)
 
 
@@ -54,7 +61,7 @@ def plate(b: Builder) -> None:
     """A flat plate with a rim."""
     color = pick(CERAMICS, b.style)
     b.cup((0, 0, 0), (1, 1, 1), color, bottom=0.65)
-    b.tube((0, -0.8, 0), (0.66, 0.2, 0.66), shade_of(color, 0.92))
+    _inner_floor(b, 0.66, shade_of(color, 0.92))
 
 
 @draws
@@ -65,7 +72,7 @@ def pot(b: Builder) -> None:
     if abs(b.half[0] - b.half[2]) < 0.05 * b.half[0]:
         half = (0.85, 1, 0.85)
     b.cup((0, 0, 0), half, color, Material.METAL, bottom=0.92)
-    b.tube((0, -0.94, 0), (half[0] * 0.92, 0.06, half[2] * 0.92), shade_of(color, 0.7))
+    _inner_floor(b, 0.92, shade_of(color, 0.7), half=half)
     _liquid(b, 0.3, min(half[0], half[2]) * 0.94)
     for side in (-1, 1):
         b.box(b.lengthwise(side * 0.92, 0.65, 0), b.lengthwise(0.08, 0.08, 0.3), BLACK)
@@ -77,7 +84,7 @@ def pan(b: Builder) -> None:
     ratio = min(0.95, b.slenderness)
     at, half = b.lengthwise(ratio - 1, 0, 0), b.lengthwise(ratio, 0.95, 1)
     b.cup(at, half, DARK, Material.METAL, bottom=0.88)
-    b.tube((at[0], -0.85, at[2]), (half[0] * 0.88, 0.1, half[2] * 0.88), (0.14, 0.14, 0.15))
+    _inner_floor(b, 0.88, (0.14, 0.14, 0.15), at, half)
     length = max(1 - ratio, 0.05)
     b.box(b.lengthwise(1 - length, 0.6, 0), b.lengthwise(length, 0.25, 0.08), BLACK)
 
@@ -117,20 +124,37 @@ def bottle(b: Builder) -> None:
 
 @draws
 def salt_shaker(b: Builder) -> None:
-    """A shaker of white."""
-    _shaker(b, WHITE)
+    """A white shaker with an S on its front and back."""
+    _shaker(b, WHITE, (0.1, 0.2, 0.5), CHROME)
+    for face in (-1, 1):
+        for level in (-0.9, 0.0, 0.9):
+            _stroke(b, face, (0.0, level), (0.9, 0.2), (0.1, 0.2, 0.5))
+        _stroke(b, face, (-0.7, 0.45), (0.24, 0.45), (0.1, 0.2, 0.5))
+        _stroke(b, face, (0.7, -0.45), (0.24, 0.45), (0.1, 0.2, 0.5))
 
 
 @draws
 def pepper_shaker(b: Builder) -> None:
-    """A shaker of nearly black."""
-    _shaker(b, (0.22, 0.18, 0.15))
+    """A nearly black shaker with a dark cap and a P on its front and back."""
+    _shaker(b, (0.14, 0.11, 0.1), BLACK, (0.5, 0.32, 0.18))
+    for face in (-1, 1):
+        for level in (0.0, 0.9):
+            _stroke(b, face, (0.0, level), (0.9, 0.2), WHITE)
+        _stroke(b, face, (-0.7, 0.0), (0.24, 1.1), WHITE)
+        _stroke(b, face, (0.7, 0.45), (0.24, 0.45), WHITE)
 
 
-def _shaker(b: Builder, fill: Color) -> None:
-    """A glass with a metal cap."""
-    b.tube((0, -0.25, 0), (1, 0.75, 1), fill, Material.GLASS, top=0.8)
-    b.tube((0, 0.7, 0), (0.82, 0.3, 0.82), CHROME, Material.METAL, top=0.7)
+def _stroke(b: Builder, face: int, at: tuple[float, float], half: tuple[float, float], color: Color) -> None:
+    """A stroke of a letter on the front (1) or back (-1) of a shaker, in shares of the letter seen upright."""
+    b.box((-face * at[0] * 0.36, -0.3 + 0.4 * at[1], face * 0.9), (half[0] * 0.36, 0.4 * half[1], 0.08), color)
+
+
+def _shaker(b: Builder, body: Color, holes: Color, cap: Color) -> None:
+    """A round body with a cap that has holes."""
+    b.tube((0, -0.2, 0), (1, 0.8, 1), body, top=0.92)
+    b.tube((0, 0.78, 0), (0.84, 0.2, 0.84), cap, Material.METAL, top=0.75)
+    b.box((0, 0.98, 0), (0.4, 0.02, 0.1), holes)
+    b.box((0, 0.98, 0), (0.1, 0.02, 0.4), holes)
 
 
 @draws

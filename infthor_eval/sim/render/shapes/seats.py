@@ -82,5 +82,7 @@ def bed(b: Builder) -> None:
 
 @draws
 def pet_bed(b: Builder) -> None:
-    """A flat round cushion."""
-    b.ball((0, -0.1, 0), (1, 0.9, 1), pick(CLOTHS, b.style), Material.FABRIC)
+    """A flat round cushion with a border."""
+    color = pick(CLOTHS, b.style)
+    b.tube((0, -0.05, 0), (1, 0.95, 1), shade_of(color, 0.7), Material.FABRIC, top=0.96)
+    b.tube((0, 0.9, 0), (0.84, 0.1, 0.84), shade_of(color, 1.15), Material.FABRIC)

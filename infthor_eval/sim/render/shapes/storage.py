@@ -1,7 +1,7 @@
 """Objects with an inside: cabinets, drawers, fridges, microwaves, safes, boxes, bins."""
 
-from infthor_eval.sim.objects import DOOR_SWING, DRAWER_SLIDE
-from infthor_eval.sim.render.primitives import Color, Form, Material
+from infthor_eval.sim.objects import DOOR_SWING, DRAWER_SLIDE, WALL
+from infthor_eval.sim.render.primitives import Color, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, WHITE, WOODS, pick
 from infthor_eval.sim.render.shapes.register import draws
@@ -9,7 +9,11 @@ from infthor_eval.sim.render.shapes.register import draws
 _LEAF = 0.02  # thickness of a door, metres
 _LIT = 0.2  # glow of the insides of open things: their contents would be hard to see otherwise
 _BODY = 0.82  # of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same share.
+_TRAY = 0.9  # top of a drawer's sides, in fractions: a little lower than its front
 _COLD: Color = (0.93, 0.97, 1.0)
+_TINTED: Color = (0.55, 0.76, 0.84)
+_WINDOW: Color = (0.13, 0.14, 0.16)
+_GLASS_END = 0.6  # front edge of a fridge's glass shelves, in fractions
 
 
 def _door(b: Builder, color: Color, material: Material, grip: Color, low: float = -1.0, high: float = 1.0) -> None:
@@ -23,7 +27,7 @@ def _door(b: Builder, color: Color, material: Material, grip: Color, low: float 
     b.hinged_box(hinge, (-side * width, middle, -leaf), (width * 0.985, half * 0.985, leaf), angle, color, material)
     reach = 2 * width * 0.88
     tall = min(half * 0.35, 0.2)
-    b.hinged_box(hinge, (-side * reach, middle, 0.012), (0.008, tall, 0.01), angle, grip, Material.METAL)
+    b.hinged_box(hinge, (-side * reach, middle, 0.01), (0.008, tall, 0.01), angle, grip, Material.METAL)
 
 
 @draws
@@ -31,7 +35,7 @@ def cabinet(b: Builder) -> None:
     """A cupboard of wood with one door."""
     color = pick(WOODS, b.style // 7 if b.item.asset_id else 2)
     if b.state.openness > 0:
-        b.open_front(shade_of(color, 1.2), Material.WOOD, 0.018, glow=_LIT)
+        b.open_front(shade_of(color, 0.8), shade_of(color, 1.2), Material.WOOD, b.item.floors[0], glow=_LIT)
     elif not b.item.hollow:
         back = b.thick(_LEAF, 2)
         b.box((0, 0, -back / 2), (1, 1, 1 - back / 2), shade_of(color, 0.8), Material.WOOD)
@@ -40,16 +44,18 @@ def cabinet(b: Builder) -> None:
 
 @draws
 def drawer(b: Builder) -> None:
-    """A drawer: its front, and when open the tray behind it."""
+    """A drawer: its front, and when open the tray behind it, as wide as what may lie in it."""
     color = shade_of(pick(WOODS, 2), 1.05)
     out = 2 * DRAWER_SLIDE * b.state.openness
     leaf = b.thick(_LEAF / 2, 2)
     if b.state.openness > 0:
-        x, y = b.thick(0.008, 0), b.thick(0.008, 1)
-        b.box((0, -0.85 + y, out), (0.9, y, 1 - leaf), shade_of(color, 1.3), Material.PLAIN, glow=_LIT)
-        for side in (-1, 1):
-            b.box((side * (0.92 - x), -0.15, out), (x, 0.7, 1 - leaf), shade_of(color, 1.1), Material.WOOD, glow=_LIT)
-        b.box((0, -0.15, out - 1 + leaf), (0.92, 0.7, leaf), shade_of(color, 1.1), Material.WOOD, glow=_LIT)
+        x, gap, back = b.thick(WALL, 0), b.thick(0.004, 0), out - 1 + b.thick(WALL, 2)
+        side = shade_of(color, 1.1)
+        floor, front = b.floor, out + 1 - 2 * leaf
+        b.span((gap - 1, -0.96, out - 1), (1 - gap, floor, front), shade_of(color, 1.3), glow=_LIT)
+        b.span((gap - 1, floor, out - 1), (1 - gap, _TRAY, back), side, Material.WOOD, glow=_LIT)
+        b.span((gap - 1, floor, back), (x - 1, _TRAY, front), side, Material.WOOD, glow=_LIT)
+        b.span((1 - x, floor, back), (1 - gap, _TRAY, front), side, Material.WOOD, glow=_LIT)
     else:
         b.box((0, 0, -leaf), (0.94, 0.92, 1 - leaf), shade_of(color, 0.75), Material.WOOD)
     b.box((0, 0, out + 1 - leaf), (0.985, 0.96, leaf), color, Material.WOOD)
@@ -64,7 +70,7 @@ def fridge(b: Builder) -> None:
         z = b.thick(0.025, 2)
         b.box((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92), Material.METAL)
     else:
-        _lit_inside(b, shade_of(color, 0.8))
+        _lit_inside(b, shade_of(color, 0.92))
     _door(b, color, Material.METAL, DARK, -0.97, 0.3)
     _door(b, shade_of(color, 1.03), Material.METAL, DARK, 0.33, 1.0)
     if b.state.openness > 0:
@@ -72,15 +78,15 @@ def fridge(b: Builder) -> None:
 
 
 def _lit_inside(b: Builder, outside: Color) -> None:
-    """The body of an open fridge: white and bright within, edges of glass shelves, a lamp."""
-    b.box((0, 0, -0.99), (1, 1, 0.01), outside, Material.METAL)
-    b.open_front(_COLD, Material.PLAIN, 0.045, glow=0.45)
-    for side in (-1, 1):
-        b.box((side * 0.995, 0, 0), (0.008, 1, 0.985), outside, Material.METAL)
-    b.box((0, 0.995, 0), (1, 0.006, 0.985), outside, Material.METAL)
-    for level in (-0.56, -0.18, 0.24):
-        b.box((0, level - 0.03, 0.8), (0.93, 0.008, 0.02), (0.45, 0.62, 0.7))
-        b.box((0, level - 0.03, -0.86), (0.93, 0.008, 0.05), (0.45, 0.62, 0.7))
+    """The body of an open fridge: white and bright within, shelves of tinted glass, a lamp."""
+    b.open_front(outside, _COLD, Material.METAL, WALL, glow=0.45)
+    x, y = 1 - b.thick(WALL, 0), b.thick(0.008, 1)
+    back = b.thick(WALL, 2) - 1
+    for metres in b.item.floors:
+        level = b.level(metres)
+        # The glass ends before the rail, so that one looks down past it, as through glass.
+        b.span((-x, level - y, back), (x, level, _GLASS_END), _TINTED, Material.GLASS, glow=0.3)
+        b.span((-x, level - 2 * y, 0.86), (x, level, 0.92), shade_of(_TINTED, 0.62), glow=0.2)
     b.box((0, 0.9, -0.2), (0.3, 0.02, 0.3), (1.0, 1.0, 0.9), glow=0.9)
 
 
@@ -105,22 +111,23 @@ def microwave(b: Builder) -> None:
     body = (STEEL, DARK, WHITE)[b.style % 3]
     x, z = b.thick(0.02, 0), b.thick(0.01, 2)
     lit = 0.75 if b.state.toggled else 0.0
+    panel, door = shade_of(body, 0.9), shade_of(body, 0.85)
     if b.state.openness == 0:
         b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
-        window: Color = (0.9, 0.75, 0.4) if b.state.toggled else (0.13, 0.14, 0.16)
-        b.box((0.22, 0, 1 - z), (0.74, 0.92, z), shade_of(body, 0.85), Material.METAL)
+        window: Color = (0.9, 0.75, 0.4) if b.state.toggled else _WINDOW
+        b.box((0.22, 0, 1 - z), (0.74, 0.92, z), door, Material.METAL)
         b.box((0.27, 0, 1 - z / 2), (0.58, 0.68, z), window, Material.GLASS, glow=lit)
         b.box((-0.44, 0, 1 + z), (x, 0.7, z), CHROME, Material.METAL)
     else:
-        b.open_front(shade_of(STEEL, 1.1), Material.METAL, 0.03, glow=0.3)
-        b.tube((0.2, -0.86, 0), (0.55, 0.03, 0.75), (0.8, 0.86, 0.88), Material.GLASS)
-        b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), shade_of(body, 0.9), Material.METAL)
-        wide = float(b.half[0])
+        b.open_front(body, shade_of(STEEL, 1.1), Material.METAL, b.item.floors[0], glow=0.3)
+        b.tube((0.2, b.floor, 0), (0.55, b.thick(0.002, 1), 0.75), (0.8, 0.86, 0.88), Material.GLASS)
+        b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), panel, Material.METAL)
+        wide, high = float(b.half[0]), float(b.half[1])
         angle = DOOR_SWING * b.state.openness
-        b.hinged_box((1, 0, 1), (-0.74 * wide, 0, -0.012), (0.74 * wide, 0.92 * float(b.half[1]), 0.012), angle,
-                shade_of(body, 0.8), Material.METAL)  # fmt: skip
-        b.hinged_box((1, 0, 1), (-0.72 * wide, 0, 0.002), (0.55 * wide, 0.65 * float(b.half[1]), 0.012), angle,
-                (0.13, 0.14, 0.16), Material.GLASS)  # fmt: skip
+        b.hinged_box((1, 0, 1), (-0.74 * wide, 0, -0.01), (0.74 * wide, 0.92 * high, 0.01), angle, door, Material.METAL)
+        b.hinged_box((1, 0, 1), (-0.72 * wide, 0, -0.01), (0.55 * wide, 0.65 * high, 0.012), angle, _WINDOW,
+                Material.GLASS)  # fmt: skip
+        b.hinged_box((1, 0, 1), (-1.44 * wide, 0, 0.01), (0.02, 0.7 * high, 0.01), angle, CHROME, Material.METAL)
     b.box((-0.76, 0.1, 1 - z / 2), (0.18, 0.7, z), BLACK)
     b.box((-0.76, 0.62, 1), (0.14, 0.12, z), (0.2, 0.85, 0.45), glow=0.6)
     for row in range(3):
@@ -129,16 +136,21 @@ def microwave(b: Builder) -> None:
 
 @draws
 def safe(b: Builder) -> None:
-    """A steel box with a dial."""
+    """A steel box with a thick door that has a dial and a wheel of spokes."""
     body: Color = (0.3, 0.32, 0.35)
     if b.state.openness == 0:
         z = b.thick(0.02, 2)
         b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
     else:
-        b.open_front(shade_of(body, 1.5), Material.METAL, 0.04, glow=_LIT)
+        b.open_front(body, shade_of(body, 1.7), Material.METAL, b.item.floors[0], glow=_LIT)
     _door(b, shade_of(body, 1.25), Material.METAL, CHROME)
     if b.state.openness == 0:
-        b.add(Form.CYLINDER, (0, 0.2, 1), (0.2, 0.02, 0.2), CHROME, Material.METAL, tilt=(90, 0, 0))
+        b.coin(2, (0, 0.2, 1), (0.3, 0.3, b.thick(0.008, 2)), DARK)
+        b.coin(2, (0, 0.2, 1), (0.14, 0.14, b.thick(0.016, 2)), CHROME, Material.METAL)
+        b.box((0, 0.42, 1), (0.02, 0.06, b.thick(0.009, 2)), WHITE)
+        b.box((0.0, -0.35, 1), (0.34, 0.28, b.thick(0.006, 2)), (0.1, 0.1, 0.11))
+        for row in range(3):
+            b.box((0.0, -0.17 - 0.18 * row, 1), (0.26, 0.05, b.thick(0.009, 2)), (0.75, 0.78, 0.8))
 
 
 @draws
@@ -158,12 +170,11 @@ def carton(b: Builder) -> None:
 
 def _body(b: Builder, color: Color, share: float) -> None:
     """Add four sides and a bottom, within the share of the box that the flaps leave."""
-    y = b.thick(0.004, 1)
     x, z = b.thick(0.006, 0), b.thick(0.006, 2)
-    b.box((0, -1 + y, 0), (share, y, share), shade_of(color, 0.88), glow=0.12)
+    b.span((-share, -1, -share), (share, b.floor, share), shade_of(color, 0.88), glow=0.12)
     for side in (-1, 1):
-        b.box((side * (share - x), y, 0), (x, 1 - y, share), color, glow=0.12)
-        b.box((0, y, side * (share - z)), (share - 2 * x, 1 - y, z), color, glow=0.12)
+        b.box((side * (share - x), 0, 0), (x, 1, share), color, glow=0.12)
+        b.box((0, 0, side * (share - z)), (share - 2 * x, 1, z), color, glow=0.12)
 
 
 def _flaps(b: Builder, color: Color, share: float) -> None:
@@ -185,7 +196,7 @@ def garbage_can(b: Builder) -> None:
     """A garbage can."""
     color = ((0.35, 0.38, 0.4), (0.75, 0.76, 0.78), (0.3, 0.42, 0.36), (0.2, 0.2, 0.22))[b.style % 4]
     b.cup((0, 0, 0), (1, 1, 1), color, Material.METAL, bottom=0.82, top=1.0)
-    b.tube((0, -0.94, 0), (0.8, 0.03, 0.8), shade_of(color, 0.5))
+    b.tube((0, (b.floor - 1) / 2, 0), (0.82, (b.floor + 1) / 2, 0.82), shade_of(color, 0.5))
 
 
 @draws
@@ -202,3 +213,4 @@ def hamper(b: Builder) -> None:
         b.tube((0, 0, 0), (1, 1, 1), (0.72, 0.6, 0.42), Material.FABRIC, bottom=0.88)
         return
     b.cup((0, 0, 0), (1, 1, 1), (0.72, 0.6, 0.42), Material.FABRIC, bottom=0.88)
+    b.tube((0, (b.floor - 1) / 2, 0), (0.88, (b.floor + 1) / 2, 0.88), (0.55, 0.45, 0.32), Material.FABRIC)
