@@ -22,7 +22,7 @@ TYPES = (
     _furniture("CoffeeTable", (1.14, 0.44, 0.70), shape="coffee_table", mass=14.0, materials=("Wood",)),
     ObjectType("CounterTop", (0.95, 0.02, 1.35), shape="counter", receptacle=True, space_below=0.1, furniture=True,
                has_cutouts=True, faces_room=True),
-    _furniture("Desk", (1.60, 0.80, 0.66), shape="table", mass=30.0, materials=("Wood",), has_cutouts=True,
+    _furniture("Desk", (1.60, 0.80, 0.66), shape="desk", mass=30.0, materials=("Wood",), has_cutouts=True,
                infer_support=True),
     _furniture("DiningTable", (1.45, 0.78, 0.92), shape="dining_table", mass=20.0, materials=("Wood",),
                has_cutouts=True),

@@ -6,6 +6,7 @@ from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, DARK, S
 from infthor_eval.sim.render.shapes.register import draws
 
 _SCREEN: Color = (0.35, 0.6, 0.9)
+_ICONS: tuple[Color, ...] = ((0.95, 0.3, 0.25), (1.0, 0.85, 0.3), (0.35, 0.8, 0.4), (0.97, 0.97, 0.97))
 _WARM: Color = (1.0, 0.93, 0.7)
 _SHADES: tuple[Color, ...] = ((0.9, 0.85, 0.72), (0.75, 0.35, 0.3), (0.5, 0.6, 0.68))
 
@@ -99,10 +100,17 @@ def _lamp(b: Builder, foot: float, shade_low: float) -> None:
 
 @draws
 def cell_phone(b: Builder) -> None:
-    """A slab with a screen."""
-    b.box((0, -0.1, 0), (1, 0.9, 1), BLACK)
+    """A slab of glass in a bright metal edge: a round key, a slit for the ear, and icons while it is on."""
+    b.box((0, -0.15, 0), (1, 0.85, 1), CHROME, Material.METAL)
+    b.box((0, 0.2, 0), (0.92, 0.68, 0.96), (0.04, 0.04, 0.05))
     lit = b.state.toggled
-    b.box((0, 0.9, 0), (0.88, 0.1, 0.9), _SCREEN if lit else (0.2, 0.24, 0.32), glow=0.8 if lit else 0.0)
+    b.box((0, 0.86, 0), (0.84, 0.08, 0.74), _SCREEN if lit else (0.1, 0.12, 0.16), Material.GLASS,
+          glow=0.8 if lit else 0.0)  # fmt: skip
+    b.tube((0, 0.9, 0.85), (0.17, 0.08, 0.085), (0.62, 0.64, 0.68))
+    b.box((0, 0.9, -0.86), (0.24, 0.08, 0.018), (0.62, 0.64, 0.68))
+    if lit:
+        for index, color in enumerate(_ICONS):
+            b.box((-0.42 + 0.84 * (index % 2), 0.96, -0.45 + 0.42 * (index // 2)), (0.24, 0.04, 0.12), color, glow=0.7)
 
 
 @draws
@@ -125,11 +133,16 @@ def vacuum(b: Builder) -> None:
 
 @draws
 def alarm_clock(b: Builder) -> None:
-    """A clock with a face, hands and two bells."""
-    color = pick(((0.75, 0.2, 0.18), BRASS, (0.3, 0.5, 0.5)), b.style)
-    b.box((0, -0.1, 0), (1, 0.85, 0.85), color)
-    b.box((0, -0.1, 0.88), (0.75, 0.65, 0.1), WHITE)
-    b.box((0, 0.08, 1), (0.05, 0.25, 0.05), BLACK)
-    b.box((0.2, -0.1, 1), (0.22, 0.05, 0.05), BLACK)
+    """A round clock on two feet with two bells on top, a face with hands and marks, and keys to wind it at its back."""
+    color = pick(((0.75, 0.2, 0.18), (0.2, 0.42, 0.55), (0.3, 0.5, 0.4)), b.style)
+    b.coin(2, (0, -0.16, 0), (0.8, 0.8, 0.74), color)
+    b.coin(2, (0, -0.16, 0.76), (0.68, 0.68, 0.06), WHITE)
+    for x, y in ((0, 0.54), (0.54, 0), (0, -0.54), (-0.54, 0)):
+        b.box((x, y - 0.16, 0.82), (0.06, 0.06, 0.05), BLACK)
+    b.box((0, 0.04, 0.86), (0.05, 0.24, 0.06), BLACK)
+    b.box((0.16, -0.16, 0.86), (0.2, 0.05, 0.06), BLACK)
     for side in (-1, 1):
-        b.ball((side * 0.5, 0.85, 0), (0.35, 0.15, 0.4), BRASS, Material.METAL)
+        b.ball((side * 0.5, 0.68, 0), (0.4, 0.28, 0.6), BRASS, Material.METAL, tilt=(0, 0, side * -35))
+        b.box((side * 0.48, -0.88, 0), (0.1, 0.12, 0.4), DARK)
+        b.box((side * 0.3, -0.16, -0.86), (0.16, 0.06, 0.14), BRASS, Material.METAL)
+    b.box((0, 0.8, 0), (0.06, 0.2, 0.12), DARK)

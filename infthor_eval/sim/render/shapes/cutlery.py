@@ -1,5 +1,7 @@
 """Knives, forks, spoons, spatulas and ladles; their handles point towards +z."""
 
+import math
+
 from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.palette import CHROME, DARK, STEEL
@@ -56,6 +58,15 @@ def spatula(b: Builder) -> None:
 
 @draws
 def ladle(b: Builder) -> None:
-    """A cup at the end of a long handle."""
-    b.cup((0, -0.3, -0.68), (0.95, 0.7, 0.32), STEEL, Material.METAL, bottom=0.6)
-    b.box((0, 0.5, 0.3), (0.15, 0.2, 0.7), CHROME, Material.METAL)
+    """A deep round bowl, and a long handle that rises from its rim to a dark grip with a hook."""
+    b.bowl((0, -0.58, -0.68), (0.95, 0.42, 0.31), STEEL, Material.METAL)
+    b.bowl((0, -0.54, -0.68), (0.84, 0.4, 0.27), shade_of(STEEL, 0.5))
+    start, end = (-0.24, -0.4), (0.86, 0.9)  # height and place along, in fractions
+    rise, run = (end[0] - start[0]) * float(b.half[1]), (end[1] - start[1]) * float(b.half[2])
+    lean = -math.degrees(math.atan2(rise, run))
+    length = math.hypot(rise, run) / 2 / float(b.half[2])
+    middle = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)
+    b.box((0, *middle), (0.1, 0.05, length), CHROME, Material.METAL, tilt=(lean, 0, 0))
+    at = (start[0] + 0.8 * (end[0] - start[0]), start[1] + 0.8 * (end[1] - start[1]))
+    b.box((0, *at), (0.17, 0.09, length * 0.28), DARK, tilt=(lean, 0, 0))
+    b.box((0, 0.8, 0.96), (0.08, 0.14, 0.03), CHROME, Material.METAL)

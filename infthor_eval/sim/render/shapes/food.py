@@ -6,7 +6,7 @@ from infthor_eval.sim.render.shapes.register import draws
 
 __all__ = ["APPLES", "CRUST", "LETTUCE", "POTATO", "TOMATO"]
 
-APPLES: tuple[Color, ...] = ((0.78, 0.12, 0.1), (0.55, 0.7, 0.2), (0.8, 0.3, 0.15))
+APPLES: tuple[Color, ...] = ((0.72, 0.07, 0.09), (0.52, 0.7, 0.2), (0.55, 0.05, 0.12))
 CRUST: Color = (0.72, 0.48, 0.24)
 LETTUCE: Color = (0.4, 0.66, 0.25)
 POTATO: Color = (0.7, 0.55, 0.32)
@@ -15,16 +15,22 @@ TOMATO: Color = (0.85, 0.16, 0.1)
 
 @draws
 def apple(b: Builder) -> None:
-    """A round fruit with a stalk."""
-    b.ball((0, -0.05, 0), (1, 0.95, 1), APPLES[b.style % 3])
-    b.tube((0, 0.92, 0), (0.06, 0.14, 0.06), (0.35, 0.22, 0.1))
+    """Broad shoulders around a dimple with a stalk and a leaf, narrower below."""
+    color = APPLES[b.style % 3]
+    b.ball((0, 0.1, 0), (1, 0.7, 1), color)
+    b.ball((0, -0.2, 0), (0.92, 0.8, 0.92), color)
+    b.tube((0, 0.77, 0), (0.3, 0.04, 0.3), shade_of(color, 0.5))
+    b.add(Form.CYLINDER, (0.03, 0.82, 0), (0.08, 0.18, 0.08), (0.3, 0.18, 0.08), tilt=(0, 0, -14))
+    b.ball((0.4, 0.88, 0.1), (0.4, 0.08, 0.2), (0.25, 0.55, 0.15))
 
 
 @draws
 def tomato(b: Builder) -> None:
-    """A red ball with a green star."""
+    """A flat red ball with a green star of leaves."""
     b.ball((0, -0.05, 0), (1, 0.95, 1), TOMATO)
-    b.tube((0, 0.88, 0), (0.3, 0.05, 0.3), (0.2, 0.5, 0.15), bottom=0.2)
+    for turn in (0, 60, 120):
+        b.box((0, 0.84, 0), (0.62, 0.06, 0.13), (0.16, 0.45, 0.12), tilt=(0, turn, 0))
+    b.tube((0, 0.9, 0), (0.09, 0.1, 0.09), (0.25, 0.4, 0.12))
 
 
 @draws

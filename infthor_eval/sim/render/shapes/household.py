@@ -2,7 +2,19 @@
 
 from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
-from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CERAMICS, DARK, LEAF, PAPER, STEEL, WHITE, WOODS, pick
+from infthor_eval.sim.render.shapes.palette import (
+    BLACK,
+    BRASS,
+    CERAMICS,
+    CHROME,
+    DARK,
+    LEAF,
+    PAPER,
+    STEEL,
+    WHITE,
+    WOODS,
+    pick,
+)
 from infthor_eval.sim.render.shapes.register import draws
 
 _COVERS: tuple[Color, ...] = ((0.6, 0.18, 0.15), (0.18, 0.3, 0.5), (0.2, 0.42, 0.3), (0.55, 0.42, 0.2))
@@ -40,9 +52,19 @@ def disc(b: Builder) -> None:
 
 @draws
 def watch(b: Builder) -> None:
-    """A face on a strap."""
-    b.tube((0, 0, 0), (0.95, 0.7, 0.95), DARK)
-    b.tube((0, 0.5, 0), (0.7, 0.5, 0.7), (0.9, 0.85, 0.6), Material.METAL)
+    """A white dial in a metal case with a crown, on a closed strap that is narrower than the case."""
+    strap = pick(((0.12, 0.12, 0.13), (0.42, 0.24, 0.12), (0.16, 0.22, 0.42)), b.style)
+    case = pick((CHROME, BRASS), b.style)
+    b.box((0, -0.92, 0), (0.66, 0.08, 0.48), strap)
+    for side in (-1, 1):
+        b.box((side * 0.82, -0.3, 0), (0.1, 0.66, 0.48), strap, tilt=(0, 0, side * -8))
+        b.box((side * 0.62, 0.42, 0), (0.36, 0.12, 0.48), strap, tilt=(0, 0, side * -16))
+    round_x = min(0.62, 0.9 * float(b.half[2] / b.half[0]))
+    b.tube((0, 0.52, 0), (round_x, 0.36, 0.9), case, Material.METAL)
+    b.tube((0, 0.88, 0), (round_x * 0.82, 0.04, 0.74), WHITE)
+    b.box((0, 0.93, -0.22), (0.06, 0.04, 0.28), BLACK)
+    b.box((0.16, 0.93, 0.05), (0.18, 0.04, 0.09), BLACK)
+    b.box((0, 0.52, 0.94), (0.09, 0.12, 0.06), case, Material.METAL)
 
 
 @draws
@@ -55,7 +77,7 @@ def teddy(b: Builder) -> None:
     for side in (-1, 1):
         b.ball((side * 0.4, 0.85, 0), (0.18, 0.15, 0.2), shade_of(fur, 0.9))
         b.ball((side * 0.72, -0.1, 0.1), (0.28, 0.2, 0.3), fur)
-        b.ball((side * 0.4, -0.85, 0.45), (0.28, 0.18, 0.5), fur)
+        b.ball((side * 0.4, -0.82, 0.45), (0.28, 0.18, 0.5), fur)
         b.ball((side * 0.18, 0.6, 0.6), (0.05, 0.05, 0.05), BLACK)
 
 
@@ -81,14 +103,22 @@ def vase(b: Builder) -> None:
 
 @draws
 def statue(b: Builder) -> None:
-    """A figure on a plinth."""
-    color = pick((BRASS, (0.75, 0.73, 0.7), (0.35, 0.3, 0.28)), b.style)
+    """A human figure of one colour on a plinth: robe, chest, head, one arm raised and the other at its hip."""
+    color = pick((BRASS, (0.78, 0.76, 0.73), (0.42, 0.36, 0.32)), b.style)
     if b.state.broken:
         _shards(b, color)
         return
-    b.box((0, -0.88, 0), (0.9, 0.12, 0.9), DARK)
-    b.tube((0, -0.2, 0), (0.9, 0.6, 0.9), color, Material.METAL, top=0.5)
-    b.ball((0, 0.65, 0), (0.6, 0.35, 0.6), color, Material.METAL)
+    b.box((0, -0.92, 0), (0.8, 0.08, 0.9), DARK)
+    b.box((0, -0.8, 0), (0.64, 0.06, 0.76), shade_of(color, 0.75), Material.METAL)
+    b.tube((0, -0.38, 0), (0.46, 0.38, 0.56), color, Material.METAL, top=0.62)
+    b.tube((0, 0.16, 0), (0.46, 0.22, 0.46), color, Material.METAL, bottom=0.6)
+    b.ball((0, 0.38, 0), (0.5, 0.09, 0.48), color, Material.METAL)
+    b.tube((0, 0.47, 0), (0.12, 0.08, 0.16), color, Material.METAL)
+    b.ball((0, 0.65, 0.02), (0.23, 0.17, 0.34), color, Material.METAL)
+    b.box((-0.6, 0.6, 0), (0.1, 0.28, 0.17), color, Material.METAL, tilt=(0, 0, 18))
+    b.ball((-0.74, 0.9, 0), (0.13, 0.08, 0.2), color, Material.METAL)
+    b.box((0.55, 0.2, 0), (0.1, 0.17, 0.17), color, Material.METAL, tilt=(0, 0, 22))
+    b.box((0.5, -0.04, 0.05), (0.1, 0.15, 0.17), color, Material.METAL, tilt=(0, 0, -35))
 
 
 def _shards(b: Builder, color: Color) -> None:

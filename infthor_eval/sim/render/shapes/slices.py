@@ -1,14 +1,14 @@
 """Slices of food, each with the rind, flesh and outline of its food."""
 
 from infthor_eval.sim.object_types import OBJECT_TYPES
-from infthor_eval.sim.render.primitives import Color, Form, Material
+from infthor_eval.sim.render.primitives import Color, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
 from infthor_eval.sim.render.shapes.food import APPLES, CRUST, LETTUCE, POTATO, TOMATO, loaf
 from infthor_eval.sim.render.shapes.register import draws
 
 # Number of slices, by the type of slice.
 _COUNTS = {whole.slice_type: whole.slices for whole in OBJECT_TYPES.values() if whole.slices}
-_RUFFLES = ((0.42, 0.42), (0.42, -0.42), (-0.42, 0.42), (-0.42, -0.42))
+_RUFFLES = ((0.63, 0.12), (0.42, 0.52), (0.0, 0.66), (-0.42, 0.52), (-0.63, 0.12), (0.46, -0.42), (-0.46, -0.42))
 _TOAST: Color = (0.55, 0.33, 0.15)
 _CRUMB: Color = (0.95, 0.86, 0.66)
 
@@ -46,13 +46,27 @@ def potato_slice(b: Builder) -> None:
 
 @draws
 def lettuce_slice(b: Builder) -> None:
-    """Ruffled leaves, dark at the edge and nearly white at the heart."""
+    """A ruffled leaf, paler within, with a broad white rib from its foot that branches into veins."""
     for aside, up in _RUFFLES:
-        _disc(b, 0.5, 0.7, shade_of(LETTUCE, 0.8), (aside, up))
-        _disc(b, 0.38, 0.86, (0.62, 0.82, 0.4), (aside, up))
-    _disc(b, 0.86, 0.68, LETTUCE, (0.0, 0.0))
-    _disc(b, 0.7, 0.84, (0.62, 0.82, 0.4), (0.0, 0.0))
-    _disc(b, 0.34, 1.0, (0.88, 0.93, 0.72), (0.0, 0.0))
+        _disc(b, 0.34, 0.76, shade_of(LETTUCE, 0.66), (aside, up))
+    _disc(b, 0.82, 0.84, shade_of(LETTUCE, 1.15), (0.0, 0.0))
+    _rib(b, (0.0, -0.2), 0.0, (0.09, 0.72))
+    _rib(b, (0.0, -0.62), 0.0, (0.17, 0.36))
+    for side in (-1, 1):
+        for up in (-0.3, 0.1):
+            _rib(b, (side * 0.24, up + 0.22), side * 48.0, (0.045, 0.34))
+
+
+def _rib(b: Builder, at: tuple[float, float], angle: float, half: tuple[float, float]) -> None:
+    """A white rib on both faces, `angle` degrees from upright; its half width and half length are fractions."""
+    thin = _thin_axis(b)
+    # A tilted box has half extents along its own axes, hence lengths in metres and not in fractions of the tilted ones.
+    wide, tall = half[0] * float(b.half[2 - thin]), half[1] * float(b.half[1])
+    metres = (float(b.half[0]) * 0.95, tall, wide) if thin == 0 else (wide, tall, float(b.half[2]) * 0.95)
+    fractions = [m / float(h) for m, h in zip(metres, b.half, strict=True)]
+    tilt = (angle, 0.0, 0.0) if thin == 0 else (0.0, 0.0, -angle)
+    middle = (0.0, at[1], at[0]) if thin == 0 else (at[0], at[1], 0.0)
+    b.box(middle, fractions, (0.95, 0.96, 0.84), tilt=tilt)
 
 
 def _round(b: Builder, rind: Color, flesh: Color) -> None:
@@ -88,9 +102,6 @@ def _thin_axis(b: Builder) -> int:
 def _disc(b: Builder, radius: float, thick: float, color: Color, at: tuple[float, float]) -> None:
     """Add a disc across the thin axis, with its middle aside and up."""
     thin = _thin_axis(b)
-    tilt = (0.0, 0.0, 90.0) if thin == 0 else (90.0, 0.0, 0.0)
-    x, y, z = (float(v) for v in b.half)
-    # Half extents are fractions of the object's axes, but the tilted cylinder's axes lie along others: hence ratios.
-    half = (radius * y / x, thick * x / y, radius) if thin == 0 else (radius, thick * z / y, radius * y / z)
+    half = (thick, radius, radius) if thin == 0 else (radius, radius, thick)
     middle = (0.0, at[1], at[0]) if thin == 0 else (at[0], at[1], 0.0)
-    b.add(Form.CYLINDER, middle, half, color, tilt=tilt)
+    b.coin(thin, middle, half, color)

@@ -1,9 +1,13 @@
 """Balls, bats, rackets and weights."""
 
+import math
+
 from infthor_eval.sim.render.primitives import Color, Form, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
-from infthor_eval.sim.render.shapes.palette import BLACK, CHROME, DARK
+from infthor_eval.sim.render.shapes.palette import BLACK, CHROME, DARK, pick
 from infthor_eval.sim.render.shapes.register import draws
+
+_STRING: Color = (0.3, 0.3, 0.32)
 
 
 @draws
@@ -32,14 +36,25 @@ def bat(b: Builder) -> None:
 
 @draws
 def racket(b: Builder) -> None:
-    """A frame of strings on a handle, along its longest side."""
-    axis = max(range(3), key=lambda i: float(b.half[i]))
+    """An oval frame with a net of strings, a forked throat and a wound grip, along its longest side."""
+    long = b.longest
     flat = min(range(3), key=lambda i: float(b.half[i]))
-    half, at, grip, low = [1.0] * 3, [0.0] * 3, [0.14] * 3, [0.0] * 3
-    half[axis], half[flat], at[axis] = 0.55, 0.5, 0.45
-    grip[axis], grip[flat], low[axis] = 0.5, 0.6, -0.5
-    b.ball(at, half, (0.85, 0.82, 0.6), Material.FABRIC)
-    b.box(low, grip, (0.25, 0.25, 0.5))
+    wide = 3 - long - flat
+
+    def at(along: float, across: float = 0.0, up: float = 0.0) -> list[float]:
+        """A position, or half extents, in fractions along the racket, across it and away from its face."""
+        return [along if axis == long else across if axis == wide else up for axis in range(3)]
+
+    frame = pick(((0.75, 0.12, 0.12), (0.1, 0.25, 0.6), (0.12, 0.12, 0.14)), b.style)
+    b.coin(flat, at(0.44), at(0.56, 1.0, 0.75), frame)
+    b.coin(flat, at(0.44), at(0.48, 0.86, 0.8), (0.9, 0.9, 0.8))
+    for index in range(5):
+        place = (index - 2) / 3
+        reach = math.sqrt(1 - place * place)
+        b.box(at(0.44 + 0.48 * place), at(0.008, 0.86 * reach, 0.86), _STRING)
+        b.box(at(0.44, 0.86 * place), at(0.48 * reach, 0.02, 0.86), _STRING)
+    b.box(at(-0.2), at(0.12, 0.13, 0.6), frame)
+    b.box(at(-0.66), at(0.34, 0.15, 0.9), BLACK, Material.FABRIC)
 
 
 @draws

@@ -4,16 +4,18 @@ import math
 
 from infthor_eval.sim.render.primitives import Color, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
-from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, STEEL, pick
+from infthor_eval.sim.render.shapes.palette import BLACK, BRASS, CHROME, STEEL, WHITE, pick
 from infthor_eval.sim.render.shapes.register import draws
 
 
 @draws
 def card(b: Builder) -> None:
-    """A plastic card with a stripe and a chip."""
-    b.box((0, 0, 0), (1, 1, 1), pick(((0.15, 0.3, 0.65), (0.75, 0.6, 0.2), (0.5, 0.12, 0.2)), b.style))
-    b.box((0, 0.9, 0.6), (1, 0.2, 0.15), BLACK)
-    b.box((-0.5, 0.9, -0.2), (0.18, 0.2, 0.2), BRASS)
+    """A bright plastic card: a gold chip, a white line of numbers, and the two overlapping discs of its maker."""
+    b.box((0, -0.1, 0), (1, 0.9, 1), pick(((0.1, 0.32, 0.8), (0.05, 0.5, 0.42), (0.45, 0.15, 0.6)), b.style))
+    b.box((-0.62, 0.85, -0.2), (0.2, 0.1, 0.26), (0.95, 0.8, 0.35))
+    b.box((-0.05, 0.85, 0.35), (0.78, 0.1, 0.1), WHITE)
+    b.tube((0.42, 0.85, -0.42), (0.24, 0.1, 0.42), (0.9, 0.15, 0.12))
+    b.tube((0.68, 0.88, -0.42), (0.24, 0.1, 0.42), (1.0, 0.65, 0.1))
 
 
 @draws

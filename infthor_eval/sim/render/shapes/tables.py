@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from infthor_eval.sim.footprints import Rect
 from infthor_eval.sim.render.primitives import Color, Material
 from infthor_eval.sim.render.shapes.builder import Builder, shade_of
-from infthor_eval.sim.render.shapes.palette import CHROME, DARK, WOODS, pick
+from infthor_eval.sim.render.shapes.palette import CHROME, CLOTHS, DARK, WOODS, pick
 from infthor_eval.sim.render.shapes.register import draws
 
 __all__ = ["cut_slab"]
@@ -86,26 +86,40 @@ def _legs(b: Builder, under: float, thick: float, color: Color) -> None:
 
 
 @draws
-def table(b: Builder) -> None:
-    """A board on four square legs, for desks."""
+def desk(b: Builder) -> None:
+    """A writing mat on a board, a block of drawers at one end, a side at the other and a panel along the back."""
     color = pick(WOODS, b.style)
     under = _top(b, color, 0.7)
+    mat = min(0.8, b.thick(0.36, 0)), min(0.62, b.thick(0.22, 2))
+    b.box((0, _surface(b), 0.14), (mat[0], b.thick(0.0015, 1), mat[1]), (0.13, 0.25, 0.2))
     if b.item.hollow:
         _carcass(b, color, under)
         return
-    _legs(b, under, 0.03, shade_of(color, 0.85))
-    apron = b.thick(0.035, 1)
-    b.box((0, under - apron, 0), (0.9, apron, 0.9), shade_of(color, 0.8), Material.WOOD)
+    x, z = b.thick(0.015, 0), b.thick(0.01, 2)
+    wide = min(0.35, b.thick(0.2, 0))
+    b.span((-0.98, -1, -0.94), (-0.98 + 2 * x, under, 0.94), shade_of(color, 0.85), Material.WOOD)
+    b.span((-0.98 + 2 * x, -0.2, -0.9), (0.98 - 2 * wide, under, -0.9 + 2 * z), shade_of(color, 0.75), Material.WOOD)
+    b.span((0.98 - 2 * wide, -0.94, -0.94), (0.98, under, 0.92), shade_of(color, 0.8), Material.WOOD)
+    rise = (under + 0.94) / 3
+    for row in range(3):
+        low = -0.94 + rise * row
+        b.span((0.98 - 1.9 * wide, low + 0.03, 0.92), (0.98 - 0.1 * wide, low + rise - 0.03, 0.95),
+               shade_of(color, 1.12), Material.WOOD)  # fmt: skip
+        b.box((0.98 - wide, low + rise * 0.6, 0.965), (wide * 0.3, b.thick(0.008, 1), 0.02), CHROME, Material.METAL)
 
 
 @draws
 def dining_table(b: Builder) -> None:
-    """A large board on turned legs, thick above and slender at the foot, with a deep apron."""
+    """A large board on turned legs, thick above and slender at the foot, a deep apron, and a runner of cloth on it."""
     color = shade_of(pick(WOODS, b.style + 2), 1.05)
     under = _top(b, color, 0.6)
     if b.item.hollow:
         _carcass(b, color, under)
         return
+    runner = pick(CLOTHS, b.style)
+    edge = b.thick(0.0015, 1)
+    b.box((0, _surface(b), 0), b.lengthwise(0.999, edge, 0.3), runner, Material.FABRIC)
+    b.box((0, _surface(b), 0), b.lengthwise(0.9, edge * 1.3, 0.22), shade_of(runner, 1.3), Material.FABRIC)
     leg = shade_of(color, 0.78)
     x, z = b.thick(0.05, 0), b.thick(0.05, 2)
     low = -1 + b.thick(0.05, 1)
@@ -192,9 +206,9 @@ def shelving(b: Builder) -> None:
 @draws
 def cart(b: Builder) -> None:
     """Two trays on wheels."""
-    for level in (-0.5, 0.92):
+    for level in (-0.5, 0.94):
         b.box((0, level, 0), (1, 0.06, 1), (0.75, 0.77, 0.8), Material.METAL)
     for sx in (-1, 1):
         for sz in (-1, 1):
-            b.box((sx * 0.94, 0, sz * 0.94), (0.04, 1, 0.04), CHROME, Material.METAL)
+            b.box((sx * 0.94, 0, sz * 0.94), (0.04, 0.98, 0.04), CHROME, Material.METAL)
             b.ball((sx * 0.94, -0.95, sz * 0.94), (0.08, 0.06, 0.08), DARK)
