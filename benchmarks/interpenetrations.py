@@ -2,13 +2,13 @@
 
     python benchmarks/interpenetrations.py [--rooms 200] [--puts 10] [--against CHECKOUT] [--examples]
 
-For each room it looks at the drawn solids, not at the boxes of the metadata, by points within each of them: at rest,
-with each door, drawer and lid opened in turn, which shows what is inside and moves what opens, and where an agent put
-things. Two objects interpenetrate if a point of one lies deeper than a centimetre (for thin boards: beyond their middle) in a solid of the
-other, or if a solid crosses the wall of a vessel. Counted are pairs of which at least one is loose, or has just been
-opened, or which are not built into one another, and things that go through a wall of the room. It prints one JSON
-object: rooms, pairs by where they are seen, the most frequent pairs of types, and objects per room.
-"""
+For each room it looks at the drawn solids, and not at the boxes of the metadata, by points within each: at rest, with
+each door, drawer and lid opened in turn, which shows what is inside and moves what opens, and where an agent put
+things. Two objects interpenetrate if a point of one lies deeper than a centimetre (for thin boards: beyond their
+middle) in a solid of the other, or if a solid crosses the wall of a vessel. Counted are pairs of which at least one
+is loose, or has just been opened, or which are not built into one another, and things that go through a wall of the
+room. It prints one JSON object: rooms, pairs by where they are seen, the most frequent pairs of types, and objects
+per room."""
 
 import argparse
 import json
@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 DEEP = 0.01  # metres; what lies less deep in another thing touches it
+TOUCH = 0.003  # metres; thin sheets, as a table's runner, are so thick
 _KINDS = ("kitchen", "living-room", "bedroom", "bathroom")
 _EDGE = 0.98  # of a solid's half extents: points on its very surface touch what they lie on
 
@@ -91,7 +92,7 @@ class Solid:
         if self.form == Form.CYLINDER:
             inside = np.minimum((radius - away) * wide, (1 - np.abs(level)) * float(self.half[1]))
             return float(inside.max())
-        within = np.abs(level) < 0.9
+        within = (level < 0.9) & (level > TOUCH / float(self.half[1]) - 1)
         inner = within & (away < radius)
         if not inner.any():
             return 0.0
@@ -121,7 +122,7 @@ def interpenetrate(mine: list[Solid], theirs: list[Solid]) -> float:
             for points, solid in ((a.points, b), (b.points, a)):
                 deep = solid.depth(points)
                 # A thin board is gone through before anything is a centimetre deep in it.
-                if deep > min(DEEP, 0.9 * solid.thickness()) and deep > 0.002:
+                if deep > min(DEEP, 0.9 * solid.thickness()) and deep > TOUCH:
                     worst = max(worst, deep)
     return worst
 

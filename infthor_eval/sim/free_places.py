@@ -150,9 +150,14 @@ def _inner_boxes(receptacle: SimObject) -> list[Box]:
     """Return the boxes of a receptacle's own parts, as if it were open; none where things hang over or stick out."""
     if receptacle.type.overhang or receptacle.type.shape == PLAIN_BOX:
         return []
-    opened = as_open(receptacle, 1.0) if receptacle.type.encloses else receptacle
+    opened = _opened(receptacle)
     back = drawer_offset(opened) - drawer_offset(receptacle)
     return [(low - back, high - back) for low, high in part_boxes(opened, hollow=True)]
+
+
+def _opened(receptacle: SimObject) -> SimObject:
+    """Return a receptacle as it is drawn open, which shows its inside; one that hides nothing as it is."""
+    return as_open(receptacle, 1.0) if receptacle.type.encloses else receptacle
 
 
 def _outer_boxes(other: SimObject, surface: Surface, low: Array, high: Array) -> Iterator[Box]:
@@ -186,7 +191,9 @@ def _room_walls(world: World, point: Array) -> Iterator[Box]:
 
 def _inner_walls(receptacle: SimObject) -> list[Wall]:
     """Return the round walls between which things must fit; what stands in dishes may stick out."""
-    return [] if receptacle.type.overhang else vessel_walls(receptacle)
+    if receptacle.type.overhang:
+        return []
+    return vessel_walls(_opened(receptacle))
 
 
 def _sort_by_reach(world: World, listed: list[Surface]) -> list[Surface]:
