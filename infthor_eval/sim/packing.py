@@ -14,6 +14,7 @@ from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.instances import class_color, instance_color
 from infthor_eval.sim.metadata import Outcome, agent_metadata, object_metadata
 from infthor_eval.sim.render.arm import ARM
+from infthor_eval.sim.render.hand import HAND
 from infthor_eval.sim.render.shell import SHELL_NAMES
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
@@ -72,7 +73,7 @@ class MetadataPacker:
         return parts
 
     def _color_list(self, sim: Simulation) -> bytes:
-        ids, agent = tuple(sim.world.objects), () if sim.world.arm is None else (ARM,)
+        ids, agent = tuple(sim.world.objects), (HAND,) if sim.world.arm is None else (ARM,)
         if self._colors is None or self._colors[0] != (*ids, *agent):
             types = sorted({o.object_type for o in sim.world.objects.values()} | {*SHELL_NAMES, *agent})
             colors: list[dict[str, Any]] = [{"name": i, "color": list(instance_color(i))} for i in ids]

@@ -9,7 +9,7 @@ from infthor_eval.sim.cameras import ThirdPartyCamera, agent_camera, map_camera,
 from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.render.arm import ARM, arm_rows
 from infthor_eval.sim.render.camera import PinholeCamera
-from infthor_eval.sim.render.hand import held_rows
+from infthor_eval.sim.render.hand import HAND, held_rows
 from infthor_eval.sim.render.picture import Picture, Rasterizer, cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.scene import SceneModel
 from infthor_eval.sim.settings import SimulatorSettings
@@ -87,7 +87,7 @@ class Views:
             if not len(rows):
                 return view
             if self._world.held is not None:
-                rows = held_rows(rows, self._world.objects[self._world.held], view.camera)
+                rows = held_rows(rows, self._world.objects[self._world.held], view.camera, len(names) - 1)
             self._frame = cast_picture(rows, names, view.camera, self._display.rasterizer, view)
             self._frame_arm_version = arm_version
         return self._frame
@@ -96,7 +96,7 @@ class Views:
         """Return the primitives of the agent's arm, or of what its hand holds, and the names of all instances."""
         _, held, names = self.primitives()
         if self._world.arm is None:
-            return held, names
+            return held, (*names, HAND)
         return arm_rows(self._world.arm, self._world.agent, len(names)), (*names, ARM)
 
     def third_party(self, camera: ThirdPartyCamera) -> Picture:

@@ -6,9 +6,10 @@ import pytest
 from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.fifo import FieldType
 from infthor_eval.sim.geometry import euler_matrix
-from infthor_eval.sim.instances import instance_color
+from infthor_eval.sim.instances import class_color, instance_color
 from infthor_eval.sim.object_types import OBJECT_TYPES, type_named
 from infthor_eval.sim.render.camera import PinholeCamera, project
+from infthor_eval.sim.render.hand import HAND
 from infthor_eval.sim.render.lighting import Lights
 from infthor_eval.sim.render.picture import cast_picture, choose_rasterizer, colour_picture
 from infthor_eval.sim.render.primitives import Form, Material, ShapePart, rows
@@ -173,6 +174,30 @@ def test_a_held_object_floats_in_the_lower_middle():
     assert 70 < columns.mean() < 130
     assert rows_.mean() > 120
     assert len(rows_) > 300
+
+
+@pytest.mark.parametrize(
+    ("scene", "object_type"), [("kitchen-1", "Mug"), ("kitchen-1", "Knife"), ("bedroom-1", "Pillow")]
+)
+def test_a_gripper_at_the_lower_edge_holds_what_is_held(scene, object_type):
+    bench = Bench(size=150)
+    bench.reset(scene, renderInstanceSegmentation=True)
+
+    def shown(name: str) -> np.ndarray:
+        pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(150, 150, 4)[::-1, :, :3]
+        color = instance_color(name) if "|" in name else class_color(name)
+        return (pixels == color).all(axis=2)
+
+    assert not shown(HAND).any()
+    held = bench.first(object_type)
+    bench.ok("PickupObject", objectId=held, forceAction=True)
+    hand, thing = shown(HAND), shown(held)
+    assert 0.001 < hand.mean() < 0.02
+    assert hand[-1].any(), "it comes from the lower edge"
+    columns, held_columns = np.nonzero(hand)[1], np.nonzero(thing)[1]
+    assert columns.min() - 3 <= held_columns.mean() <= columns.max() + 3
+    assert np.nonzero(thing)[0].min() < np.nonzero(hand)[0].min(), "what is held stands out above it"
+    assert HAND in {entry["name"] for entry in bench.metadata["colors"]}
 
 
 @pytest.mark.parametrize(("scene", "object_type"), [("living-room-1", "Box"), ("bedroom-1", "Pillow")])

@@ -46,8 +46,9 @@ def _basin(b: Builder, steel: bool) -> None:
     """A tub with a drain."""
     color = shade_of(STEEL, 1.12) if steel else _CERAMIC
     b.open_top(color, Material.METAL if steel else Material.PLAIN, 0.014, b.floor, glow=0.22)
-    b.tube((0, b.floor, 0), (b.thick(0.04, 0), b.thick(0.001, 1), b.thick(0.04, 2)), CHROME, Material.METAL)
-    b.tube((0, b.floor, 0), (b.thick(0.028, 0), b.thick(0.002, 1), b.thick(0.028, 2)), DARK)
+    level = b.floor - b.thick(0.001, 1)
+    b.tube((0, level, 0), (b.thick(0.04, 0), b.thick(0.0015, 1), b.thick(0.04, 2)), CHROME, Material.METAL)
+    b.tube((0, level, 0), (b.thick(0.028, 0), b.thick(0.002, 1), b.thick(0.028, 2)), DARK)
 
 
 @draws

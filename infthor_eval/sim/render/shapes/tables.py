@@ -91,7 +91,8 @@ def desk(b: Builder) -> None:
     color = pick(WOODS, b.style)
     under = _top(b, color, 0.7)
     mat = min(0.8, b.thick(0.36, 0)), min(0.62, b.thick(0.22, 2))
-    b.box((0, _surface(b), 0.14), (mat[0], b.thick(0.0015, 1), mat[1]), (0.13, 0.25, 0.2))
+    level = _surface(b) - b.thick(0.001, 1)  # it stands out by half a millimetre: things stand on the board
+    b.box((0, level, 0.14), (mat[0], b.thick(0.0015, 1), mat[1]), (0.13, 0.25, 0.2))
     if b.item.hollow:
         _carcass(b, color, under)
         return
@@ -117,9 +118,9 @@ def dining_table(b: Builder) -> None:
         _carcass(b, color, under)
         return
     runner = pick(CLOTHS, b.style)
-    edge = b.thick(0.0015, 1)
-    b.box((0, _surface(b), 0), b.lengthwise(0.999, edge, 0.3), runner, Material.FABRIC)
-    b.box((0, _surface(b), 0), b.lengthwise(0.9, edge * 1.3, 0.22), shade_of(runner, 1.3), Material.FABRIC)
+    level, half = _surface(b) - b.thick(0.001, 1), b.thick(0.0015, 1)  # half a millimetre above the board
+    b.box((0, level, 0), b.lengthwise(0.999, half, 0.3), runner, Material.FABRIC)
+    b.box((0, level, 0), b.lengthwise(0.9, half * 1.3, 0.22), shade_of(runner, 1.3), Material.FABRIC)
     leg = shade_of(color, 0.78)
     x, z = b.thick(0.05, 0), b.thick(0.05, 2)
     low = -1 + b.thick(0.05, 1)
