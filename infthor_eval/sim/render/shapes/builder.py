@@ -97,7 +97,9 @@ class Builder:
         start, end = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         self.box((start + end) / 2, (end - start) / 2, color, material, glow=glow)
 
-    def open_front(self, outside: Color, inside: Color, material: Material, floor: float, glow: float = 0.0) -> None:
+    def open_front(
+        self, outside: Color, inside: Color, material: Material, floor: float, *, glow: float = 0.0, top: bool = True
+    ) -> None:
         """Add a box without its front: five boards, `WALL` thick with a lining in a colour of its own.
 
         Args:
@@ -105,22 +107,37 @@ class Builder:
             material: surface pattern of both.
             floor: thickness of the lower board, metres.
             glow: share of light of its own of the lining.
+            top: whether it has an upper board: sinks hang in cabinets without.
         """
         board, below = WALL - _LINING, floor - _LINING
-        self._boards(0.0, 0.0, board, below, outside, material, 0.0)
-        self._boards(board, below, _LINING, _LINING, inside, material, glow)
+        self._boards((0.0, 0.0), (board, below), outside, material, 0.0, top)
+        self._boards((board, below), (_LINING, _LINING), inside, material, glow, top)
 
     def _boards(
-        self, inset: float, rise: float, thick: float, below: float, color: Color, material: Material, glow: float
+        self,
+        inset: tuple[float, float],
+        thick: tuple[float, float],
+        color: Color,
+        material: Material,
+        glow: float,
+        top: bool,
     ) -> None:
-        """Add back, sides, top and bottom, metres from sides and underside; `below`: thickness of the bottom."""
+        """Add back, sides, bottom and, with `top`, the upper board.
+
+        Args:
+            inset: metres from the box's sides, and from its underside.
+            thick: thickness in metres of all but the bottom, and of the bottom.
+            color, material, glow: of all boards.
+            top: whether there is an upper board.
+        """
         size = 2 * self.half
-        (x, y, z), (dx, dy, dz) = inset / size * 2, thick / size * 2
-        low, floor, back = self.level(rise), self.level(rise + below), -1 + z + dz
+        (x, y, z), (dx, dy, dz) = inset[0] / size * 2, thick[0] / size * 2
+        low, floor, back = self.level(inset[1]), self.level(inset[1] + thick[1]), -1 + z + dz
         self.span((x - 1, low, z - 1), (1 - x, 1 - y, back), color, material, glow=glow)
         self.span((x - 1, low, back), (x - 1 + dx, 1 - y, 1), color, material, glow=glow)
         self.span((1 - x - dx, low, back), (1 - x, 1 - y, 1), color, material, glow=glow)
-        self.span((x - 1 + dx, 1 - y - dy, back), (1 - x - dx, 1 - y, 1), color, material, glow=glow)
+        if top:
+            self.span((x - 1 + dx, 1 - y - dy, back), (1 - x - dx, 1 - y, 1), color, material, glow=glow)
         self.span((x - 1 + dx, low, back), (1 - x - dx, floor, 1), color, material, glow=glow)
 
     def open_top(self, color: Color, material: Material, wall: float, floor: float, glow: float = 0.0) -> None:

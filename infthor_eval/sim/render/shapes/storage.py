@@ -13,7 +13,7 @@ _TRAY = 0.9  # top of a drawer's sides, in fractions: a little lower than its fr
 _COLD: Color = (0.93, 0.97, 1.0)
 _TINTED: Color = (0.55, 0.76, 0.84)
 _WINDOW: Color = (0.13, 0.14, 0.16)
-_GLASS_END = 0.6  # front edge of a fridge's glass shelves, in fractions
+_GLASS_END = 0.76  # of a fridge's shelves, in fractions: one looks down past them onto the lower ones
 
 
 def _door(b: Builder, color: Color, material: Material, grip: Color, low: float = -1.0, high: float = 1.0) -> None:
@@ -35,10 +35,14 @@ def cabinet(b: Builder) -> None:
     """A cupboard of wood with one door."""
     color = pick(WOODS, b.style // 7 if b.item.asset_id else 2)
     if b.state.openness > 0:
-        b.open_front(shade_of(color, 0.8), shade_of(color, 1.2), Material.WOOD, b.item.floors[0], glow=_LIT)
+        b.open_front(shade_of(color, 0.8), shade_of(color, 1.2), Material.WOOD, b.item.floors[0], glow=_LIT,
+                     top=not b.item.hollow)  # fmt: skip
     elif not b.item.hollow:
         back = b.thick(_LEAF, 2)
         b.box((0, 0, -back / 2), (1, 1, 1 - back / 2), shade_of(color, 0.8), Material.WOOD)
+    else:  # nothing but a panel behind the door, so that the wall is not seen past its edges
+        leaf = b.thick(_LEAF, 2)
+        b.span((-1, -1, 1 - 1.4 * leaf), (1, 1, 1 - leaf), shade_of(color, 0.8), Material.WOOD)
     _door(b, color, Material.WOOD, CHROME)
 
 
@@ -84,9 +88,8 @@ def _lit_inside(b: Builder, outside: Color) -> None:
     back = b.thick(WALL, 2) - 1
     for metres in b.item.floors:
         level = b.level(metres)
-        # The glass ends before the rail, so that one looks down past it, as through glass.
         b.span((-x, level - y, back), (x, level, _GLASS_END), _TINTED, Material.GLASS, glow=0.3)
-        b.span((-x, level - 2 * y, 0.86), (x, level, 0.92), shade_of(_TINTED, 0.62), glow=0.2)
+        b.span((-x, level - 2 * y, _GLASS_END), (x, level, _GLASS_END + 0.06), shade_of(_TINTED, 0.62), glow=0.2)
     b.box((0, 0.9, -0.2), (0.3, 0.02, 0.3), (1.0, 1.0, 0.9), glow=0.9)
 
 
