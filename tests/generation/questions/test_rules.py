@@ -70,7 +70,7 @@ TABLE_3 = {
 @pytest.fixture(scope="module")
 def replayed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("set")
-    jobs = [TrajectorySettings(scene, 3, 110, 1) for scene in ("kitchen-3", "kitchen-5")]
+    jobs = [TrajectorySettings(scene, 4, 110, 1) for scene in ("kitchen-3", "kitchen-5")]
     with Simulator(embedded_launch()) as simulator:
         generate_set(jobs, simulator, folder / "trajectories")
         assert summarise(replay_set(select([folder / "trajectories"]), simulator, folder)).complete == 2
@@ -218,12 +218,12 @@ def test_a_log_without_what_frames_show_is_skipped(replayed, tmp_path):
 
 def test_a_log_that_contradicts_itself_is_skipped_and_the_others_are_asked_about(replayed, tmp_path):
     shutil.copytree(replayed, tmp_path / "set")
-    path = tmp_path / "set/metadata/kitchen-3-seed3/metadata.json"
+    path = tmp_path / "set/metadata/kitchen-3-seed4/metadata.json"
     steps = json.loads(path.read_text())
     opened = next(step for step in steps if (step.get("action") or "").startswith("PickupObject"))
     opened["target"] = "Mug|+09.00|+09.00|+09.00"  # which is nowhere
     path.write_text(json.dumps(steps))
     made = generate_questions(tmp_path / "set", per_trajectory=10)
     (line,) = made.skipped
-    assert "kitchen-3-seed3: its log is inconsistent (no 'Mug|+09.00|+09.00|+09.00'); replay" in line
-    assert {question.traj_id for question in made.questions} == {"kitchen-5-seed3"}
+    assert "kitchen-3-seed4: its log is inconsistent (no 'Mug|+09.00|+09.00|+09.00'); replay" in line
+    assert {question.traj_id for question in made.questions} == {"kitchen-5-seed4"}
