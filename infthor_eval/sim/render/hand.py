@@ -12,7 +12,7 @@ from infthor_eval.sim.geometry import Array, euler_matrix
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.render import primitives
 from infthor_eval.sim.render.camera import PinholeCamera
-from infthor_eval.sim.render.primitives import AXES, CENTER, HALF, Color, Form, Material, ShapePart
+from infthor_eval.sim.render.primitives import AXES, BOTTOM, CENTER, FORM, HALF, TOP, Color, Form, Material, ShapePart
 
 __all__ = ["HAND", "held_rows"]
 
@@ -20,18 +20,36 @@ HAND = "Hand"  # its name in segmentation frames
 _AWAY = 0.16  # metres in front of the camera: nearer than anything that the agent can stand in front of
 _NEAREST = 0.115  # of the gripper: beyond the camera's clipping plane
 _FOOT = 0.97  # of the object's lowest point below the middle of the picture, as a share of its half height
-_SMALLEST, _GROWTH, _LARGEST = 0.11, 0.27, 0.21  # shares of the picture's height: at least, per metre of size, at most
+_SMALLEST, _GROWTH, _LARGEST = 0.105, 0.26, 0.2  # shares of the picture's height: at least, per metre of size, at most
 _TILT = euler_matrix((-24.0, 0.0, 0.0))  # towards the camera, which so sees into bowls and the faces of flat things
 _TURN = 155.0  # degrees: the front, as of screens and clocks, faces the camera and a little aside
 
 # Of the gripper, in shares of the picture's half height.
-_JAW = (0.022, 0.085, 0.04)  # half extents
-_PAD = (0.012, 0.045, 0.035)
+_JAW = (0.02, 0.075, 0.04)  # half extents
+_PAD = (0.012, 0.04, 0.035)
 _NARROWEST, _WIDEST = 0.025, 0.34  # half of the space between its jaws
-_GRASPED = 0.25  # the jaws close on this share of the object's height, from below
+_GRASPED = 0.45  # the jaws close on this share of the object's height, from below
 _STEEL: Color = (0.22, 0.23, 0.26)
 _RUBBER: Color = (0.95, 0.55, 0.1)
-_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+
+
+def _outlines() -> Array:
+    """Return points on the surface of each form of primitive, scaled by its half extents (forms, points, 3)."""
+    angles = np.arange(8) * np.pi / 4
+    ring = np.stack([np.cos(angles), np.zeros(8), np.sin(angles)], axis=1)
+    up = np.array([0.0, 1.0, 0.0])
+    box = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+    cylinder = np.concatenate([ring - up, ring + up])
+    upright = ring[:, [0, 2, 1]]
+    bowl = upright * [1.0, 2.0, 1.0] * (upright[:, [1]] < 0) + up  # the lower half of a sphere, from -1 to 1
+    by_form = {
+        Form.BOX: np.concatenate([box, box]), Form.CYLINDER: cylinder, Form.CUP: cylinder,
+        Form.ELLIPSOID: np.concatenate([ring, upright]), Form.BOWL: np.concatenate([ring + up, bowl]),
+    }  # fmt: skip
+    return np.stack([by_form[form] for form in Form])
+
+
+_OUTLINES = _outlines()
 
 
 def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) -> Array:
@@ -52,8 +70,10 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
     axes = rows[:, AXES : AXES + 9].reshape(-1, 3, 3) @ upright.T
     shown[:, AXES : AXES + 9] = axes.reshape(-1, 9)
     centers = scale * (rows[:, CENTER : CENTER + 3] - item.center) @ upright.T
-    corners = centers[:, None] + np.einsum("kj,nj,nji->nki", _CORNERS, shown[:, HALF : HALF + 3], axes)
-    points = corners.reshape(-1, 3) @ camera.matrix  # right, up and forward of the object's middle
+    outlines = _OUTLINES[rows[:, FORM].astype(int)].copy()
+    outlines[:, :, [0, 2]] *= np.where(outlines[:, :, 1] < 0, rows[:, [BOTTOM]], rows[:, [TOP]])[:, :, None]
+    surfaces = centers[:, None] + np.einsum("nkj,nj,nji->nki", outlines, shown[:, HALF : HALF + 3], axes)
+    points = surfaces.reshape(-1, 3) @ camera.matrix  # right, up and forward of the object's middle
     low, high = points.min(axis=0), points.max(axis=0)
     # At `height`, a point is drawn at (height + y) / (away + z): the one that is drawn lowest is to be at the foot.
     height = float(np.max(-_FOOT * reach / _AWAY * (_AWAY + points[:, 2]) - points[:, 1]))
