@@ -9,7 +9,7 @@ from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.receptacles import contains_box
 from infthor_eval.sim.world import World
 
-__all__ = ["obstacle_at", "occupant"]
+__all__ = ["obstacle_at", "obstacles_at", "occupant"]
 
 _SKIN = 0.005  # metres by which boxes may overlap: things that touch do
 
@@ -19,11 +19,15 @@ def obstacle_at(world: World, item: SimObject, offset: Array) -> str | None:
 
     What it touches already does not count, as the object could not be moved away from it otherwise.
     """
+    return next(obstacles_at(world, item, offset), None)
+
+
+def obstacles_at(world: World, item: SimObject, offset: Array) -> Iterator[str]:
+    """Yield the names of all that an object would run into if it were moved by `offset` (3,), see `obstacle_at`."""
     low, high = item.bounds()
     for name, box in _collisions(world, item, low + offset, high + offset):
         if not _overlaps(low, high, box):
-            return name
-    return None
+            yield name
 
 
 def occupant(world: World, pose: SimObject) -> str | None:

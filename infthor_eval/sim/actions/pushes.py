@@ -9,12 +9,11 @@ from infthor_eval.sim.actions.targets import BY_ID_OR_PIXEL, interactable
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array, yaw_matrix
 from infthor_eval.sim.simulation import Simulation
-from infthor_eval.sim.sliding import slide
+from infthor_eval.sim.sliding import LIGHTEST, slide
 
 _FRAME = 0.02  # seconds that Unity applies the force
 _FRICTION = 0.5
 _GRAVITY = 9.81
-_LIGHTEST = 0.05  # kilograms; some recorded objects have a mass of 0
 _DEFAULT_FORCE = 200.0  # newtons
 
 
@@ -54,6 +53,6 @@ def directional_push(
         raise ActionError(f"moveMagnitude must be > 0, not {moveMagnitude}")
     direction: Array = yaw_matrix(sim.world.agent.yaw + pushAngle)[:, 2]
     # The force acts for one frame; the speed it gives is then lost to friction: v^2 = 2 * friction * g * distance.
-    speed = moveMagnitude * _FRAME / max(target.type.mass, _LIGHTEST)
+    speed = moveMagnitude * _FRAME / max(target.type.mass, LIGHTEST)
     slide(sim.world, target, direction, float(np.square(speed) / (2 * _FRICTION * _GRAVITY)))
     sim.world.mark_changed()

@@ -7,6 +7,7 @@ from infthor_eval.sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, W
 from infthor_eval.sim.render.shapes.register import draws
 
 _LEAF = 0.02  # thickness of a door, metres
+_FRIDGE_GRIP = 0.022  # metres that a fridge's grips stand out within its box, as recorded in FloorPlan28
 _LIT = 0.2  # glow of the insides of open things: their contents would be hard to see otherwise
 _BODY = 0.82  # of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same share.
 _TRAY = 0.9  # top of a drawer's sides, in fractions: a little lower than its front
@@ -16,18 +17,30 @@ _WINDOW: Color = (0.13, 0.14, 0.16)
 _GLASS_END = 0.76  # of a fridge's shelves, in fractions: one looks down past them onto the lower ones
 
 
-def _door(b: Builder, color: Color, material: Material, grip: Color, low: float = -1.0, high: float = 1.0) -> None:
-    """Add a hinged door over the front from height fraction `low` to `high`, at the object's openness."""
+def _door(
+    b: Builder,
+    color: Color,
+    material: Material,
+    grip: Color,
+    low: float = -1.0,
+    high: float = 1.0,
+    grip_in: float = 0.0,
+) -> None:
+    """Add a hinged door over the front from height fraction `low` to `high`, at the object's openness.
+
+    With `grip_in`, the grip is within the object's box, and the door so many metres behind its front.
+    """
     side = b.item.hinge or -1
     width, height, depth = (float(v) for v in b.half)
     middle, half = (low + high) / 2 * height, (high - low) / 2 * height
     angle = side * DOOR_SWING * b.state.openness
     leaf = min(_LEAF / 2, depth * 0.3)
     hinge = (side, 0.0, 1.0)
-    b.hinged_box(hinge, (-side * width, middle, -leaf), (width * 0.985, half * 0.985, leaf), angle, color, material)
-    reach = 2 * width * 0.88
+    back = -leaf - grip_in
+    b.hinged_box(hinge, (-side * width, middle, back), (width * 0.985, half * 0.985, leaf), angle, color, material)
+    reach = 2 * width * (0.94 if grip_in else 0.88)
     tall = min(half * 0.35, 0.2)
-    b.hinged_box(hinge, (-side * reach, middle, 0.01), (0.008, tall, 0.01), angle, grip, Material.METAL)
+    b.hinged_box(hinge, (-side * reach, middle, 0.01 - grip_in), (0.008, tall, 0.01), angle, grip, Material.METAL)
 
 
 @draws
@@ -75,8 +88,8 @@ def fridge(b: Builder) -> None:
         b.box((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92), Material.METAL)
     else:
         _lit_inside(b, shade_of(color, 0.92))
-    _door(b, color, Material.METAL, DARK, -0.97, 0.3)
-    _door(b, shade_of(color, 1.03), Material.METAL, DARK, 0.33, 1.0)
+    _door(b, color, Material.METAL, DARK, -0.97, 0.3, _FRIDGE_GRIP)
+    _door(b, shade_of(color, 1.03), Material.METAL, DARK, 0.33, 1.0, _FRIDGE_GRIP)
     if b.state.openness > 0:
         _door_racks(b)
 
@@ -98,7 +111,7 @@ def _door_racks(b: Builder) -> None:
     side = b.item.hinge or -1
     angle = side * DOOR_SWING * b.state.openness
     width, height, _ = (float(v) for v in b.half)
-    hinge, inward = (side, 0.0, 1.0), -_LEAF
+    hinge, inward = (side, 0.0, 1.0), -_LEAF - _FRIDGE_GRIP
     for low, high in ((-0.93, 0.26), (0.37, 0.96)):
         half, middle = (high - low) / 2 * height, (high + low) / 2 * height
         b.hinged_box(hinge, (-side * width, middle, inward - 0.006), (width * 0.9, half, 0.006), angle, _COLD,
