@@ -14,7 +14,8 @@ _TRAY = 0.9  # top of a drawer's sides, in fractions: a little lower than its fr
 _COLD: Color = (0.93, 0.97, 1.0)
 _TINTED: Color = (0.55, 0.76, 0.84)
 _WINDOW: Color = (0.13, 0.14, 0.16)
-_GLASS_END = 0.76  # of a fridge's shelves, in fractions: one looks down past them onto the lower ones
+# Of a fridge's shelves, in fractions: one looks down between glass and rim onto the lower ones, as through clear glass.
+_GLASS_END, _RIM = 0.3, 0.76
 
 
 def _door(
@@ -98,11 +99,14 @@ def _lit_inside(b: Builder, outside: Color) -> None:
     """The body of an open fridge: white and bright within, shelves of tinted glass, a lamp."""
     b.open_front(outside, _COLD, Material.METAL, WALL, glow=0.45)
     x, y = 1 - b.thick(WALL, 0), b.thick(0.008, 1)
-    back = b.thick(WALL, 2) - 1
+    back, edge = b.thick(WALL, 2) - 1, b.thick(0.012, 0)
+    rim, middle, half = shade_of(_TINTED, 0.62), (_RIM + _GLASS_END) / 2, (_RIM - _GLASS_END) / 2
     for metres in b.item.floors:
         level = b.level(metres)
         b.span((-x, level - y, back), (x, level, _GLASS_END), _TINTED, Material.GLASS, glow=0.3)
-        b.span((-x, level - 2 * y, _GLASS_END), (x, level, _GLASS_END + 0.06), shade_of(_TINTED, 0.62), glow=0.2)
+        b.span((-x, level - 2 * y, _RIM), (x, level, _RIM + 0.06), rim, glow=0.2)
+        for side in (-1, 1):
+            b.box((side * (x - edge), level - y, middle), (edge, y, half), rim, glow=0.2)
     b.box((0, 0.9, -0.2), (0.3, 0.02, 0.3), (1.0, 1.0, 0.9), glow=0.9)
 
 
