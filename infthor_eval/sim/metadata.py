@@ -103,7 +103,7 @@ def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
     world, agent = sim.world, sim.world.agent
     held = None if world.held is None else world.objects[world.held]
     low, high = world.scene_bounds()
-    pose = _held_pose(world)
+    pose = _hand_pose(world)
     return {
         **_LEGACY,
         **outcome.fields(),
@@ -147,17 +147,21 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
     }
 
 
-def _held_pose(world: World) -> dict[str, Any]:
-    """Return the held object's pose in the world and in the camera's frame; all zeros where nothing is held."""
+def _hand_pose(world: World) -> dict[str, Any]:
+    """Return the hand's pose in the world and in the camera's frame; all zeros where nothing is held.
+
+    AI2-THOR calls it the held object's, but it is the hand's: 0 in the camera's frame until the hand is turned,
+    however the object lies in it.
+    """
     if world.held is None:
         return dict.fromkeys(("position", "rotation", "localPosition", "localRotation"), round_xyz(np.zeros(3)))
-    item, agent = world.objects[world.held], world.agent
+    agent, hand = world.agent, world.hand
     camera = agent.camera_matrix()
     return {
-        "position": round_xyz(item.position),
-        "rotation": round_xyz(item.rotation),
-        "localPosition": round_xyz(camera.T @ (item.position - agent.camera_position())),
-        "localRotation": round_xyz(matrix_euler(camera.T @ item.matrix)),
+        "position": round_xyz(agent.camera_position() + camera @ hand.offset),
+        "rotation": round_xyz(matrix_euler(camera @ hand.turn)),
+        "localPosition": round_xyz(hand.offset),
+        "localRotation": round_xyz(matrix_euler(hand.turn)),
     }
 
 

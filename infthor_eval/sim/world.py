@@ -16,7 +16,7 @@ from infthor_eval.sim.objects import SimObject
 __all__ = ["FLOOR_STYLES", "RoomShell", "Wall", "World"]
 
 FLOOR_STYLES = ("wood", "tiles", "carpet")
-_HAND = np.array([0.0, -0.16, 0.38])  # where AI2-THOR holds an object, in the camera's frame, metres
+_HAND = Grip(np.array([0.0, -0.16, 0.38]), np.eye(3))  # where AI2-THOR has its agent's hand, in the camera's frame
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,8 @@ class World:
         walls: walls of rooms that are not `walled`.
         open_at_start: ids of the objects that are open in the recording; its cells already go around them.
         templates: copies of the loose objects as the scene first had them, by type.
-        grip: pose of the held object in the hand; None for the usual one after a pick-up.
+        grip: pose of the held object in the camera's frame; None for the usual one after a pick-up.
+        hand: pose of the hand in the camera's frame; the held object keeps its place in it.
         arm: the agent's arm; None for an agent that holds things in front of its camera.
         disabled: objects that are out of the scene until they are enabled again, by id.
         unbreakable: types of objects that no fall breaks.
@@ -95,6 +96,7 @@ class World:
     open_at_start: frozenset[str] = frozenset()
     templates: dict[str, list[SimObject]] = field(default_factory=dict)
     grip: Grip | None = None
+    hand: Grip = _HAND
     arm: Arm | None = None
     disabled: dict[str, SimObject] = field(default_factory=dict)
     unbreakable: set[str] = field(default_factory=set)
@@ -193,7 +195,7 @@ class World:
             keep_grip: leave the object as it was moved in the hand; else the hand returns to its usual place.
         """
         if not keep_grip:
-            self.grip = None
+            self.grip, self.hand = None, _HAND
         if self.held is not None:
             self.set_pose(self.objects[self.held], *self._held_pose(self.objects[self.held]))
         if self.arm is not None:
@@ -212,7 +214,7 @@ class World:
     def _held_pose(self, item: SimObject) -> tuple[Array, Array]:
         if self.grip is None:  # upright, turned with the agent, the middle of its box at the hand
             turn = np.array([item.rotation[0], self.agent.yaw, item.rotation[2]])
-            hand = self.agent.camera_position() + self.agent.camera_matrix() @ _HAND
+            hand = self.agent.camera_position() + self.agent.camera_matrix() @ _HAND.offset
             return hand - euler_matrix(turn) @ item.box_center, turn
         camera = self.agent.camera_matrix()
         return self.agent.camera_position() + camera @ self.grip.offset, matrix_euler(camera @ self.grip.turn)
@@ -226,6 +228,7 @@ class World:
         """Let go of one object, if it is held, with its contents; it stays where it is."""
         if item.object_id == self.held:
             self.held = self.grip = None
+            self.hand = _HAND
         if self.arm is not None:
             for part in (item, *self.descendants(item)):
                 part.state.picked_up = part.state.picked_up and part.object_id not in self.arm.held
@@ -233,11 +236,13 @@ class World:
         item.state.picked_up = False
         self.mark_changed(item)
 
-    def move_in_hand(self, position: Array, matrix: Array) -> None:
-        """Move the held object in the hand to a position (3,) and rotation (3, 3) in the world."""
+    def move_hand(self, hand: Grip) -> None:
+        """Move the hand to a pose in the camera's frame; what it holds moves and turns as it does."""
         assert self.held is not None
-        camera = self.agent.camera_matrix()
-        self.grip = Grip(camera.T @ (position - self.agent.camera_position()), camera.T @ matrix)
+        item, camera = self.objects[self.held], self.agent.camera_matrix()
+        offset = camera.T @ (item.position - self.agent.camera_position()) + hand.offset - self.hand.offset
+        self.grip = Grip(offset, hand.turn @ self.hand.turn.T @ camera.T @ item.matrix)
+        self.hand = hand
         self.carry(keep_grip=True)
 
     def set_pose(self, item: SimObject, position: Array, rotation: Array) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.actions.targets import held_object
+from infthor_eval.sim.agent import Grip
 from infthor_eval.sim.clearance import obstacle_at
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.falling import let_fall
@@ -59,14 +60,18 @@ for _name, _direction in _DIRECTIONS.items():
 def rotate_held_object(
     sim: Simulation, pitch: float = 0.0, yaw: float = 0.0, roll: float = 0.0, rotation: Vector3 | None = None
 ) -> None:
-    """Turn the held object by angles about its own axes, or to a rotation relative to the camera."""
-    held = held_object(sim, "Need to be holding something to rotate it!")
+    """Turn the hand, with what it holds, by angles about the hand's own axes, or to a rotation relative to the camera.
+
+    The axes are the hand's and not the object's: an object that lies in the hand stays lying in it.
+    """
+    held_object(sim, "Need to be holding something to rotate it!")
+    hand = sim.world.hand
     if rotation is None:
         # Unity's roll is positive to the right, the reverse of its rotation about z.
-        turned = held.matrix @ euler_matrix((pitch, yaw, -roll))
+        turned = hand.turn @ euler_matrix((pitch, yaw, -roll))
     else:
-        turned = sim.world.agent.camera_matrix() @ euler_matrix(to_array(rotation))
-    sim.world.move_in_hand(held.position, turned)
+        turned = euler_matrix(to_array(rotation))
+    sim.world.move_hand(Grip(hand.offset, turned))
     sim.world.mark_changed()
 
 
@@ -82,5 +87,5 @@ def _move_held(sim: Simulation, step: Array, force_visible: bool) -> None:
     obstacle = obstacle_at(world, held, offset)
     if obstacle is not None:
         raise ActionError(f"{obstacle} is blocking the held object from moving there.")
-    world.move_in_hand(held.position + offset, held.matrix)
+    world.move_hand(Grip(world.hand.offset + step, world.hand.turn))
     world.mark_changed()
