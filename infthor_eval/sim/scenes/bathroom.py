@@ -45,7 +45,7 @@ def _place_washstand(plan: RoomPlan, at: float) -> None:
     top = plan.place_against("z+", "CounterTop", at, y=_TOP - 0.04, size=(width, 0.04, 0.55), gap=0.01)
     top.support = None
     sink = plan.place_against("z+", "Sink", at, y=_TOP - 0.15, size=(0.5, 0.152, 0.4), gap=0.08)
-    basin = plan.place_against("z+", "SinkBasin", at, y=_TOP - 0.15, size=(0.44, 0.145, 0.34), gap=0.1)
+    basin = plan.place_against("z+", "SinkBasin", at, y=_TOP - 0.149, size=(0.44, 0.144, 0.34), gap=0.1)
     name_after(sink, basin)
     top.pieces, sink.pieces = rim_pieces(top, sink), rim_pieces(sink, basin)
     plan.place_against("z+", "Faucet", at, y=_TOP, size=(0.14, 0.2, 0.16), gap=0.03)

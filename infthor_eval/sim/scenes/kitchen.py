@@ -71,7 +71,7 @@ def _place_lower_cabinet(plan: RoomPlan, at: float, index: int, drawer: bool) ->
 
 def _place_sink(plan: RoomPlan, top: SimObject, at: float) -> None:
     sink = plan.place_against("z+", "Sink", at, y=_HEIGHT - 0.17, size=(0.56, 0.172, 0.46), gap=0.1)
-    basin = plan.place_against("z+", "SinkBasin", at, y=_HEIGHT - 0.17, size=(0.5, 0.165, 0.38), gap=0.12)
+    basin = plan.place_against("z+", "SinkBasin", at, y=_HEIGHT - 0.169, size=(0.5, 0.164, 0.38), gap=0.12)
     name_after(sink, basin)
     faucet = plan.place_against("z+", "Faucet", at, y=_HEIGHT, size=(0.16, 0.28, 0.2), gap=0.04)
     faucet.style = 0
