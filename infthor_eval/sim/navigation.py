@@ -47,17 +47,12 @@ class NavGrid:
         return min(self._cells.values(), key=lambda cell: ((cell[0] - x) ** 2 + (cell[1] - z) ** 2, cell))
 
     def can_walk(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
-        """Return whether the agent can stand all along the straight way from `start` to `end`, checked each 0.1 m.
-
-        An agent that was put down beside the grid can walk back to it.
-        """
-        beside = None if self.can_stand(*start) else self._key(*start)
+        """Return whether the agent can stand all along the straight way from `start` to `end`, checked each 0.1 m."""
         steps = max(1, math.ceil(math.dist(start, end) / 0.1))
-        way = [
-            (start[0] + (end[0] - start[0]) * i / steps, start[1] + (end[1] - start[1]) * i / steps)
+        return all(
+            self.can_stand(start[0] + (end[0] - start[0]) * i / steps, start[1] + (end[1] - start[1]) * i / steps)
             for i in range(1, steps + 1)
-        ]
-        return self.can_stand(*end) and all(self.can_stand(x, z) or self._key(x, z) == beside for x, z in way)
+        )
 
     def reachable_cells(self, x: float, z: float) -> list[tuple[float, float]]:
         """Return the cells connected to the one at (x, z) by steps of one cell, sorted."""
@@ -70,7 +65,7 @@ class NavGrid:
         if size == CELL and yaw % 90 == 0 and start is not None and math.dist(start, (x, z)) < _SAME:
             return self.reachable_cells(x, z)
         ahead = (math.sin(math.radians(yaw)) * size, math.cos(math.radians(yaw)) * size)
-        reached = {(0, 0): (x, z)}  # by whole steps aside and ahead; the agent may stand beside the grid itself
+        reached = {(0, 0): (x, z)}  # by whole steps aside and ahead
         queue = deque(reached)
         while queue:
             key = queue.popleft()
@@ -79,7 +74,7 @@ class NavGrid:
                 if other not in reached and self.can_walk(reached[key], point):
                     reached[other] = point
                     queue.append(other)
-        return sorted((round(px, 6), round(pz, 6)) for px, pz in reached.values() if self.can_stand(px, pz))
+        return sorted((round(px, 6), round(pz, 6)) for px, pz in reached.values())
 
     def path(self, start: tuple[float, float], end: tuple[float, float]) -> list[tuple[float, float]] | None:
         """Return a shortest path of cells from `start` to the cell of `end`; None if there is none."""

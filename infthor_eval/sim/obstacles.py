@@ -6,10 +6,9 @@ from infthor_eval.sim.geometry import Array, aabb_overlap, level_gaps, yaw_matri
 from infthor_eval.sim.objects import DOOR_SWING, DRAWER_SLIDE, SimObject
 from infthor_eval.sim.world import World
 
-__all__ = ["blocking_object", "door_leaf", "has_room", "held_object_blocks", "nearest_name"]
+__all__ = ["blocking_object", "door_leaf", "held_object_blocks", "nearest_name"]
 
 _RADIUS = 0.2  # of the agent's capsule, metres
-_BESIDE = 0.26  # metres from a cell within which the agent may stand beside the grid
 _KNEE, _HEAD = 0.15, 1.5  # heights in metres between which a door stops the agent
 
 
@@ -47,22 +46,6 @@ def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
         points = [(p[0], y, p[2]) for p in (hinge, edge) for y in (-height / 2, height / 2)]
     world = np.array(points) @ matrix.T + item.center
     return world.min(axis=0), world.max(axis=0)
-
-
-def has_room(world: World, target: Array) -> bool:
-    """Return whether the agent fits at a place beside the grid: next to one of its cells, and clear of all boxes.
-
-    A teleport asks Unity for collisions alone, while the grid has only the places that the agent was seen to walk to.
-    """
-    x, z = world.nav.nearest(float(target[0]), float(target[2]))
-    if np.hypot(target[0] - x, target[2] - z) > _BESIDE:
-        return False
-    for item in world.objects.values():
-        low, high = item.bounds()
-        solid = not item.type.pickupable and item.object_type != "Floor" and high[1] > _KNEE and low[1] < _HEAD
-        if solid and level_gaps(target[[0, 2]], low, high) < _RADIUS:
-            return False
-    return True
 
 
 def held_object_blocks(world: World, target: Array) -> bool:

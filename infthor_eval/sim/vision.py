@@ -18,9 +18,6 @@ from infthor_eval.sim.world import World
 __all__ = ["AgentVision"]
 
 _PIXEL_SHARE = 2.5e-5  # of a picture's pixels that must show an object for it to be visible: 2 pixels at 300x300
-# A pose must show so much, of the picture or of what the object would fill of it: Unity looks for points all over an
-# object, and not for a corner at the frame's edge.
-_POSE_SHARE, _OWN_SHARE = 0.008, 0.05
 _INNER_FRAME = 0.9  # of half the frame: what is nearer to its edge may be cut off
 _TOUCHING = 0.05  # metres around a receptacle's box within which an object still counts as in it
 
@@ -89,14 +86,10 @@ class AgentVision:
         rows, _, names = self._views.primitives()
         return VisibilityProbe(rows, names.index(item.object_id), self._display.rasterizer)
 
-    def sees_from(self, agent: Agent, item: SimObject, probe: VisibilityProbe) -> bool:
-        """Return whether the agent would see an object, at any distance, in the pose of `agent`; `probe` is its own."""
+    def sees_from(self, agent: Agent, probe: VisibilityProbe) -> bool:
+        """Return whether the agent would see the probe's object, at any distance, in the pose of `agent`."""
         camera = agent_camera(agent, self.settings.field_of_view, self._display.width, self._display.height)
-        focal = camera.height / 2 / np.tan(np.radians(camera.field_of_view) / 2)
-        distance = max(float(np.linalg.norm(item.center - camera.position)), NEAR)
-        fills = float(np.prod(np.sort(item.box_size)[1:])) * (focal / distance) ** 2
-        least = min(_POSE_SHARE * camera.width * camera.height, _OWN_SHARE * fills)
-        return probe.is_seen_by(camera, max(_least_pixels(camera), round(least)))
+        return probe.is_seen_by(camera, _least_pixels(camera))
 
     def point_at(self, x: float, y: float) -> Array | None:
         """Return the point (3,) seen at (x, y), shares of the frame from its bottom left; None for the void."""

@@ -75,20 +75,10 @@ def test_interactable_poses_are_those_whose_whole_picture_shows_the_object(rende
         for pose in product(places, (-30.0, 0.0, 30.0, 60.0), (0.0, 90.0, 180.0, 270.0), (True, False)):
             place, tilt, turn, standing = pose
             world.agent = Agent(to_array(place), turn, tilt, standing)
-            if target in bench.sim.vision.visible_ids() and shows_enough(bench.sim, target):
+            if target in bench.sim.vision.visible_ids():
                 slow.append({**place, "rotation": turn, "standing": standing, "horizon": tilt})
         assert poses == slow
         assert slow
-
-
-def shows_enough(sim, target):
-    """Whether 0.8 % of the picture shows the object, or a twentieth of the pixels that its largest side would fill."""
-    view, item = sim.views.agent_view(), sim.world.objects[target]
-    away = np.linalg.norm(item.center - view.camera.position)
-    metres = away * 2 * np.tan(np.radians(view.camera.field_of_view) / 2) / view.camera.height  # that a pixel covers
-    side = np.prod(sorted(item.box_size)[1:]) / metres**2
-    shown = (view.instances == view.names.index(target)).sum()
-    return shown >= round(min(0.008 * view.instances.size, 0.05 * side))
 
 
 def test_interactable_poses_can_be_narrowed(bench):

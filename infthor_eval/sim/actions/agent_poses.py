@@ -70,7 +70,6 @@ def _seeing_poses(
     for position, tilt, turn, standing in poses:
         if sim.vision.sees_from(
             replace(sim.world.agent, position=to_array(position), yaw=turn % 360.0, horizon=tilt, standing=standing),
-            item,
             probe,
         ):
             yield {**position, "rotation": turn, "standing": standing, "horizon": tilt}

@@ -6,7 +6,7 @@ from infthor_eval.sim.actions.registry import Vector3, action
 from infthor_eval.sim.agent import MAX_DOWN, MAX_UP
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import Array
-from infthor_eval.sim.obstacles import blocking_object, has_room, nearest_name
+from infthor_eval.sim.obstacles import blocking_object, nearest_name
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
 
@@ -74,6 +74,6 @@ def _place_on_floor(world: World, target: Array, horizon: float) -> Array:
             " Consider using `forceAction=true` if you'd like to teleport anyway."
         )
     obstacle = blocking_object(world, placed)
-    if obstacle is not None or not (world.nav.can_stand(target[0], target[2]) or has_room(world, placed)):
+    if obstacle is not None or not world.nav.can_stand(target[0], target[2]):
         raise ActionError(f"Cannot teleport due to hitting object '{obstacle or nearest_name(world, placed)}'.")
     return placed
