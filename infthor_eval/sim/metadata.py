@@ -7,8 +7,8 @@ import numpy as np
 
 from infthor_eval.sim.arm.metadata import arm_metadata
 from infthor_eval.sim.cameras import ThirdPartyCamera
-from infthor_eval.sim.geometry import corners, matrix_euler, round_vector, round_xyz
-from infthor_eval.sim.objects import SimObject
+from infthor_eval.sim.geometry import Array, corners, matrix_euler, round_vector, round_xyz
+from infthor_eval.sim.objects import DOOR_SWING, SimObject
 from infthor_eval.sim.obstacles import door_leaf
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.world import World
@@ -92,7 +92,7 @@ def object_metadata(item: SimObject) -> dict[str, Any]:
         "isMoving": False,
         "axisAlignedBoundingBox": _axis_aligned(item),
         # Null for fixed things, as in Unity.
-        "objectOrientedBoundingBox": {"cornerPoints": [round_vector(c) for c in item.oriented_corners()]}
+        "objectOrientedBoundingBox": {"cornerPoints": [round_vector(c) for c in _corners_with_lid(item)]}
         if movable
         else None,
     }
@@ -165,9 +165,20 @@ def _hand_pose(world: World) -> dict[str, Any]:
     }
 
 
+def _corners_with_lid(item: SimObject) -> Array:
+    """Return the 8 corners (8, 3) of an object's box, turned with it, which is higher by what its open lid stands up.
+
+    Only the metadata has the higher box: the lid's room is above the object's back and keeps nothing from its top.
+    """
+    lid = item.type.lid * float(item.front_size[2])
+    rise = np.array([0.0, lid * np.sin(np.radians(DOOR_SWING * item.state.openness)), 0.0])
+    return corners(item.center + item.matrix @ rise / 2, item.box_size + rise, item.matrix)
+
+
 def _axis_aligned(item: SimObject) -> dict[str, Any]:
-    """Return the box around an object and its open door or drawer."""
-    low, high = item.bounds()
+    """Return the box around an object and its open lid, door or drawer."""
+    points = _corners_with_lid(item)
+    low, high = points.min(axis=0), points.max(axis=0)
     leaf = door_leaf(item) if item.state.openness > 0 else None
     if leaf is not None:
         low, high = np.minimum(low, leaf[0]), np.maximum(high, leaf[1])

@@ -88,3 +88,21 @@ def test_an_open_laptop_takes_the_room_above_it(bench):
     assert occupant(bench.sim.world, pen) == laptop.name
     bench.ok("CloseObject", objectId=laptop.object_id, forceAction=True)
     assert occupant(bench.sim.world, pen) != laptop.name
+
+
+@pytest.mark.parametrize(("kind", "share"), [("Kettle", 0.4), ("LaundryHamper", 1.0)])
+def test_a_lid_stands_up_while_it_is_open(bench, kind, share):
+    item = default_object(kind, np.array([0.0, 1.2, 0.0]))
+    bench.sim.world.add(item)
+    bench.ok("Pass")
+    shut = box(bench, item.object_id)
+    for openness in (1.0, 0.5):
+        bench.ok("OpenObject", objectId=item.object_id, openness=openness, forceAction=True)
+        low, high = box(bench, item.object_id)
+        rise = share * item.front_size[2] * np.sin(np.radians(85 * openness))
+        assert low == pytest.approx(shut[0], abs=2e-4)
+        assert high - shut[1] == pytest.approx([0, rise, 0], abs=2e-4)
+        oriented = np.array(bench.object(item.object_id)["objectOrientedBoundingBox"]["cornerPoints"])
+        assert np.ptp(oriented, axis=0) == pytest.approx(high - low, abs=3e-4)
+    bench.ok("CloseObject", objectId=item.object_id, forceAction=True)
+    assert np.array(box(bench, item.object_id)) == pytest.approx(np.array(shut), abs=1e-9)

@@ -32,7 +32,7 @@ TYPES = (
     ObjectType("HousePlant", (0.34, 0.65, 0.36), shape="plant", moveable=True, fillable=True),
     portable("KeyChain", (0.13, 0.01, 0.07), shape="keys", categories=("small", "lounge"), materials=("Metal",)),
     ObjectType("LaundryHamper", (0.66, 0.88, 0.51), shape="hamper", moveable=True, receptacle=True, openable=True,
-               takes=("laundry",), encloses=True, open_top=1.0),
+               takes=("laundry",), encloses=True, open_top=1.0, lid=1.0),
     portable("Newspaper", (0.33, 0.03, 0.13), shape="newspaper", categories=("lounge",), materials=("Paper",)),
     portable("Pen", (0.01, 0.01, 0.20), shape="pen", categories=("small", "stationery")),
     portable("Pencil", (0.01, 0.01, 0.18), shape="pencil", categories=("small", "stationery")),

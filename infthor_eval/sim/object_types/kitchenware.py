@@ -20,7 +20,7 @@ TYPES = (
           fillable=True, mass=0.2, materials=("Glass",), takes=("cutlery", "stationery")),
     _cutlery("Fork", (0.03, 0.02, 0.25), shape="fork"),
     portable("Kettle", (0.20, 0.19, 0.21), shape="kettle", categories=("cookware",), openable=True, fillable=True,
-             materials=("Metal",)),
+             materials=("Metal",), lid=0.4),
     _cutlery("Knife", (0.05, 0.01, 0.33), shape="knife", categories=("cutlery", "knives"), mass=0.3),
     _cutlery("Ladle", (0.09, 0.12, 0.27), shape="ladle", mass=0.5),
     _dish("Mug", (0.11, 0.10, 0.09), shape="mug", categories=("dishes", "tableware", "drinkware"), breakable=True,

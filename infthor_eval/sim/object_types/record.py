@@ -57,6 +57,7 @@ class ObjectType:
         hinged: it opens a door that can block the agent.
         slides: it slides out with its contents, as drawers do.
         unfolds: changes of its box with opening, for types without door or drawer.
+        lid: length of a lid that is hinged at its back and stands up when open, as a share of its depth; 0: no lid.
         runs_closed: it must be closed to be switched on, and switched off to be opened.
         switched_by: type of the object that switches it; it has no switch of its own.
         slice_type: type of its slices.
@@ -114,6 +115,7 @@ class ObjectType:
     hinged: bool = False
     slides: bool = False
     unfolds: tuple[Unfolding, ...] = ()
+    lid: float = 0.0
     runs_closed: bool = False
     switched_by: str = ""
     slice_type: str = ""
