@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from infthor_eval.sim.agent import AGENT_HEIGHT
 from infthor_eval.sim.geometry import Array, level_gaps
@@ -24,10 +25,9 @@ def add_door_cells(world: World) -> None:
     ALFRED's layouts have no such cells, but AI2-THOR lets its agent stand there while the door is closed. An open door
     blocks them as it blocks others, see `obstacles`.
     """
-    free = [
-        cell for cell in sorted(set(_fringe(world.nav))) if _in_reach_of_a_door(world, cell) and _clear(world, cell)
-    ]
-    world.nav = NavGrid([*world.nav, *free])
+    places = np.array(sorted(set(_fringe(world.nav)))).reshape(-1, 2)
+    free = places[_in_reach_of_a_door(world, places) & _clear(world, places)]
+    world.nav = NavGrid([*world.nav, *((float(x), float(z)) for x, z in free)])
 
 
 def _fringe(nav: NavGrid) -> Iterator[tuple[float, float]]:
@@ -40,13 +40,14 @@ def _fringe(nav: NavGrid) -> Iterator[tuple[float, float]]:
                     yield place
 
 
-def _in_reach_of_a_door(world: World, place: tuple[float, float]) -> bool:
-    return any(
-        level_gaps(np.array(place), *leaf) < _RADIUS
-        for item in world.objects.values()
-        if item.state.openness == 0
-        for leaf in _leaves(item)
-    )
+def _in_reach_of_a_door(world: World, places: Array) -> NDArray[np.bool_]:
+    """Return at which places (n, 2) the agent would touch a door or drawer on its way to wide open."""
+    reached = np.zeros(len(places), dtype=bool)
+    for item in world.objects.values():
+        if item.state.openness == 0 and (item.type.hinged or item.type.slides):
+            for leaf in _leaves(item):
+                reached |= level_gaps(places, *leaf) < _RADIUS
+    return reached
 
 
 def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
@@ -58,15 +59,14 @@ def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
             yield leaf
 
 
-def _clear(world: World, place: tuple[float, float]) -> bool:
-    """Return whether the agent's capsule touches neither an object nor the room's walls."""
-    low, high = world.scene_bounds()
+def _clear(world: World, places: Array) -> NDArray[np.bool_]:
+    """Return at which places (n, 2) the agent's capsule touches neither an object nor the room's walls."""
+    low, high = (corner[[0, 2]] for corner in world.scene_bounds())
     floor = world.standing_height - AGENT_HEIGHT
-    if min(place[0] - low[0], high[0] - place[0], place[1] - low[2], high[2] - place[1]) < _RADIUS:
-        return False
+    clear = np.minimum(places - low, high - places).min(axis=1, initial=np.inf) >= _RADIUS
     for item in world.objects.values():
         bottom, top = item.bounds()
         in_height = top[1] > floor + _KNEE and bottom[1] < floor + 2 * AGENT_HEIGHT
-        if in_height and item.object_type != "Floor" and level_gaps(np.array(place), bottom, top) < _RADIUS:
-            return False
-    return True
+        if in_height and item.object_type != "Floor":
+            clear &= level_gaps(places, bottom, top) >= _RADIUS
+    return np.asarray(clear)
