@@ -82,3 +82,27 @@ def test_the_hand_turns_by_its_own_angles(bench, turn, rotation, tilt):
     assert before["localRotation"] == {"x": 0, "y": 0, "z": 0}
     assert list(after["rotation"].values()) == pytest.approx(list(rotation), abs=1e-3)
     assert after["position"] == before["position"]
+
+
+@pytest.mark.parametrize(("angle", "axis", "sign"), [(0, "z", 1), (90, "x", 1), (180, "z", -1), (270, "x", -1),
+                                                     (-1, "z", 1), (-90, "x", -1)])  # fmt: skip
+def test_a_push_moves_a_tomato_far_and_what_is_in_its_way_along(bench, angle, axis, sign):
+    bench.ok("TeleportFull", position={"x": -3.25, "y": FLOOR, "z": -1.25}, rotation={"x": 0, "y": 0, "z": 0},
+             horizon=30, standing=True)  # fmt: skip
+    tomato, bread = bench.first("Tomato"), bench.first("Bread")
+    before, stood = bench.object(tomato)["position"], bench.object(bread)["position"]
+    bench.ok("DirectionalPush", objectId=tomato, pushAngle=angle, moveMagnitude=25)
+    assert sign * (bench.object(tomato)["position"][axis] - before[axis]) > 0.2
+    # The bread lies 14 cm beside it, towards -x.
+    assert (bench.object(bread)["position"] != stood) == ((axis, sign) == ("x", -1))
+
+
+@pytest.mark.parametrize(
+    ("at", "point"),
+    [((0.5, 0.5), (-0.3443, 1.576, -1.5)), ((0.5, 0.2), (-0.3443, 2.2694, -1.5)),
+     ((0.25, 0.5), (-0.5968, 1.576, -1.0484))],
+)  # fmt: skip
+def test_the_point_that_a_ray_from_the_screen_hits(bench, at, point):
+    stand(bench, -1.5, -1.5)
+    hit = bench.ok("GetCoordinateFromRaycast", x=at[0], y=at[1])["actionReturn"]
+    assert list(hit.values()) == pytest.approx(point, abs=1e-3)

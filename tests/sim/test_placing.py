@@ -229,3 +229,27 @@ def test_a_thing_teleported_into_the_tray_of_an_open_drawer_is_in_it_and_goes_wi
     assert bench.object(item.object_id)["parentReceptacles"] == out["parentReceptacles"] == [drawer.object_id]
     bench.ok("CloseObject", objectId=drawer.object_id, forceAction=True)
     assert bench.object(item.object_id)["position"] != out["position"]
+
+
+@pytest.mark.parametrize("scene", ["kitchen-2", "kitchen-3", "kitchen-5"])
+def test_a_push_takes_what_is_in_its_way_along_and_nothing_through_it(scene):
+    bench = Bench(size=60)
+    bench.reset(scene)
+    world = bench.sim.world
+    table = world.objects[bench.first("DiningTable")]
+    low, high = table.bounds()
+    first, second = (default_object(name, np.zeros(3)) for name in ("Apple", "Tomato"))
+    for item in world.children(table):
+        world.remove(item)
+    for number, item in enumerate((first, second)):
+        item.place_bottom(np.array([(low[0] + high[0]) / 2, table.surface_height(), low[2] + 0.2 + 0.2 * number]))
+        item.object_id = f"{item.object_type}|pushed"
+        world.add(item)
+        world.attach(item, table)
+    gap = second.bounds()[0][2] - first.bounds()[1][2]
+    angle = -bench.metadata["agent"]["rotation"]["y"]  # towards +z
+    bench.ok("DirectionalPush", objectId=first.object_id, pushAngle=angle, moveMagnitude=20, forceAction=True)
+    first, second = (world.objects[f"{name}|pushed"] for name in ("Apple", "Tomato"))
+    assert gap > 0.02
+    assert second.position[2] > low[2] + 0.41, "it was pushed along"
+    assert second.bounds()[0][2] > first.bounds()[1][2] - 0.006, "and not gone through"
