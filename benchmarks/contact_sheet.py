@@ -32,9 +32,9 @@ _NEAR = 150  # size of a close-up
 _OPEN = {"Box", "Fridge", "Drawer", "Cabinet", "Microwave", "Safe"}
 _SHAPES = ("Bowl", "AppleSliced", "BreadSliced", "TomatoSliced", "PotatoSliced", "LettuceSliced", "BaseballBat",
            "ButterKnife", "Knife", "Pencil", "Pen", "KeyChain", "Cloth", "Potato", "Pillow", "Bread", "Box", "Fridge",
-           "Drawer", "Cabinet", "SinkBasin", "DiningTable", "SideTable", "CoffeeTable", "Desk", "Apple", "Tomato", "TennisRacket",
-           "AlarmClock", "Watch", "Ladle", "Statue", "CreditCard", "CellPhone", "SaltShaker", "PepperShaker", "Microwave",
-           "Safe", "DogBed", "Lettuce")  # fmt: skip
+           "Drawer", "Cabinet", "SinkBasin", "DiningTable", "SideTable", "CoffeeTable", "Desk", "Apple", "Tomato",
+           "TennisRacket", "AlarmClock", "Watch", "Ladle", "Statue", "CreditCard", "CellPhone", "SaltShaker",
+           "PepperShaker", "Microwave", "Safe", "DogBed", "Lettuce")  # fmt: skip
 _HELD = (("kitchen-1", "Pan"), ("kitchen-2", "Bread"), ("bedroom-1", "BaseballBat"), ("living-room-1", "Box"))
 
 

@@ -100,7 +100,7 @@ def test_by_hand_a_thing_fits_in_a_round_vessel_by_its_corners():
     corners = np.array([[0.07, 0.07], [0.07, -0.07], [-0.07, 0.07], [-0.07, -0.07]])  # 0.099 m from the middle
     middle = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     assert wall.holds(middle, corners).tolist() == [True, True]  # the radius is 0.1 m below, 0.2 m above
-    assert wall.holds(middle + [0.02, 0.0, 0.0], corners).tolist() == [False, True]
+    assert wall.holds(middle + np.array([0.02, 0.0, 0.0]), corners).tolist() == [False, True]
 
 
 def test_a_thing_that_is_too_high_is_not_put_into_a_drawer():
