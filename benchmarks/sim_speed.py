@@ -108,6 +108,7 @@ def processor_time(client: Any) -> float:
 def compare(scene: str, steps: int, other: str) -> dict[str, Any]:
     """Compare this simulator with that of another checkout, see the module's docstring."""
     python, here = shlex.quote(sys.executable), str(Path(__file__).parents[1])
+    os.environ["PYTHONSAFEPATH"] = "1"  # else the folder that this is run in would come before PYTHONPATH
     result: dict[str, Any] = {"scene": scene, "rounds": 8}
     for load, init in (("rgb", {}), ("rgb_ids_depth", _FULL)):
         clients = {}
