@@ -16,13 +16,13 @@ from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.thor.frames import NoFrames
 from model_adapters import ArmDelta
 
-BOOK, CLOCK, PHONE = 19, 28, 36  # pick-ups: out of the sphere's reach; in the sphere at the start; out of reach
-INTO_BOX, ON_DRESSER, INTO_DRAWER = 26, 31, 45  # puts of the book, the clock and the phone
+BOOK, PEN, AGAIN = 7, 100, 27  # pick-ups: out of the sphere's reach; in the sphere at the start; the book once more
+ON_TABLE, ON_BED, INTO_DRAWER = 106, 53, 23  # puts of the pen, and of the book
 
 
 @pytest.fixture(scope="module")
 def room(arena):
-    """A bedroom in which seven things are picked up and put."""
+    """A bedroom in which things are picked up and put five times."""
     return arena("bedroom-2-seed7", 99)
 
 
@@ -41,19 +41,19 @@ def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
     played = [room.play(actor("still"), episode.index) for episode in room.of(ManipulationKind.PICKUP)]
     assert [record.done for record in played] == [record.starts_inside for record in played]
     assert [record.starts_inside for record in played] == [record.start_distance <= 0.5 for record in played]
-    assert [record.index for record in played if record.done] == [28, 33]  # alarm clocks on the dresser before it
+    assert [record.index for record in played if record.done] == [51, 67, 100]  # the book, a ball and a pen before it
     assert all(len(record.steps) == 1 for record in played)
     assert {record.ended for record in played} == {"done", "gave up"}
     (refused,) = room.play(actor("still"), BOOK).steps[0].refusals
     assert "refused" not in refused  # the simulator's own words
 
 
-def test_the_planner_picks_up_all_and_puts_nearly_all(room):
+def test_the_planner_picks_up_and_puts_all(room):
     picked = [room.play(actor("planner-arm"), episode.index) for episode in room.of(ManipulationKind.PICKUP)]
-    assert [record.ended for record in picked] == ["done"] * 7
+    assert [record.ended for record in picked] == ["done"] * 5
     assert all(record.reward == record.max_reward == 2 for record in picked)
     put = [room.play(actor("planner-arm"), episode.index) for episode in room.of(ManipulationKind.PUT)]
-    assert [record.index for record in put if not record.done] == [79]  # the cloth into a bowl that is too far off
+    assert [record.ended for record in put] == ["done"] * 5
 
 
 def test_the_planner_puts_into_open_drawers(arena):
@@ -72,22 +72,22 @@ def test_a_larger_sphere_takes_no_success_from_the_planner(room):
     }  # fmt: skip
     rates = [sum(found[radius]) for radius in radii]
     assert rates == sorted(rates)
-    assert rates[0] > 0 and rates[-1] == 7
+    assert rates[0] > 0 and rates[-1] == 5
 
 
 def test_equal_seeds_move_alike_and_other_seeds_and_episodes_do_not(room):
     def moved(index, seed):
         return [step.delta for step in room.play(actor("random-arm"), index, seed, max_steps=4).steps]
 
-    first = moved(PHONE, 7)
+    first = moved(AGAIN, 7)
     assert len(first) == 4 and len(set(first)) == 4
     assert moved(BOOK, 7) != first
-    assert moved(PHONE, 7) == first
-    assert moved(PHONE, 8) != first
+    assert moved(AGAIN, 7) == first
+    assert moved(AGAIN, 8) != first
 
 
 def test_a_random_arm_keeps_within_the_longest_step_and_ten_degrees(room):
-    steps = room.play(actor("random-arm"), PHONE, max_step=0.03, max_steps=20).steps
+    steps = room.play(actor("random-arm"), AGAIN, max_step=0.03, max_steps=20).steps
     moves = [step.delta[:3] for step in steps]
     assert 0.015 < max(abs(part) for move in moves for part in move) <= 0.03
     assert 0.08 < max(abs(part) for step in steps for part in step.delta[3:6]) <= math.radians(10)
@@ -97,7 +97,7 @@ def test_a_random_arm_keeps_within_the_longest_step_and_ten_degrees(room):
 # -- how an episode begins
 
 
-@pytest.mark.parametrize("index", [BOOK, CLOCK, INTO_BOX, ON_DRESSER])
+@pytest.mark.parametrize("index", [BOOK, PEN, ON_TABLE, ON_BED])
 def test_an_episode_begins_in_the_experts_pose_with_the_arm_at_rest(room, index):
     _, begun = room.begin(index)
     wanted, agent = room.states.starts[index].view.agent, begun.view.agent
@@ -111,7 +111,7 @@ def test_an_episode_begins_in_the_experts_pose_with_the_arm_at_rest(room, index)
     assert level == pytest.approx(0.4, abs=1e-3)  # ahead, as at rest
 
 
-@pytest.mark.parametrize("index", [INTO_BOX, ON_DRESSER, INTO_DRAWER])
+@pytest.mark.parametrize("index", [ON_TABLE, ON_BED, INTO_DRAWER])
 def test_of_a_put_the_wrist_is_as_high_as_the_experts_hand(room, index):
     _, begun = room.begin(index)
     start = room.states.starts[index]
@@ -120,16 +120,16 @@ def test_of_a_put_the_wrist_is_as_high_as_the_experts_hand(room, index):
 
 
 def test_an_episode_begins_alike_whatever_was_done_before(room):
-    _, fresh = room.begin(CLOCK)
-    room.play(actor("random-arm"), INTO_BOX)
-    room.play(actor("planner-arm"), ON_DRESSER)
-    _, again = room.begin(CLOCK)
+    _, fresh = room.begin(PEN)
+    room.play(actor("random-arm"), ON_TABLE)
+    room.play(actor("planner-arm"), ON_BED)
+    _, again = room.begin(PEN)
     assert again.view.objects == fresh.view.objects
     assert again.view.arm == fresh.view.arm and again.view.agent == fresh.view.agent
     assert again.distance == fresh.distance
 
 
-@pytest.mark.parametrize("index", [INTO_BOX, ON_DRESSER, INTO_DRAWER])
+@pytest.mark.parametrize("index", [ON_TABLE, ON_BED, INTO_DRAWER])
 def test_what_is_held_before_the_palm_is_nearer_to_it_than_in_the_middle(room, index):
     def distance(at_palm):
         _, begun = room.begin(index, Grasp(at_palm=at_palm))
@@ -152,7 +152,7 @@ def test_no_step_without_an_episode(room):
     environment = ArmEnvironment(room.trajectory, room.simulator)
     with pytest.raises(RuntimeError, match="no episode is under way"):
         environment.step(gripper(1.0))
-    environment, _ = room.begin(CLOCK)
+    environment, _ = room.begin(PEN)
     assert environment.step(gripper(0.0)).ended == ArmEnded.DONE
     with pytest.raises(RuntimeError, match="no episode is under way"):
         environment.step(gripper(0.0))
@@ -165,7 +165,7 @@ def test_no_step_without_an_episode(room):
     (0.5, 0.49, True), (0.5, 0.5, False), (0.7, 0.69, True), (0.7, 0.7, False), (0.2, 0.3, False),
 ])  # fmt: skip
 def test_below_the_threshold_the_hand_closes(room, threshold, value, taken):
-    environment, begun = room.begin(CLOCK, Grasp(threshold=threshold))
+    environment, begun = room.begin(PEN, Grasp(threshold=threshold))
     outcome = environment.step(gripper(value))
     target = environment.start.object_id
     assert environment.starts_inside and target in begun.view.arm.pickupable
@@ -175,7 +175,7 @@ def test_below_the_threshold_the_hand_closes(room, threshold, value, taken):
 
 @pytest.mark.parametrize(("value", "released"), [(0.49, False), (0.5, True)])
 def test_at_the_threshold_it_opens(room, value, released):
-    environment, _ = room.begin(ON_DRESSER)
+    environment, _ = room.begin(ON_BED)
     outcome = environment.step(gripper(value))
     assert (outcome.ended is not None) == released == (outcome.view.inventory == ())
     assert [call["action"] for call in outcome.calls] == ["ReleaseObject"] * released
@@ -188,11 +188,11 @@ def test_a_hand_that_closes_around_nothing_does_nothing(room):
 
 
 def test_a_hand_takes_the_target_alone_or_all_that_is_in_the_sphere(room):
-    environment, begun = room.begin(CLOCK)
+    environment, begun = room.begin(PEN)
     target, near = environment.start.object_id, set(begun.view.arm.pickupable)
     assert len(near) > 1
     assert environment.step(gripper(0.0)).view.inventory == (target,)
-    environment, _ = room.begin(CLOCK, Grasp(takes_all=True))
+    environment, _ = room.begin(PEN, Grasp(takes_all=True))
     outcome = environment.step(gripper(0.0))
     assert set(outcome.view.inventory) == near
     assert outcome.ended == ArmEnded.DONE
@@ -230,7 +230,7 @@ def over(environment, item, aside=0.0):
 
 
 def test_released_over_the_receptacle_counts(room):
-    environment, _ = room.begin(INTO_BOX)
+    environment, _ = room.begin(ON_TABLE)
     target, box = environment.start.object_id, environment.start.receptacle_id
     moved = environment.step([over(environment, environment.view.objects[box])])
     assert moved.ended is None  # over it is not in it
@@ -241,12 +241,12 @@ def test_released_over_the_receptacle_counts(room):
 
 
 def test_released_elsewhere_does_not_count(room):
-    environment, _ = room.begin(INTO_BOX)
+    environment, _ = room.begin(ON_TABLE)
     target, box = environment.start.object_id, environment.start.receptacle_id
     outcome = environment.step(gripper(1.0))
     assert outcome.ended == ArmEnded.ELSEWHERE
     assert not is_in(target, box, outcome.view)
-    record = room.play(actor("still"), INTO_BOX)
+    record = room.play(actor("still"), ON_TABLE)
     assert (record.ended, record.reward, record.done) == ("released elsewhere", 0, False)
 
 
@@ -261,7 +261,7 @@ def test_the_last_step_that_there_is_counts_and_one_fewer_is_too_few(room):
 
 
 def test_distances_are_from_the_spheres_centre_to_the_targets_box(room):
-    for index in (BOOK, INTO_BOX):
+    for index in (BOOK, ON_TABLE):
         environment, begun = room.begin(index)
         target = environment.start.receptacle_id or environment.start.object_id
         for outcome in (begun, environment.step(ArmDelta((0.05, 0, 0.02), (0, 0.1, 0), 0.49))):

@@ -1,27 +1,37 @@
-"""Bundled trajectories cut down to their first plans."""
+"""Trajectories cut down to their first plans.
 
+They are those of a bundled set as it once was, kept here: the bundled sets are made again when rooms change, and tests
+name plans by number.
+"""
+
+import gzip
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
-
-from infthor_eval.formats.packaged import packaged_folder
 
 FORK = "kitchen-2-seed4"  # put a fork in the drawer: go, pick up, look, put; then another task
 MUG = "bedroom-1-seed7"  # put a mug on the desk: go, pick up, go, put
 CANDLE = "living-room-2-seed4"  # look at a candle under the floor lamp
 
 
+@cache
+def _kept() -> dict[str, str]:
+    """The documents by their names."""
+    with gzip.open(Path(__file__).parent / "trajectories.jsonl.gz", "rt") as lines:
+        return {json.loads(line)["traj_id"]: line for line in lines}
+
+
 def cut(name: str, n_plans: int = 4, *, final: bool = False, called: str | None = None) -> dict[str, Any]:
-    """The document of a trajectory of the first sub-goals of a bundled one.
+    """The document of a trajectory of the first sub-goals of another.
 
     Args:
-        name: the bundled one.
+        name: the other one.
         n_plans: how many of its sub-goals are kept, each with an action.
         final: whether the last task that is left is its long-horizon task.
-        called: its name; the bundled one's if None.
+        called: its name; the other one's if None.
     """
-    path = packaged_folder("sets/nieh_mini") / "metadata" / name / "traj_data.json"
-    document = json.loads(path.read_text())
+    document = json.loads(_kept()[name])
     plan = document["plan"]
     plan["high_pddl"] = plan["high_pddl"][:n_plans]
     plan["low_actions"] = [low for low in plan["low_actions"] if low["high_idx"] < n_plans]
