@@ -6,7 +6,7 @@ In a wheel they are inside `infthor_eval`. In a checkout `tasks/` and `results/`
 from importlib import resources
 from pathlib import Path
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, wrap_errors
 
 __all__ = ["packaged_folder"]
 
@@ -19,6 +19,9 @@ def packaged_folder(name: str) -> Path:
     """
     package = resources.files("infthor_eval")
     for place in (package.joinpath(name), package.joinpath("..", name)):
-        if isinstance(place, Path) and place.is_dir():
-            return place.resolve()
+        with wrap_errors(
+            f"the installation lacks its data folder {name!r:.60}", "give another", catch=(OSError, ValueError)
+        ):
+            if isinstance(place, Path) and place.is_dir():
+                return place.resolve()
     raise DataError(f"the installation lacks its data folder {name!r}; install infthor-eval again")

@@ -1,8 +1,9 @@
 """Payloads of NIEH's records in the journal: replies, what memories recalled and models wrote, a judge's verdicts."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
 
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
@@ -75,7 +76,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     question_type: str
     n_clues: int
     clue_column: str
-    answers: tuple[str | int | float, ...]
+    answers: Annotated[tuple[str | int | float, ...], Meta(min_length=1)]
     file: str = ""
     guess: Guess | None = None
     shown_clues: ShownClues | None = None

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.config_form import check_config
 from infthor_eval.nieh.evaluation import NiehEvaluation
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
@@ -37,7 +38,8 @@ class NiehSuite:
         return NiehEvaluation(request)
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[NiehAnswer]]) -> NiehSummary:
-        """See `Suite.summarise`."""
+        """See `Suite.summarise`; raises DataError for a journal whose config is of another form."""
+        check_config(header)
         return summarise(header.config, records)
 
     def scores(self, record: UnitRecord[NiehAnswer]) -> Mapping[str, float]:

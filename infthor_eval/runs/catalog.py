@@ -194,7 +194,9 @@ class _Reader:
         if not isinstance(included, str):
             raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_HINT}")
         beside = path.parent / included
-        other = (beside if beside.exists() else self._shared.get(included, beside)).resolve()
+        # ValueError: a null character in the name
+        with wrap_errors(f"{path}: include is {included!r:.60}, no name of a file", _HINT, catch=(OSError, ValueError)):
+            other = (beside if beside.exists() else self._shared.get(included, beside)).resolve()
         if other in (*including, path.resolve()):
             raise DataError(f"{path}: includes {included}, which includes it; {_HINT}")
         return {**self.settings(other, (*including, path.resolve())), **config}

@@ -43,7 +43,8 @@ class StoredCommand:
     def line(self) -> str:
         """One line for a shell that resumes or repeats the run."""
         typed = [word for name, value in self.options.items() for word in _words(name, value)]
-        if any("," in value for value in dict(self.options.get("model_args") or {}).values()):
+        model_args = self.options.get("model_args")
+        if isinstance(model_args, Mapping) and any("," in str(value) for value in model_args.values()):
             typed = ["--config", str(self.path)]  # a value with a comma cannot be typed
         return shlex.join(["infthor-eval", "run", *typed])
 
@@ -84,6 +85,8 @@ def read_options(path: Path) -> dict[str, Any]:
         raise DataError(f"{path}: holds no options; {_HINT}")
     if not isinstance(options.get("model_args") or {}, dict | str):
         raise DataError(f"{path}: model_args is neither a mapping nor a text; write K: V below it, a line each")
+    if not isinstance(options.get("data") or "", str):
+        raise DataError(f"{path}: data is {options['data']!r:.60}; write the name of a folder")
     return options
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from infthor_eval.errors import SimulatorError
 
-__all__ = ["FieldType", "FifoPipes"]
+__all__ = ["FieldType", "FifoPipes", "parse_action"]
 
 _HEADER = struct.Struct("!BI")
 _ROOM = 1 << 20  # bytes; the most that Linux grants without privileges
@@ -96,7 +96,7 @@ class FifoPipes:
                 return None
             if field_type == FieldType.END_OF_MESSAGE:
                 break
-            action = _parse(field_type, body)
+            action = parse_action(field_type, body)
         if action is None:
             raise SimulatorError(
                 "the controller sent a message without an action; it must be ai2thor 5.0.0's FIFO form"
@@ -161,12 +161,19 @@ def _widen(pipe: int) -> None:
         return  # more than the system grants: the pipe stays as it is, which is slower and nothing else
 
 
-def _parse(field_type: int, body: bytes) -> dict[str, Any]:
+def parse_action(field_type: int, body: bytes) -> dict[str, Any]:
+    """Return the action in the body of a frame.
+
+    Raises:
+        SimulatorError: it is not an action message.
+    """
     if field_type != FieldType.ACTION:
         raise SimulatorError(f"the controller sent a frame of type {field_type} where an action (2) is expected")
     try:
         action = json.loads(body)
-    except ValueError as error:
+        if b"\\u" in body or b"\xed" in body:  # halves of characters, which no reply could repeat, become "?"
+            action = json.loads(json.dumps(action, ensure_ascii=False).encode(errors="replace"))
+    except (ValueError, RecursionError) as error:
         raise SimulatorError(f"the controller sent an action that is not JSON ({error})") from error
     if not isinstance(action, dict):
         raise SimulatorError("the controller sent an action that is not a JSON object")

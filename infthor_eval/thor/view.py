@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from infthor_eval.errors import SimulatorError
+from infthor_eval.errors import SimulatorError, in_one_line
 
 __all__ = [
     "AgentPose",
@@ -184,6 +184,20 @@ class SimulatorView:
     arm: ArmState | None = None
 
 
+class _InHand(msgspec.Struct):
+    object_id: str = msgspec.field(name="objectId")
+
+
+class _Outcome(msgspec.Struct):
+    """What an action came to."""
+
+    success: bool = msgspec.field(name="lastActionSuccess")
+    error: str | None = msgspec.field(name="errorMessage")
+    code: Any = msgspec.field(name="errorCode")
+    result: Any = msgspec.field(name="actionReturn")
+    scene: str = msgspec.field(name="sceneName")
+
+
 def view_of(event: Any) -> SimulatorView:
     """Convert an `ai2thor.server.Event`; raises SimulatorError if a field of the metadata is missing or malformed."""
     metadata = event.metadata
@@ -192,20 +206,23 @@ def view_of(event: Any) -> SimulatorView:
         agent = _pose(metadata["agent"])
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)
         # The inventory of arm agents is always empty; what they hold is in the arm's state.
-        in_hand = [item["objectId"] for item in metadata["inventoryObjects"] or ()]
-    except (msgspec.ValidationError, KeyError, TypeError) as error:
-        raise SimulatorError(f"metadata of {metadata['lastAction']}: {error}; use AI2-THOR 5.x") from error
+        in_hand = [item.object_id for item in msgspec.convert(metadata["inventoryObjects"], list[_InHand] | None) or ()]
+        outcome = msgspec.convert(metadata, _Outcome)
+    except (ValueError, KeyError, TypeError) as error:  # msgspec's errors are ValueErrors
+        raise SimulatorError(
+            f"metadata of {metadata.get('lastAction')!r:.40}: {in_one_line(error)}; use AI2-THOR 5.x"
+        ) from error
     return SimulatorView(
         frame=None if event.frame is None else np.ascontiguousarray(event.frame),
         depth=None if event.depth_frame is None else np.ascontiguousarray(event.depth_frame),
         objects={item.object_id: item for item in objects},
         agent=agent,
         inventory=tuple(in_hand if arm is None else arm.held),
-        success=bool(metadata["lastActionSuccess"]),
-        error=metadata["errorMessage"] or "",
-        error_code=str(metadata["errorCode"] or ""),
-        result=metadata["actionReturn"],
-        scene=metadata["sceneName"],
+        success=outcome.success,
+        error=outcome.error or "",
+        error_code=str(outcome.code or ""),
+        result=outcome.result,
+        scene=outcome.scene,
         instances=_instances(event),
         arm=arm,
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.sim.agent import AGENT_HEIGHT, Agent
 from infthor_eval.sim.navigation import NavGrid
 from infthor_eval.sim.scenes.dataset import FloorPlanData
@@ -82,4 +82,7 @@ class Catalogue:
             assert self._supplement_path is not None
             self._supplement = read_supplement(self._supplement_path)
         extra = self._supplement.get(name, Supplement())
-        return build_floor_plan(name, self._data.objects(name), self._data.cells(name), extra)
+        objects, cells = self._data.objects(name), self._data.cells(name)
+        malformed = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
+        with wrap_errors(f"{name}: its recording is malformed", "record it again", catch=malformed):
+            return build_floor_plan(name, objects, cells, extra)

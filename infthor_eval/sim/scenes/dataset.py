@@ -6,19 +6,23 @@ A data folder holds `thor_scenes/objects.jsonl.gz` (one `{"scene", "objects"}` a
 
 import gzip
 import json
+import tokenize
 import zlib
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
-from infthor_eval.errors import DataError
+from infthor_eval.errors import DataError, in_one_line
 from infthor_eval.sim.geometry import Array
 
 __all__ = ["FloorPlanData"]
 
 _OBJECTS = Path("thor_scenes/objects.jsonl.gz")
 _LAYOUTS = Path("alfred/layouts")
+# What numpy raises on a damaged file: its header is a Python literal.
+_NO_ARRAY = (OSError, ValueError, TypeError, EOFError, SyntaxError, OverflowError, tokenize.TokenError, BadZipFile)
 _FAR = 1e5  # metres from the origin that no recorded cell is
 _KEY = '{"scene":"'  # the usual start of a line
 
@@ -42,7 +46,7 @@ class FloorPlanData:
             raise DataError(f"{path}: has no {scene}; it has {len(self._index())} other floor plans")
         try:
             objects: list[dict[str, Any]] = json.loads(line)["objects"]
-        except (ValueError, KeyError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise DataError(f"{path}: the line of {scene} is not of the form scene, objects ({error})") from error
         return objects
 
@@ -56,9 +60,10 @@ class FloorPlanData:
         if not path.exists():
             return None
         try:
-            cells: Array = np.load(path, allow_pickle=False)
-        except (OSError, ValueError) as error:
-            raise DataError(f"{path}: not a readable layout ({error})") from error
+            # Mapped, so that a header that promises more numbers than there are is refused and fills no memory.
+            cells: Array = np.array(np.load(path, allow_pickle=False, mmap_mode="r"))
+        except _NO_ARRAY as error:
+            raise DataError(f"{path}: not a readable layout ({in_one_line(error)}); record it again") from error
         if cells.ndim != 2 or cells.shape[1] != 2:
             raise DataError(f"{path}: must be an array (n, 2), not {cells.shape}")
         if cells.dtype.kind not in "fiu" or not bool((np.abs(cells) < _FAR).all()):
@@ -88,5 +93,5 @@ def _scene_of(path: Path, number: int, line: str) -> str:
         return compact[len(_KEY) :].split('"', 1)[0]
     try:
         return str(json.loads(line)["scene"])
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DataError(f"{path}: line {number} is not of the form scene, objects ({error})") from error

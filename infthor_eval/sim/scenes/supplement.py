@@ -42,7 +42,7 @@ def read_supplement(path: Path) -> dict[str, Supplement]:
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise DataError(
             f"{path}: not a readable supplement ({error}); write it again with the replay command"
         ) from error

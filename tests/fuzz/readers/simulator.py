@@ -6,7 +6,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.floor_plans import write_floor_plan
+from infthor_eval.sim.fifo import FieldType, parse_action
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.thor.view import view_of
 
@@ -67,11 +69,10 @@ def _answer(folder: Path) -> None:
     bench.reset("kitchen-1")
     for line in (folder / "sent.jsonl").read_bytes().splitlines():
         try:
-            message = json.loads(line)
-        except (ValueError, RecursionError):
-            continue  # what comes over the pipe is a JSON object: sim.fifo refuses everything else
-        if isinstance(message, dict):
-            bench.server.answer(message)
+            message = parse_action(FieldType.ACTION, line)
+        except SimulatorError:
+            continue
+        bench.server.answer(message)
         if bench.sim.display.width * bench.sim.display.height > 10**6:
             bench.ok("ChangeResolution", x=_SIZE, y=_SIZE)
         del bench.sim.cameras[1:]
