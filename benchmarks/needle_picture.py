@@ -11,7 +11,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 from PIL import Image
 
-FRAMES = Path(__file__).parents[1] / "infthor_eval/sets/nieh_mini/metadata/kitchen-1-seed7/img"
+FRAMES = Path(__file__).parents[1] / "infthor_eval/sets/nieh_mini/metadata/kitchen-1-seed3/img"
 SHOWN = (2, 30, 58, 90, 100, 133)
 CLUES = (133,)
 QUESTION = "How many objects were on the dining table?"

@@ -11,12 +11,12 @@ import pytest
 from PIL import Image
 
 from infthor_eval.cli import main
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.runs import Catalog
 
 from .browser import browser, open_page  # noqa: F401 - fixtures
+from .plans.cut import MUG, cut, write
 from .processor_times import read_slow_tests
 
 # Before torch is imported, here and in processes that tests start: on a busy machine two threads that wait for each
@@ -87,11 +87,16 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
 
 
 @pytest.fixture(scope="session")
-def scripted_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run of plans: the baseline `scripted` in the first trajectory of the bundled set."""
-    output, data = tmp_path_factory.mktemp("scripted"), packaged_folder("sets/nieh_mini")
-    only_first = ("--limit", 1, "--seed", 19)  # which draws that trajectory
-    words = ("--model", "scripted", "--tasks", "infthor_plans", "--data", data, *only_first, "--output", output)
+def scripted_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the trajectory of `scripted_run`, of twelve plans."""
+    return write(tmp_path_factory.mktemp("trajectories") / "data", cut(MUG, 12))
+
+
+@pytest.fixture(scope="session")
+def scripted_run(tmp_path_factory: pytest.TempPathFactory, scripted_data: Path) -> Path:
+    """The folder of a run of plans: the baseline `scripted` in one trajectory."""
+    output = tmp_path_factory.mktemp("scripted")
+    words = ("--model", "scripted", "--tasks", "infthor_plans", "--data", scripted_data, "--output", output)
     with pytest.raises(SystemExit) as ended:
         main([str(word) for word in words])
     assert ended.value.code == 0

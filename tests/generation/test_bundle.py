@@ -17,7 +17,7 @@ def test_the_bundled_set_is_small_and_has_every_type_and_number_of_clues():
     data = NiehSet(BUNDLED)
     assert data.skipped == ()
     assert data.simulator == "embedded"
-    assert len({question.question_type for question in data.questions}) == 12
+    assert len({question.question_type for question in data.questions}) == 13
     assert {min(len(question.clues), 3) for question in data.questions} == {1, 2, 3}
     assert len({question.traj_id for question in data.questions}) == 6
     assert 130 <= len(data.questions) <= 170

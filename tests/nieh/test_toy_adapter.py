@@ -22,13 +22,13 @@ def test_it_keeps_the_contract():
 def test_it_runs_the_bundled_set(tmp_path, run):
     code, out, err = run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)
     assert code == 0, err
-    assert "toy: 260 evaluated now" in err
+    assert "toy: 264 evaluated now" in err
     (results,) = tmp_path.rglob("results.json")
     tasks = json.loads(results.read_text())["summary"]["tasks"]
-    assert {name: task["n"] for name, task in tasks.items()} == {"nieh_mini_gt": 130, "nieh_mini_full": 130}
+    assert {name: task["n"] for name, task in tasks.items()} == {"nieh_mini_gt": 132, "nieh_mini_full": 132}
     row = next(line.split() for line in out.splitlines() if line.split()[:1] == ["toy"])
-    assert row[-1] == "130"
-    assert "0 evaluated now, 260 resumed" in run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
+    assert row[-1] == "132"
+    assert "0 evaluated now, 264 resumed" in run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
 
 
 def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(make_nieh_set, tmp_path, run, monkeypatch):

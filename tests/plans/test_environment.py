@@ -16,6 +16,8 @@ from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
+from .cut import LAMP, whole
+
 SET = packaged_folder("sets/nieh_mini")
 
 
@@ -67,14 +69,12 @@ def test_the_expert_earns_all_there_is(simulator):
 
 def test_a_goal_that_comes_to_hold_when_the_way_is_over_is_not_counted_on(simulator):
     """The lamp is on, and in view from the first step of the way on; often it is from the last steps on only."""
-    path = packaged_folder("sets/plans_mini") / "trajectories.jsonl.gz"
-    found = next(item for item in iter_trajectories(path) if item.traj_id == "bedroom-4-seed0")
-    environment, plan = PlanEnvironment(found, simulator), 18
-    assert environment.reset(plan)[1]["max_reward"] == pytest.approx(9.2)
-    assert sum(outcome.reward for outcome in play(environment, plan)) == pytest.approx(9.2)
+    environment, plan = PlanEnvironment(whole(LAMP), simulator), 8
+    assert environment.reset(plan)[1]["max_reward"] == pytest.approx(9.8)
+    assert sum(outcome.reward for outcome in play(environment, plan)) == pytest.approx(9.8)
     actions = environment._expert._actions[plan]
     actions[:] = [replace(action, completes=action is actions[-1]) for action in actions]
-    assert environment.reset(plan)[1]["max_reward"] == pytest.approx(4.2)
+    assert environment.reset(plan)[1]["max_reward"] == pytest.approx(4.8)
 
 
 @pytest.mark.parametrize(
@@ -122,9 +122,9 @@ def test_the_history_is_the_sequence_that_models_are_trained_on(simulator, tmp_p
     play(environment, last)
     past = environment.past(last)
     text = "".join(part if isinstance(part, str) else "<image>" for segment in past.all for part in segment.parts())
-    whole = (SET / "metadata" / found.traj_id / "traj.txt").read_text().strip()
-    assert whole.startswith(text)
-    assert whole[len(text) :].startswith("<|act|>")
+    text_file = (SET / "metadata" / found.traj_id / "traj.txt").read_text().strip()
+    assert text_file.startswith(text)
+    assert text_file[len(text) :].startswith("<|act|>")
 
 
 class _FullFor(FrameFolder):

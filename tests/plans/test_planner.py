@@ -3,6 +3,8 @@
 import pytest
 
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.navigation import GRID, GridPose
 from infthor_eval.household.scout import reachable_grid
@@ -17,7 +19,7 @@ from infthor_eval.thor.recorded import translate
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 
-from .test_plans import ours
+SET = packaged_folder("sets/nieh_mini")
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +36,10 @@ def recorded_goal(plan, grid):
 
 
 # The kitchen has all kinds but switching a lamp on; the bedroom has that, stacks, and two of a thing.
-@pytest.mark.parametrize("name", ["kitchen-1-seed7", "bedroom-2-seed7"])
+@pytest.mark.parametrize("name", ["kitchen-1-seed3", "bedroom-2-seed7"])
 def test_every_plan_is_carried_out(simulator, name):
-    trajectory, rules = ours(name), reward_rules("default")
+    trajectory = next(iter_trajectories(SET / "metadata" / name / "traj_data.json"))
+    rules = reward_rules("default")
     restored = restore(simulator, trajectory.scene)
     assert not restored.refused and not restored.dropped
     grounding, tasks, plans = Grounding(simulator.view), tasks_of(trajectory), plans_of(trajectory, Words.PUBLISHED)

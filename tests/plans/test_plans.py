@@ -12,12 +12,13 @@ from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_t
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 
-SETS = Path(__file__).parents[2] / "infthor_eval/sets"
+from .cut import whole
+
 SHARED = Path(__file__).parents[2] / "../shared/data"
 
 
 def ours(name="kitchen-1-seed7"):
-    return next(iter_trajectories(SETS / "nieh_mini/metadata" / name / "traj_data.json"))
+    return whole(name)
 
 
 def published(name):
@@ -60,7 +61,7 @@ def test_our_plans():
 
 def test_what_stands_between_two_tasks_belongs_to_the_one_before():
     plans = plans_of(ours("bedroom-2-seed7"), Words.NATURAL)
-    assert [plan.task for plan in plans[12:16]] == [2, 2, 2, 3]
+    assert [plan.task for plan in plans[2:7]] == [0, 0, 0, 0, 1]  # tasks 0 to 4, and 6 to 14
 
 
 def test_published_plans():

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.plans.recorded_runs import PlansRun
 from infthor_eval.plans.records import RECORDS, StepRecord
 from infthor_eval.plans.replaying import recorded_plans, replay_plans
 from infthor_eval.runs import read_run
 
-SET = packaged_folder("sets/nieh_mini")
-NAME = "bedroom-1-seed7"
+from .cut import FORK, cut, write
+from .cut import MUG as NAME
 
 
 @pytest.fixture(scope="module")
@@ -23,8 +22,8 @@ def recorded(scripted_run):
 
 
 @pytest.fixture(scope="module")
-def session(recorded):
-    with replay_plans(recorded, SET, None) as session:
+def session(recorded, scripted_data):
+    with replay_plans(recorded, scripted_data, None) as session:
         yield session
 
 
@@ -41,7 +40,7 @@ def with_identity(recorded, change):
     return replace(recorded, run=PlansRun("scripted", header, recorded.run.records))
 
 
-def opened(recorded, data=SET):
+def opened(recorded, data):
     with replay_plans(recorded, data, None):
         pass
 
@@ -79,10 +78,10 @@ def test_rewards_add_up_over_the_trajectory(recorded, session):
     assert (last.rewards.plan, last.goal_reached) == (7.0, True)
 
 
-def test_excluded_plans_count_for_nothing(recorded):
+def test_excluded_plans_count_for_nothing(recorded, scripted_data):
     left_out = msgspec.structs.replace(recorded.records[1], excluded="the expert is refused")
     plans = (recorded.records[0], left_out, changed(recorded.records[2], steps=()))
-    with replay_plans(replace(recorded, records=plans), SET, None) as session:
+    with replay_plans(replace(recorded, records=plans), scripted_data, None) as session:
         (frame,) = session.frames(plans[2:])
     first, _, third = (plan.payload for plan in recorded.records[:3])
     assert frame.rewards.so_far == first.reward
@@ -94,7 +93,8 @@ def test_what_differs_is_told_once_and_it_goes_on(recorded, session):
     steps = plan.payload.steps
     paid = tuple(msgspec.structs.replace(step, reward=step.reward + 1) for step in steps)
     notes = [frame.note for frame in session.frames([changed(plan, steps=paid)])]
-    assert notes == ["", "plan 1, action 1: MoveAhead earns 0.2 now, and 1.2 in the run", *[""] * (len(steps) - 1)]
+    earns = f"{steps[0].reward:g} now, and {steps[0].reward + 1:g} in the run"
+    assert notes == ["", f"plan 1, action 1: MoveAhead earns {earns}", *[""] * (len(steps) - 1)]
     ended = (*steps[:-1], msgspec.structs.replace(steps[-1], message=""))
     *_, last = session.frames([changed(plan, steps=ended)])
     assert last.note.startswith("plan 1, action 7: MoveAhead is refused (Wall is blocking")
@@ -149,15 +149,15 @@ def test_plans_tasks_and_trajectories_that_are_not_there_are_named(recorded):
         recorded_plans(PlansRun("scripted", run.header, []), None, None)
 
 
-def test_only_the_runs_own_trajectory_will_do(recorded):
+def test_only_the_runs_own_trajectory_will_do(recorded, scripted_data, tmp_path):
     def change(identity):
         identity["tasks"]["infthor_plans"]["trajectories"][NAME] = "0123"
 
     with pytest.raises(DataError, match=f"{NAME}: changed since the run; give the run's own"):
-        opened(with_identity(recorded, change))
+        opened(with_identity(recorded, change), scripted_data)
     with pytest.raises(UsageError, match="give them as --data FILE or FOLDER"):
         opened(recorded, None)
-    kitchen = SET / "metadata/kitchen-2-seed4/traj_data.json"
+    kitchen = write(tmp_path / "kitchen", cut(FORK))
     with pytest.raises(DataError, match=f"{NAME}: not among the trajectories of --data \\(kitchen-2-seed4\\)"):
         opened(recorded, kitchen)
 
@@ -166,16 +166,17 @@ def test_trajectories_that_come_with_the_package_are_found_by_name(recorded):
     def change(identity):
         identity["tasks"]["infthor_plans"]["config"]["dataset_kwargs"]["bundled"] = "nieh_mini"
 
-    opened(with_identity(recorded, change), None)
+    with pytest.raises(DataError, match=f"{NAME}: changed since the run"):  # so it was found
+        opened(with_identity(recorded, change), None)
 
 
-def test_rewards_of_another_version_are_an_error(recorded):
+def test_rewards_of_another_version_are_an_error(recorded, scripted_data):
     def change(identity):
         identity["tasks"]["infthor_plans"]["rewards"] = {"per_smile": 1}
 
     strange = with_identity(recorded, change)
     with (
-        replay_plans(strange, SET, None) as session,
+        replay_plans(strange, scripted_data, None) as session,
         pytest.raises(DataError, match="rewards that this version does not know"),
     ):
         list(session.frames(strange.records[:1]))

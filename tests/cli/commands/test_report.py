@@ -4,8 +4,6 @@ import re
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
-
 from ...plans.made_runs import made_run, plan, planner_run, write_run
 
 PLANS = [plan(name, index, (index, index + 1), 1.0, context=10 * index) for name in "ab" for index in range(3)]
@@ -81,11 +79,12 @@ def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run):
 
 
 def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
-    scripted_run, tmp_path, run, monkeypatch
+    scripted_run, scripted_data, tmp_path, run, monkeypatch
 ):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
-    data = packaged_folder("sets/nieh_mini")
-    code, out, err = run("report", scripted_run, "--data", data, "--episodes", 3, "--out", tmp_path / "report.html")
+    code, out, err = run(
+        "report", scripted_run, "--data", scripted_data, "--episodes", 3, "--out", tmp_path / "report.html"
+    )
     assert code == 0
     assert "12 samples, " in out
     first, second = err.splitlines()  # the third is the last: the page's size follows

@@ -7,16 +7,14 @@ import msgspec
 import pytest
 from PIL import Image
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
 from infthor_eval.runs.journal import Journal
 
+from ...plans.cut import FORK, cut
+from ...plans.cut import MUG as NAME
 from ..remarks import remarks
-
-SET = packaged_folder("sets/nieh_mini")
-NAME = "bedroom-1-seed7"
 
 
 def refused(found, *said):
@@ -32,9 +30,11 @@ def n_pictures(folder, *numbers):
     return sum(TITLE_REPEATS + len(plans[number].steps) + END_REPEATS for number in numbers)
 
 
-def test_two_plans_become_an_mp4(scripted_run, tmp_path, run):
+def test_two_plans_become_an_mp4(scripted_run, scripted_data, tmp_path, run):
     out = tmp_path / "new" / "watched.mp4"
-    code, said, err = run("watch", scripted_run, "--trajectory", NAME, "--plans", "2-3", "--data", SET, "--out", out)
+    code, said, err = run(
+        "watch", scripted_run, "--trajectory", NAME, "--plans", "2-3", "--data", scripted_data, "--out", out
+    )
     wanted = n_pictures(scripted_run, 2, 3)
     assert (code, remarks(err)) == (0, [])
     assert said.splitlines() == [f"2 of 12 plans, {wanted / 2:.0f} s: {out}"]
@@ -46,9 +46,9 @@ def test_two_plans_become_an_mp4(scripted_run, tmp_path, run):
     assert [path.name for path in out.parent.iterdir()] == ["watched.mp4"]
 
 
-def test_a_gif_is_as_long_as_its_plans(scripted_run, tmp_path, run):
+def test_a_gif_is_as_long_as_its_plans(scripted_run, scripted_data, tmp_path, run):
     out = tmp_path / "watched.gif"
-    code, _, _ = run("watch", scripted_run, "--plans", 2, "--data", SET, "--out", out, "--fps", 5)
+    code, _, _ = run("watch", scripted_run, "--plans", 2, "--data", scripted_data, "--out", out, "--fps", 5)
     assert code == 0
     with Image.open(out) as gif:
         assert gif.size == SIZE
@@ -59,15 +59,15 @@ def test_a_gif_is_as_long_as_its_plans(scripted_run, tmp_path, run):
     assert sum(durations) == 200 * n_pictures(scripted_run, 2)
 
 
-def test_a_file_is_named_for_what_it_shows(scripted_run, tmp_path, run, monkeypatch):
+def test_a_file_is_named_for_what_it_shows(scripted_run, scripted_data, tmp_path, run, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code, said, _ = run("watch", scripted_run, "--plans", "2", "--data", SET)
+    code, said, _ = run("watch", scripted_run, "--plans", "2", "--data", scripted_data)
     path = f"results/recordings/scripted-infthor_plans-{NAME}-2.mp4"
     assert (code, said.split()[-1]) == (0, path)
     assert (tmp_path / path).stat().st_size > 1000
 
 
-def test_what_ends_otherwise_than_recorded_is_said_in_a_line(scripted_run, tmp_path, run):
+def test_what_ends_otherwise_than_recorded_is_said_in_a_line(scripted_run, scripted_data, tmp_path, run):
     header, records = read_run(scripted_run, RECORDS)
     with Journal(tmp_path / "run", header, RECORDS) as journal:
         for record in records:
@@ -75,15 +75,15 @@ def test_what_ends_otherwise_than_recorded_is_said_in_a_line(scripted_run, tmp_p
             journal.append(
                 msgspec.structs.replace(record, payload=msgspec.structs.replace(record.payload, steps=steps))
             )
-    code, said, err = run("watch", tmp_path / "run", "--plans", 2, "--data", SET, "--out", tmp_path / "a.gif")
+    code, said, err = run("watch", tmp_path / "run", "--plans", 2, "--data", scripted_data, "--out", tmp_path / "a.gif")
     line = "otherwise than recorded: plan 2, action 1: PickupObject Mug earns 2 now, and 9 in the run"
     assert (code, remarks(err)) == (0, [line])
     assert "1 of 12 plans" in said
 
 
-def test_what_cannot_be_watched_is_one_line(scripted_run, make_nieh_set, tmp_path, run):
+def test_what_cannot_be_watched_is_one_line(scripted_run, scripted_data, make_nieh_set, tmp_path, run):
     def watch(*words):
-        return run("watch", scripted_run, "--data", SET, *words)
+        return run("watch", scripted_run, "--data", scripted_data, *words)
 
     refused(watch("--trajectory", "hall-9"), f"unknown trajectory of this run 'hall-9'; there are {NAME}")
     refused(watch("--task", "infthor"), "unknown task of this run 'infthor'; did you mean 'infthor_plans'?")
@@ -102,11 +102,9 @@ def test_what_cannot_be_watched_is_one_line(scripted_run, make_nieh_set, tmp_pat
     refused(run("watch", asked), f"{asked}: is a run of nieh, and only runs of plans and manipulation can be watched")
 
 
-@pytest.mark.parametrize("name", [NAME, "kitchen-1-seed7"])
+@pytest.mark.parametrize("name", [NAME, FORK])
 def test_a_trajectory_that_is_not_the_runs_is_one_line(scripted_run, tmp_path, run, name):
-    content = json.loads((SET / "metadata" / name / "traj_data.json").read_text())
-    content["more"] = 1
-    (tmp_path / "changed.json").write_text(json.dumps(content))
+    (tmp_path / "changed.json").write_text(json.dumps(cut(name) | {"more": 1}))
     said = "changed since the run" if name == NAME else f"not among the trajectories of --data ({name}"
     refused(run("watch", scripted_run, "--data", tmp_path / "changed.json", "--out", tmp_path / "a.gif"), NAME, said)
     assert not (tmp_path / "a.gif").exists()

@@ -104,8 +104,8 @@ def test_hostile_text_stays_text(page, open_page):
     assert opened.errors == []
 
 
-def test_an_episode_has_its_steps_and_its_map(make_page, scripted_run, open_page):
-    page = make_page(scripted_run, data=DATA, episodes=2)
+def test_an_episode_has_its_steps_and_its_map(make_page, scripted_run, scripted_data, open_page):
+    page = make_page(scripted_run, data=scripted_data, episodes=2)
     opened = open_page(page)
     place = next(at for at, sample in enumerate(page.samples) if sample.results[0].map is not None)
     for _ in range(place):

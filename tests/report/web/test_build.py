@@ -103,8 +103,8 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
     assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
 
 
-def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run):
-    page = make_page(scripted_run, data=DATA, episodes=3)
+def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scripted_data):
+    page = make_page(scripted_run, data=scripted_data, episodes=3)
     assert {section.key for section in page.sections} >= {"results", "plans", "rewards-infthor_plans", "cost"}
     seen = [sample for sample in page.samples if sample.results[0].map is not None]
     assert len(seen) == 3
