@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.manipulation.actors import BASELINES
+from infthor_eval.manipulation.config_form import ManipulationConfig
 from infthor_eval.manipulation.evaluation import ManipulationEvaluation
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
@@ -11,7 +12,7 @@ from infthor_eval.manipulation.summary import ManipulationSummary, summarise_man
 from infthor_eval.manipulation.tables import overview_table, result_tables
 from infthor_eval.manipulation.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord, check_config
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -37,7 +38,8 @@ class ManipulationSuite:
         return ManipulationEvaluation(request)
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[ArmRecord]]) -> ManipulationSummary:
-        """See `Suite.summarise`."""
+        """See `Suite.summarise`; raises DataError for a journal whose config is of another form."""
+        check_config(header, ManipulationConfig)
         return summarise_manipulation(header.config, records)
 
     def scores(self, record: UnitRecord[ArmRecord]) -> Mapping[str, float]:

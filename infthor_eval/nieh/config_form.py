@@ -1,18 +1,11 @@
-"""The part of an NIEH run's config that its summary and tables read, as `task.NiehTask.config` writes it.
-
-A journal can be cut, edited, or of another suite, and its header's config is free-form JSON. It is checked here once,
-before anything is summed up.
-"""
+"""The part of an NIEH run's config that its summary and tables read, as `task.NiehTask.config` writes it."""
 
 from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
 
-from infthor_eval.errors import wrap_errors
-from infthor_eval.runs import RunHeader
-
-__all__ = ["check_config"]
+__all__ = ["NiehConfig"]
 
 
 class _Dataset(msgspec.Struct):
@@ -47,7 +40,7 @@ class _Sources(msgspec.Struct):
     memory: _Memory | None = None
 
 
-class _Task(msgspec.Struct):
+class _Task(msgspec.Struct, kw_only=True):
     config: _TaskFile
     decoding: _Decoding
     metrics: _Metrics
@@ -55,23 +48,14 @@ class _Task(msgspec.Struct):
     n_samples: int
     data: str
     sources: _Sources = msgspec.field(default_factory=_Sources)
-    simulator: str | None = None
+    simulator: str | None
 
 
-class _Config(msgspec.Struct):
+class NiehConfig(msgspec.Struct):
+    """The config of a run."""
+
     tasks: dict[str, _Task]
     model: dict[str, Any]
     frames: str
     budget: int | str | None = None
     rescored: dict[str, Any] = {}
-
-
-def check_config(header: RunHeader) -> None:
-    """Check that the config in a journal's header is that of an NIEH run.
-
-    Raises:
-        DataError: names the run, and the place in its config.
-    """
-    problem, hint = f"{header.name}: not the config of a run of nieh", "run the evaluation again"
-    with wrap_errors(problem, hint, catch=msgspec.ValidationError):
-        msgspec.convert(header.config, _Config)

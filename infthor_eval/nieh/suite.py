@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.nieh.baselines import BASELINES
-from infthor_eval.nieh.config_form import check_config
+from infthor_eval.nieh.config_form import NiehConfig
 from infthor_eval.nieh.evaluation import NiehEvaluation
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
@@ -12,7 +12,7 @@ from infthor_eval.nieh.summary import NiehSummary, primary_metrics, summarise
 from infthor_eval.nieh.tables import overview, tables
 from infthor_eval.nieh.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
+from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord, check_config
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -39,7 +39,7 @@ class NiehSuite:
 
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[NiehAnswer]]) -> NiehSummary:
         """See `Suite.summarise`; raises DataError for a journal whose config is of another form."""
-        check_config(header)
+        check_config(header, NiehConfig)
         return summarise(header.config, records)
 
     def scores(self, record: UnitRecord[NiehAnswer]) -> Mapping[str, float]:

@@ -62,7 +62,7 @@ class ReportRun:
     @property
     def tasks(self) -> Mapping[str, Any]:
         """Settings of the tasks in the run's config, by name."""
-        tasks: Mapping[str, Any] = self.header.config["tasks"]
+        tasks: Mapping[str, Any] = self.header.config.get("tasks", {})
         return tasks
 
     def dataset(self, task: str) -> Mapping[str, Any]:

@@ -1,6 +1,7 @@
 """One run of any suite: its config, its journal, and the order of its work."""
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
+from infthor_eval.runs.config_form import check_config
 from infthor_eval.runs.driver import Observer, RunOutcome, Silent, execute
 from infthor_eval.runs.estimate import Estimate, TaskEstimate, estimate_run
 from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, UnitKey, UnitRecord
@@ -52,6 +53,7 @@ __all__ = [
     "UnitSample",
     "Usage",
     "Workload",
+    "check_config",
     "estimate_run",
     "execute",
     "prepare",

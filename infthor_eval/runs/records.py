@@ -26,6 +26,7 @@ __all__ = [
 ]
 
 FORMAT = 3
+_CONFIG_FORMS: dict[str, type] = {"tasks": dict, "model": dict, "frames": str}
 
 A = TypeVar("A")  # an artifact
 P = TypeVar("P")  # the payload of a suite's records
@@ -80,6 +81,12 @@ class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag
     name: str
     config: dict[str, Any]
     format: int = FORMAT
+
+    def __post_init__(self) -> None:
+        """Check the form of what every suite's config has; msgspec turns the error into its own."""
+        for key, form in _CONFIG_FORMS.items():
+            if not isinstance(self.config.get(key, form()), form):
+                raise TypeError(f"`config.{key}` is no {form.__name__}")
 
 
 class UnitRecord(

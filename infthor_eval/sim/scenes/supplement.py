@@ -57,5 +57,5 @@ def _entry(path: Path, name: str, value: Any) -> Supplement:
         floor = value.get("floor_y")
         objects = tuple(sorted({str(item) for item in value.get("objects", ())}))
         return Supplement(cells, None if floor is None else float(floor), objects)
-    except (AttributeError, TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError, OverflowError) as error:
         raise DataError(f"{path}: entry {name} is not of the form cells, floor_y, objects ({error})") from error

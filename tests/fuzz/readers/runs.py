@@ -26,8 +26,8 @@ __all__ = ["READERS"]
 
 
 @cache
-def _run(model: str) -> Path:
-    """Return the folder of a run of a baseline on the small set, made once."""
+def _run(model: str, task: str = "nieh_gt") -> Path:
+    """Return the folder of a run of a baseline on the small set, or on its trajectories; made once."""
     scratch = TemporaryDirectory()
     _kept.append(scratch)
     root = Path(scratch.name)
@@ -35,7 +35,7 @@ def _run(model: str) -> Path:
         "--model",
         model,
         "--tasks",
-        "nieh_gt",
+        task,
         "--data",
         str(make_set(root / "set")),
         "--output",
@@ -51,25 +51,34 @@ _kept: list[TemporaryDirectory[str]] = []
 
 
 def _make(pattern: str, folder: Path) -> Path:
-    for model in ("oracle", "blind"):
-        shutil.copytree(_run(model), folder / model)
-    (file,) = (folder / "oracle").glob(pattern)
+    """Copy two runs, and return the file of one of them that a pattern names."""
+    for name, model in (("damaged", "oracle"), ("sound", "blind")):
+        shutil.copytree(_run(model), folder / name)
+    (file,) = (folder / "damaged").glob(pattern)
     if file.suffix == ".yaml":
         file.write_text(json.dumps(yaml.safe_load(file.read_text())))
     return file
 
 
+def _make_plans(folder: Path) -> Path:
+    """Copy two runs of plans, and return the journal of one of them."""
+    for name, model in (("damaged", "scripted"), ("sound", "random")):
+        shutil.copytree(_run(model, "infthor_plans"), folder / name)
+    (file,) = (folder / "damaged").glob("journal/*.jsonl")
+    return file
+
+
 def _find(folder: Path) -> None:
     runs = list(find_runs(folder))
-    assert any(isinstance(run, StoredRun) and run.folder.name == "blind" for run in runs), "the good run is not listed"
+    assert any(isinstance(run, StoredRun) and run.folder.name == "sound" for run in runs), "the good run is not listed"
 
 
 def _show(folder: Path) -> None:
-    read_run_results(folder / "oracle")
+    read_run_results(folder / "damaged")
 
 
 def _report(folder: Path) -> None:
-    runs = read_report_runs([folder / "oracle", folder / "blind"], find_suite, find_presenter)
+    runs = read_report_runs([folder / "damaged", folder / "sound"], find_suite, find_presenter)
     presenter = runs[0].presenter
     list(presenter.sections(runs))
     list(presenter.charts(runs))
@@ -97,6 +106,8 @@ READERS = (
     Reader("journal, listed", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _find),
     Reader("journal, shown", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _show),
     Reader("journal, reported", Form.JSON_LINES, partial(_make, "journal/*.jsonl"), _report),
+    Reader("journal of plans, shown", Form.JSON_LINES, _make_plans, _show),
+    Reader("journal of plans, reported", Form.JSON_LINES, _make_plans, _report),
     Reader("results, listed", Form.JSON, partial(_make, "results.json"), _find),
     Reader("results, shown", Form.JSON, partial(_make, "results.json"), _show),
     Reader("stored command", Form.JSON, partial(_make, "run.yaml"), _report),
