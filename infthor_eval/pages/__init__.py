@@ -1,0 +1,1 @@
+"""Local pages that a running command serves; what is on them is another package's."""
