@@ -1,7 +1,5 @@
 """The part of a run's config that its summary and tables read, as `task.ManipulationTask.config` writes it."""
 
-from typing import Any
-
 import msgspec
 
 from infthor_eval.episodes.config_form import EpisodeTaskForm
@@ -18,6 +16,5 @@ class ManipulationConfig(msgspec.Struct):
     """The config of a run."""
 
     tasks: dict[str, _Task]
-    model: dict[str, Any]
     simulator: str
     frames: str

@@ -23,6 +23,5 @@ class PlansConfig(msgspec.Struct):
     """The config of a run."""
 
     tasks: dict[str, _Task]
-    model: dict[str, Any]
     simulator: str
     frames: str

@@ -28,6 +28,7 @@ def identity(
         "words": "published",
         "after_failure": after_failure,
         "broken": [],
+        "config": {"dataset_kwargs": {}},
     }
     model = dict(model or {"name": "a model"})
     return {"suite": "plans", "model": model, "simulator": simulator, "frames": "shown", "tasks": {task: about}}

@@ -53,7 +53,7 @@ def _long_name(option: click.Parameter) -> str:
 def _as_typed(path: Path, name: str, value: Any, option: click.Parameter) -> Any:
     """A value of a file as it would be typed; None for no value."""
     if value is None or (isinstance(option, click.Option) and option.is_flag):
-        if not isinstance(value, bool | None):
+        if not isinstance(value, bool | str | None):
             raise UsageError(f"{path}: {name} is {value!r:.60}; it is true or false")
         return value
     if isinstance(value, Mapping) and isinstance(option.type, ModelArgs):

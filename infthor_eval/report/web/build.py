@@ -131,8 +131,8 @@ def _about(run: ReportRun) -> About:
     simulators = {about.get("simulator") for about in run.tasks.values() if isinstance(about, dict)}
     facts = {
         "suite": run.suite.name,
-        "model": str(config["model"].get("name", "")),
-        "checkpoint": str(config["model"].get("checkpoint", "")),
+        "model": str(config.get("model", {}).get("name", "")),
+        "checkpoint": str(config.get("model", {}).get("checkpoint", "")),
         "tasks": ", ".join(run.tasks),
         "simulator": str(config.get("simulator", "") or ", ".join(sorted(filter(None, simulators)))),
         "seed": str(config.get("seed", "")),
