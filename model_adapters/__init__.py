@@ -3,6 +3,7 @@
 Importing this package imports neither torch nor transformers; the first model that needs them does.
 """
 
+from model_adapters.attended import Attended, Notice
 from model_adapters.backend import Backend, BackendConversation
 from model_adapters.check import CheckResult, ContractError, check_adapter, run_checks
 from model_adapters.protocols import (
@@ -43,6 +44,7 @@ __all__ = [
     "ROLES",
     "Adapter",
     "ArmDelta",
+    "Attended",
     "Backend",
     "BackendConversation",
     "Capabilities",
@@ -52,6 +54,7 @@ __all__ = [
     "Decoding",
     "Mark",
     "Model",
+    "Notice",
     "Part",
     "Policy",
     "Reply",

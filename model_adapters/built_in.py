@@ -6,6 +6,7 @@ __all__ = ["BUILT_IN", "BuiltIn"]
 
 
 _RANDOM = "random weights, for trying the harness; scores are near 0"
+_PERSON = "a person, who answers on a page of this machine"
 _NANO = "small, trained, bundled with the package"
 
 
@@ -38,6 +39,7 @@ BUILT_IN = {
     "deepseek-vl-tiny": _locate("tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM),
     "hf-vlm": _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions"),
     "hf-vlm@vllm": _locate("vllm.adapter:HfVlmOnVllm", "vllm.options:HfVlmOnVllmOptions"),
+    "human": _locate("human.adapter:Human", "human.options:HumanOptions", _PERSON),
     "llava-onevision": _locate("hf.families.llava_onevision:LlavaOnevision", "options.families:LlavaOnevisionOptions"),
     "llava-onevision@vllm": _locate("vllm.adapter:LlavaOnevisionOnVllm", "vllm.options:LlavaOnevisionOnVllmOptions"),
     "llava-onevision-tiny": _locate("tiny.llava_onevision:LlavaOnevisionTiny", "options.tiny:TinyOptions", _RANDOM),

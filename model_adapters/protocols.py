@@ -111,6 +111,7 @@ class Reply:
         cost: cost of the reply in US dollars, or None if it is free or its price unknown.
         thinking: what the model thought before the reply, if it is told apart from the text; thoughts between markers
             in the text are told from the answer where the reply is read (`model_adapters.thinking`).
+        n_watched: different frames that a person looked at before replying; None for models.
     """
 
     text: str
@@ -121,6 +122,7 @@ class Reply:
     faults: tuple[str, ...] = ()
     cost: float | None = None
     thinking: str | None = None
+    n_watched: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,7 @@ from infthor_eval.nieh.shown_clues import shown_clues
 from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
-from model_adapters import Decoding, Model, Part, Reply, answer_of, wrap_request_errors
+from model_adapters import Attended, Decoding, Model, Notice, Part, Reply, answer_of, wrap_request_errors
 
 __all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "answer_units"]
 
@@ -82,7 +82,7 @@ class _UnitRequest:
             failure = session.describe_failure(self.unit, error)
         return self.unit.record(
             self.fingerprint,
-            self.unit.payload.with_reply(answer, scores, thinking),
+            self.unit.payload.with_reply(answer, scores, thinking, reply.n_watched),
             failure=failure,
             faults=(*faults, *reply.faults),
             seconds=round(seconds, 4),
@@ -128,6 +128,7 @@ class ModelAnswerer:
         self.batch_size = model.capabilities.batch_size
         self.batch_contexts = model.capabilities.batch_contexts
         self._name = model.name
+        self._person = model if isinstance(model, Attended) else None
         self._video_input = model.capabilities.video_input
         self.write: Write | None = Notebook(model, session).write
         self._conversation = model.conversation()
@@ -142,6 +143,8 @@ class ModelAnswerer:
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
         context, decoding = requests[0].context, requests[0].decoding
+        if self._person is not None:
+            self._person.tell(Notice(title="Question", words=requests[0].prepared.task_samples.words))
         with wrap_request_errors(self._name):
             if any(item.context != context for item in requests[1:]):
                 self._go_to(())

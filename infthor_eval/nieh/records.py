@@ -70,6 +70,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
         reply: the reply; None if the model failed.
         scores: scores of the reply by metric; empty if there is none.
         thinking: what the model thought before the reply, which is empty if it was cut off there; None if it did not.
+        n_watched: different frames that a person looked at before replying; None for models.
     """
 
     question: str
@@ -84,6 +85,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     reply: str | None = None
     scores: dict[str, float] = {}
     thinking: str | None = None
+    n_watched: int | None = None
 
     @classmethod
     def of(cls, question: Question, guess: Guess | None = None, shown_clues: ShownClues | None = None) -> "NiehAnswer":
@@ -99,9 +101,11 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
             shown_clues=shown_clues,
         )
 
-    def with_reply(self, reply: str, scores: dict[str, float], thinking: str | None = None) -> "NiehAnswer":
-        """Return the same question with a reply, and what the model thought before it."""
-        return msgspec.structs.replace(self, reply=reply, scores=scores, thinking=thinking)
+    def with_reply(
+        self, reply: str, scores: dict[str, float], thinking: str | None = None, n_watched: int | None = None
+    ) -> "NiehAnswer":
+        """Return the same question with a reply, what a model thought before it, and how much a person looked at."""
+        return msgspec.structs.replace(self, reply=reply, scores=scores, thinking=thinking, n_watched=n_watched)
 
 
 class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_note"):

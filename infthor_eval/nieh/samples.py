@@ -1,8 +1,9 @@
 """The samples of a task: every question of its set in every variant of its context, and the skipped ones."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.runs.limiting import spread
 
 __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
+
+_WORD = re.compile(r"[A-Za-z]{3,}")
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,14 @@ class TaskSamples:
     def shows_films(self) -> bool:
         """True if the samples show films, which a model is given as a video or as images."""
         return any(sample.fps is not None for sample in self.samples)
+
+    @cached_property
+    def words(self) -> tuple[str, ...]:
+        """All answers in words and all words of the questions, sorted: what a person's typing is completed from."""
+        questions = [sample.question for sample in self.samples]
+        answers = {answer for question in questions for answer in question.answers if isinstance(answer, str)}
+        asked = {word.lower() for question in questions for word in _WORD.findall(question.text)}
+        return tuple(sorted(answers | (asked - {answer.lower() for answer in answers})))
 
     def all_frames(self, sample: Sample) -> list[FrameRef]:
         """Return all frames of a sample's trajectory as a memory observes them: ablated, but in their order.

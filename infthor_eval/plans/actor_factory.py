@@ -1,4 +1,4 @@
-"""The actors of a subject: a model that is prompted as the task says, or a baseline."""
+"""The actors of a subject: a model that is prompted as the task says, a person, or a baseline."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.plans.actors import PlanActor, PlanBaseline
 from infthor_eval.plans.model_actor import ModelActor
+from infthor_eval.plans.person_actor import PersonActor
 from infthor_eval.plans.task import PlansTask
-from model_adapters import Model, Subject
+from model_adapters import Attended, Model, Subject
 
 __all__ = ["ActorFactory", "actor_factory"]
 
@@ -31,6 +32,8 @@ def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> Actor
     if isinstance(subject, PlanBaseline):
         subject.fit(trajectories)
         return ActorFactory(False, lambda task, trajectory: subject.actor(trajectory, task.words))
+    if isinstance(subject, Attended):
+        return ActorFactory(True, lambda task, _: PersonActor(subject, task.agent_config()))
     if isinstance(subject, Model):
         trained = subject.identity().get("trained_words")
         return ActorFactory(True, lambda task, _: ModelActor(subject, task.agent_config()), trained)

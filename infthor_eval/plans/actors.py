@@ -10,7 +10,7 @@ from infthor_eval.plans.environment import Observation, PlanEnvironment, StepOut
 from infthor_eval.plans.plan import Plan
 from model_adapters import Reply, Subject
 
-__all__ = ["Act", "CountingActor", "PlanActor", "PlanBaseline", "PlanSituation"]
+__all__ = ["Act", "CountingActor", "EndedActor", "PlanActor", "PlanBaseline", "PlanSituation"]
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,14 @@ class CountingActor(PlanActor, Protocol):
 
         Frames are numbered from the trajectory's first; the history is that before the plan that has begun.
         """
+
+
+@runtime_checkable
+class EndedActor(PlanActor, Protocol):
+    """An actor that is told how its plan ended."""
+
+    def end(self, outcome: StepOutcome) -> None:
+        """Take the outcome of the plan's last action."""
 
 
 @runtime_checkable

@@ -9,7 +9,7 @@ import msgspec
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.plans.actor_factory import ActorFactory
-from infthor_eval.plans.actors import Act, CountingActor, PlanSituation
+from infthor_eval.plans.actors import Act, CountingActor, EndedActor, PlanSituation
 from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
 from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.plans.plan import Plan
@@ -113,6 +113,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             if act.reply is not None:
                 self.usage = Usage.total([self.usage, Usage.of([act.reply])])
             acts.append((act, environment.step(act.action)))
+        if isinstance(self._actor, EndedActor):
+            self._actor.end(acts[-1][1])
         replies = [act.reply for act, _ in acts if act.reply is not None]
         faults = tuple(fault for reply in replies for fault in reply.faults)
         return EpisodeResult(_completed_record(self.begun, acts), _tokens(replies), faults)

@@ -1,0 +1,143 @@
+"""Where a question waits for its answer: the run asks in one thread, and the page answers in others."""
+
+import itertools
+import threading
+import time
+from dataclasses import dataclass
+
+from model_adapters.attended import Notice
+from model_adapters.protocols import Decoding, Turn
+
+__all__ = ["Answer", "Asked", "Desk", "Question", "StaleError"]
+
+_WAKE_S = 0.2  # seconds between two looks at signals: conditions wait without, and Ctrl-C must end a run at once
+
+
+class StaleError(Exception):
+    """An answer to a question that has been answered, or is no longer asked."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is put before a person: the turns that a model would be given, the decoding, and what is told beside."""
+
+    turns: tuple[Turn, ...]
+    decoding: Decoding
+    notice: Notice
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A person's answer, and the number of different frames that were looked at."""
+
+    text: str
+    n_watched: int
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked; `number` counts from 1, and `since` is the monotonic time in seconds at which it was put."""
+
+    number: int
+    asked: Asked
+    since: float
+
+
+class Desk:
+    """One question at a time. Each change has a number, so that a page can wait for the next."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._numbers = itertools.count(1)
+        self._question: Question | None = None
+        self._answer: Answer | None = None
+        self._version = 0
+        self._n_readers = 0
+        self._n_answered = 0
+        self._is_closed = self._is_stopped = False
+
+    @property
+    def question(self) -> Question | None:
+        """What is asked now; None between two questions."""
+        return self._question
+
+    @property
+    def version(self) -> int:
+        """Number of changes so far."""
+        return self._version
+
+    @property
+    def n_answered(self) -> int:
+        """Number of questions answered so far."""
+        return self._n_answered
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the person has stopped the run."""
+        return self._is_stopped
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether nothing will be asked any more."""
+        return self._is_closed
+
+    def ask(self, asked: Asked) -> Answer:
+        """Put a question, and wait until it is answered.
+
+        Raises:
+            KeyboardInterrupt: the person stops the run from the page.
+        """
+        with self._changed:
+            self._question, self._answer = Question(next(self._numbers), asked, time.monotonic()), None
+            self._change()
+            try:
+                while self._answer is None and not self._is_stopped:
+                    self._changed.wait(_WAKE_S)
+                if self._answer is None:
+                    raise KeyboardInterrupt
+                self._n_answered += 1
+                return self._answer
+            finally:
+                self._question = None
+                self._change()
+
+    def give(self, number: int, answer: Answer) -> None:
+        """Answer the question of this number.
+
+        Raises:
+            StaleError: it is not the one that is asked.
+        """
+        with self._changed:
+            if self._question is None or self._question.number != number or self._answer is not None:
+                raise StaleError
+            self._answer = answer
+            self._changed.notify_all()
+
+    def wait_for_change(self, version: int, timeout_s: float) -> None:
+        """Wait until there is another version than this one, or for so many seconds."""
+        with self._changed:
+            self._n_readers += 1
+            self._changed.wait_for(lambda: self._version != version, timeout_s)
+            self._n_readers -= 1
+            self._changed.notify_all()
+
+    def wait_for_readers(self, timeout_s: float) -> None:
+        """Wait until all who waited for a change have learned of it, for so many seconds at most."""
+        with self._changed:
+            self._changed.wait_for(lambda: not self._n_readers, timeout_s)
+
+    def stop(self) -> None:
+        """Let the run end as Ctrl-C does: what is asked now stays unanswered, and is asked when the run goes on."""
+        with self._changed:
+            self._is_stopped = True
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Say that nothing will be asked any more."""
+        with self._changed:
+            self._is_closed = True
+            self._change()
+
+    def _change(self) -> None:
+        self._version += 1
+        self._changed.notify_all()

@@ -1,0 +1,72 @@
+"""A person as a `Model`."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import Any
+
+from infthor_eval.formats.frames import FrameRef
+from model_adapters.attended import Notice
+from model_adapters.backend import BackendConversation
+from model_adapters.human.desk import Asked, Desk
+from model_adapters.human.options import HumanOptions
+from model_adapters.human.serving import serve_desk
+from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn
+from model_adapters.stopping import cut_at_stop
+
+__all__ = ["HumanModel"]
+
+
+class HumanModel:
+    """A person, who answers on a page of this machine; the page opens with the first request."""
+
+    def __init__(self, name: str, options: HumanOptions) -> None:
+        self.name = name
+        self._options = options
+        self._desk = Desk()
+        self._notice = Notice()
+        self._page = ExitStack()
+        self._is_open = False
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """One question at a time; nothing is counted in tokens, and nobody answers the same twice for certain."""
+        return Capabilities(counts_tokens=False, token_ids=False, deterministic=False, sampling=True, choices=True)
+
+    def identity(self) -> dict[str, Any]:
+        """Return who answers, as JSON values."""
+        return {"adapter": self.name, "reader": str(self._options.reader)}
+
+    def tokens_per_frame(self, frame: FrameRef) -> None:
+        """Return None: people count no tokens."""
+
+    def conversation(self) -> Conversation:
+        """Return a new, empty conversation."""
+        return BackendConversation(self)
+
+    def count(self, turns: Sequence[Turn]) -> None:
+        """Return None, as `tokens_per_frame`."""
+
+    def tell(self, notice: Notice) -> None:
+        """See `Attended`."""
+        self._notice = notice
+
+    def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
+        """Show what a model would be given, and wait for the answer; see `Conversation.reply`."""
+        self._open()
+        answer = self._desk.ask(Asked(tuple(turns), decoding, self._notice))
+        before_stop = None if decoding.choices else cut_at_stop(answer.text, decoding.stop)
+        return Reply(answer.text if before_stop is None else before_stop, n_watched=answer.n_watched)
+
+    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+        """Ask one after the other; see `Conversation.replies`."""
+        return [self.answer(turns, decoding) for turns in conversations]
+
+    def close(self) -> None:
+        """Tell the page that it is over, and close it."""
+        self._desk.close()
+        self._page.close()
+
+    def _open(self) -> None:
+        if not self._is_open:
+            self._page.enter_context(serve_desk(self._desk, self._options))
+            self._is_open = True

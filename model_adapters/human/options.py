@@ -1,0 +1,34 @@
+"""Options of a person as a model."""
+
+import re
+from dataclasses import dataclass
+
+from infthor_eval.errors import UsageError
+
+__all__ = ["HumanOptions"]
+
+_READER = re.compile(r"[\w.-]{1,40}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class HumanOptions:
+    """Options of the page that a person answers on.
+
+    Attributes:
+        reader: who answers: a name or a number, which tells people apart in tables and folders.
+        port: port of the page; 0 for any that is free.
+        browser: open the page in the browser of this machine, if it has a screen.
+    """
+
+    reader: str = "1"
+    port: int = 0
+    browser: bool = True
+
+    def __post_init__(self) -> None:
+        """Check all values; raise `UsageError` for one that is out of its range."""
+        if not _READER.fullmatch(str(self.reader)):
+            raise UsageError(
+                f"human: reader is {self.reader!r:.60}; write a name of at most 40 letters, digits, '.', '-' and '_'"
+            )
+        if not 0 <= self.port <= 65_535:
+            raise UsageError(f"human: port must be between 0 and 65535, not {self.port}")

@@ -1,0 +1,119 @@
+"""The page of a desk: its routes, and the server that has them while a run goes on."""
+
+import os
+import sys
+import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import msgspec
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import BaseRoute, Route
+
+from infthor_eval.pages.server import file_route, serve_pages
+from model_adapters.human.desk import Answer, Desk, StaleError
+from model_adapters.human.options import HumanOptions
+from model_adapters.human.view import frames_of, state_of
+
+__all__ = ["desk_routes", "serve_desk"]
+
+_WAIT_S = 20.0  # a page asks again after so long without a change
+_LAST_LOOK_S = 1.0  # for open pages to learn that it is over
+_LONGEST = 2000  # characters of an answer
+_PACKAGE = "model_adapters.human"
+
+
+class _Given(msgspec.Struct):
+    """An answer as the page sends it."""
+
+    number: int
+    text: str
+    watched: int = 0
+
+
+@contextmanager
+def serve_desk(desk: Desk, options: HumanOptions) -> Iterator[None]:
+    """Serve the page of a desk until the context ends, and say where it is.
+
+    Raises:
+        UsageError: the web server is not installed, or the port cannot be had.
+    """
+    with serve_pages(desk_routes(desk), port=options.port) as server:
+        print(f"human: answer at {server.address}", file=sys.stderr, flush=True)
+        if options.browser and _has_screen():
+            webbrowser.open(server.address)
+        yield
+        desk.wait_for_readers(_LAST_LOOK_S)
+
+
+def desk_routes(desk: Desk) -> list[BaseRoute]:
+    """Return the routes of a desk's page."""
+
+    async def state(request: Request) -> Response:
+        """What is asked now; waits for another version than the one that the page has."""
+        seen = request.query_params.get("seen", "")
+        if seen.isdecimal():
+            await run_in_threadpool(desk.wait_for_change, int(seen), _WAIT_S)
+        return JSONResponse(state_of(desk))
+
+    async def frame(request: Request) -> Response:
+        """One frame of the question of a number."""
+        question = desk.question
+        if question is None or question.number != request.path_params["number"]:
+            return _problem("this question is not asked any more", 409)
+        frames = frames_of(question.asked.turns)
+        if request.path_params["place"] >= len(frames):
+            return _problem("there is no such frame", 404)
+        path = frames[request.path_params["place"]].path
+        return FileResponse(path) if path.is_file() else _problem(f"{path.name}: the frame is not there", 404)
+
+    async def answer(request: Request) -> Response:
+        """Take an answer."""
+        try:
+            given = msgspec.json.decode(await request.body(), type=_Given)
+        except (msgspec.ValidationError, msgspec.DecodeError):
+            return _problem("not an answer", 400)
+        return _take(desk, given)
+
+    async def stop(_request: Request) -> Response:
+        """End the run, which can go on later."""
+        desk.stop()
+        return JSONResponse({})
+
+    pages: list[BaseRoute] = [
+        file_route("/" if name == "page.html" else f"/{name}", _PACKAGE, name)
+        for name in ("page.html", "page.css", "page.js", "strip.js")
+    ]
+    return [
+        *pages,
+        Route("/state.json", state),
+        Route("/frames/{number:int}/{place:int}", frame),
+        Route("/answer", answer, methods=["POST"]),
+        Route("/stop", stop, methods=["POST"]),
+    ]
+
+
+def _take(desk: Desk, given: _Given) -> Response:
+    question, text = desk.question, given.text.strip()
+    if not text:
+        return _problem("write an answer first", 400)
+    if len(text) > _LONGEST:
+        return _problem(f"an answer has at most {_LONGEST} characters", 400)
+    if question is not None and question.asked.decoding.choices and text not in question.asked.decoding.choices:
+        return _problem("only the listed replies are possible here", 400)
+    try:
+        desk.give(given.number, Answer(text, max(0, given.watched)))
+    except StaleError:
+        return _problem("this question was answered already, perhaps in another tab", 409)
+    return JSONResponse({})
+
+
+def _problem(text: str, status: int) -> JSONResponse:
+    return JSONResponse({"problem": text}, status_code=status)
+
+
+def _has_screen() -> bool:
+    """Return whether a browser can open a window; in a terminal without one it would take the terminal."""
+    return sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))

@@ -1,0 +1,83 @@
+"""Where a question waits for its answer."""
+
+import threading
+import time
+from collections.abc import Callable
+
+import pytest
+
+from model_adapters import Decoding, Notice, Turn
+from model_adapters.human.desk import Answer, Asked, Desk, StaleError
+
+ASKED = Asked((Turn("user", ("Where is the mug?",)),), Decoding(max_new_tokens=5), Notice())
+
+
+def asking(desk: Desk) -> tuple[threading.Thread, list[object]]:
+    """Ask in a thread; the answer, or the type of the error, comes into a list."""
+    found: list[object] = []
+
+    def ask() -> None:
+        try:
+            found.append(desk.ask(ASKED))
+        except KeyboardInterrupt as error:
+            found.append(type(error))
+
+    thread = threading.Thread(target=ask, daemon=True)
+    thread.start()
+    until(lambda: desk.question is not None)
+    return thread, found
+
+
+def until(holds: Callable[[], bool]) -> None:
+    for _ in range(1000):
+        if holds():
+            return
+        time.sleep(0.005)
+    pytest.fail("it never came to hold")
+
+
+def test_a_question_waits_for_its_answer_and_is_gone_then() -> None:
+    desk = Desk()
+    thread, found = asking(desk)
+    assert desk.question is not None and desk.question.number == 1
+    desk.give(1, Answer("Fridge", 7))
+    thread.join()
+    assert (found, desk.question, desk.n_answered) == ([Answer("Fridge", 7)], None, 1)
+
+
+def test_an_answer_to_another_question_is_refused_and_the_first_of_two_counts() -> None:
+    desk = Desk()
+    with pytest.raises(StaleError):
+        desk.give(1, Answer("too early", 0))
+    thread, found = asking(desk)
+    with pytest.raises(StaleError):
+        desk.give(2, Answer("another", 0))
+    desk.give(1, Answer("first", 0))
+    with pytest.raises(StaleError):
+        desk.give(1, Answer("second", 0))
+    thread.join()
+    assert found == [Answer("first", 0)]
+    thread, _ = asking(desk)
+    assert desk.question is not None and desk.question.number == 2
+    desk.stop()
+    thread.join()
+
+
+def test_a_run_that_is_stopped_ends_as_by_ctrl_c() -> None:
+    desk = Desk()
+    thread, found = asking(desk)
+    desk.stop()
+    thread.join()
+    assert (found, desk.n_answered) == ([KeyboardInterrupt], 0)
+
+
+def test_who_waits_for_a_change_learns_of_it() -> None:
+    desk = Desk()
+    seen = desk.version
+    waiting = threading.Thread(target=desk.wait_for_change, args=(seen, 60.0), daemon=True)
+    waiting.start()
+    desk.close()
+    desk.wait_for_readers(60.0)
+    waiting.join(60.0)
+    assert not waiting.is_alive() and desk.is_closed and desk.version > seen
+    desk.wait_for_change(seen, 60.0)  # it has happened: returns at once

@@ -1,0 +1,298 @@
+"""A person's sessions, from the command to the journal: a browser answers by the page's own controls."""
+
+import json
+import re
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.records import RECORDS, NiehAnswer
+from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
+from infthor_eval.runs import UnitRecord, read_run
+
+from ...plans.cut import FORK, cut, write
+
+OURS = "from infthor_eval.cli import main; main()"
+HOSTILE = "Is </script><img src=x onerror='document.title=\"hacked\"'> here?"
+KEY = ("yes", "no", "Fridge", "3", "SideTable, Desk")
+# Ten questions on two trajectories, told apart by their texts.
+QUESTIONS = tuple(
+    Question(f"room-{number % 2}", HOSTILE if number == 9 else f"What is number {number}?", (1,), (KEY[number % 5],))
+    for number in range(10)
+)
+ANSWERS = {question.text: str(question.answers[0]) for question in QUESTIONS}
+
+
+class Session:
+    """A run of a person, and the tab that answers."""
+
+    def __init__(self, browser: Any, output: Path, *words: object) -> None:
+        model = () if "--model" in words else ("--model", "human:browser=false")
+        command = ["-c", OURS, *model, "--output", output, *words]
+        self.process = subprocess.Popen(
+            [sys.executable, *map(str, command)], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+        )
+        self.address = self._address()
+        self.errors: list[str] = []
+        self.tab = self.new_tab(browser)
+
+    def _address(self) -> str:
+        assert self.process.stderr is not None
+        for line in self.process.stderr:
+            found = re.search(r"human: answer at (http://\S+)", line)
+            if found:
+                return found[1]
+        pytest.fail("the run ended without a page")
+
+    def new_tab(self, browser: Any) -> Any:
+        tab = browser.new_page(viewport={"width": 1280, "height": 900})
+        tab.on("pageerror", lambda error: self.errors.append(str(error)))
+        tab.goto(self.address)
+        tab.locator("#desk").wait_for()
+        return tab
+
+    def await_answered(self, number: int) -> None:
+        """Wait until so many are answered and the next one is shown, or that there is none."""
+        self.tab.get_by_text(f"{number} answered", exact=True).wait_for()
+        self.tab.locator("#state:empty, #desk[hidden]").first.wait_for(state="attached")
+
+    @property
+    def question(self) -> str:
+        return self.tab.locator("#question").inner_text().rpartition("Question: ")[2]
+
+    def end(self) -> int:
+        """Wait until the run ends, and return its exit code."""
+        assert self.process.stderr is not None
+        said = self.process.stderr.read()
+        code = self.process.wait(60)
+        assert "Traceback" not in said, said
+        return code
+
+
+@pytest.fixture
+def session(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Session]]:
+    """Starts sessions; ends those that are left."""
+    begun: list[Session] = []
+
+    def begin(*words: object) -> Session:
+        begun.append(Session(browser, tmp_path / "out", *words))
+        return begun[-1]
+
+    yield begin
+    for one in begun:
+        one.process.kill()
+        one.process.wait()
+        one.tab.close()
+
+
+@pytest.fixture
+def data(make_nieh_set: Callable[..., Path]) -> Path:
+    return make_nieh_set(QUESTIONS, n_frames=12)
+
+
+def records(tmp_path: Path) -> list[UnitRecord[NiehAnswer]]:
+    (folder,) = (tmp_path / "out/human").iterdir()
+    return read_run(folder, RECORDS)[1]
+
+
+def by_text(tmp_path: Path) -> dict[str, NiehAnswer]:
+    return {record.payload.question: record.payload for record in records(tmp_path)}
+
+
+def test_ten_questions_by_keyboard_alone(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
+    one = session("--tasks", "nieh_full", "--data", data)
+    keyboard, unknown = one.tab.keyboard, ""
+    for number in range(10):
+        one.await_answered(number)
+        asked = one.question
+        assert one.tab.locator("#place").inner_text() == "1 of 12"
+        keyboard.press("Shift+ArrowRight")
+        keyboard.press(".")
+        assert one.tab.locator("#place").inner_text() == "12 of 12"
+        one.tab.wait_for_timeout(150)  # for which a frame counts as looked at
+        if number == 3:
+            keyboard.press("n")
+            unknown = asked
+            continue
+        keyboard.press("Enter")
+        keyboard.type(ANSWERS[asked])
+        keyboard.press("Enter")
+    one.tab.get_by_text("All is answered. Thank you.").wait_for()
+    assert one.end() == 0
+    assert one.errors == []
+    found = by_text(tmp_path)
+    assert {text: answer.reply for text, answer in found.items()} == ANSWERS | {unknown: "I do not know"}
+    assert all(answer.scores["strict"] == (text != unknown) for text, answer in found.items())
+    assert all(answer.n_watched is not None and 1 <= answer.n_watched <= 3 for answer in found.values())
+    assert all(record.seconds >= 0.15 and record.tokens.context is None for record in records(tmp_path))
+
+
+def test_ten_questions_by_mouse(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
+    one = session("--tasks", "nieh_gt", "--data", data)
+    for number in range(10):
+        one.await_answered(number)
+        asked = one.question
+        if asked == HOSTILE:  # it is text, and no element of it is there
+            assert one.tab.locator("img[src=x]").count() == 0
+            one.tab.locator("#whole summary").click()
+            assert HOSTILE in one.tab.locator("#parts").inner_text()
+        one.tab.locator("#text").click()
+        answer = ANSWERS[asked]
+        one.tab.locator("#text").fill(answer[:2].lower())
+        word = one.tab.locator("#words li", has_text=re.compile(f"^{re.escape(answer)}$"))
+        if word.count():
+            word.click()
+        else:
+            one.tab.locator("#text").fill(answer)
+        one.tab.locator("#send").click()
+    one.tab.get_by_text("All is answered. Thank you.").wait_for()
+    assert one.tab.title() == "infthor-eval: answer"
+    assert one.end() == 0
+    assert one.errors == []
+    assert {text: answer.reply for text, answer in by_text(tmp_path).items()} == ANSWERS
+
+
+def test_exactly_the_frames_are_shown_that_a_model_is_given(session: Callable[..., Session], data: Path) -> None:
+    one = session("--tasks", "nieh_gt", "--data", data, "--frames", "blank")
+    one.await_answered(0)
+    assert one.tab.locator("#place").inner_text() == "1 of 1"  # the clue frame
+    assert one.tab.locator("#parts li").count() == 2
+    shade = one.tab.evaluate(
+        """async () => {
+            const image = document.getElementById("frame");
+            await image.decode();
+            const canvas = document.createElement("canvas"), pen = canvas.getContext("2d");
+            pen.drawImage(image, 0, 0);
+            return [image.naturalWidth, ...pen.getImageData(9, 9, 1, 1).data];
+        }"""
+    )
+    width, red, green, blue, _ = shade
+    assert width == 300 and red == green == blue
+
+
+def test_two_tabs_answer_one_question_once(
+    session: Callable[..., Session], data: Path, tmp_path: Path, browser: Any
+) -> None:
+    one = session("--tasks", "nieh_gt", "--data", data, "--limit", 2)
+    one.await_answered(0)
+    other = one.new_tab(browser)
+    other.route("**/state.json*", lambda route: route.abort())  # it does not learn that the question was answered
+    first = one.question
+    one.tab.locator("#text").fill("first")
+    one.tab.keyboard.press("Enter")
+    one.await_answered(1)
+    other.evaluate("question = question || {number: 1, replies: []}")
+    other.evaluate("send('second')")
+    other.get_by_text("this question was answered already, perhaps in another tab").wait_for()
+    one.tab.locator("#unknown").click()
+    assert one.end() == 0
+    other.close()
+    assert by_text(tmp_path)[first].reply == "first"
+
+
+def test_what_is_no_answer_is_refused_with_the_reason(session: Callable[..., Session], data: Path) -> None:
+    one = session("--tasks", "nieh_gt", "--data", data, "--limit", 1)
+    one.await_answered(0)
+    one.tab.locator("#text").fill("   ")
+    one.tab.keyboard.press("Enter")
+    one.tab.get_by_text("write an answer first").wait_for()
+
+    def post(path: str, body: bytes, **headers: str) -> int:
+        request = urllib.request.Request(path, body, headers)
+        try:
+            with urllib.request.urlopen(request) as answer:
+                return int(answer.status)
+        except urllib.error.HTTPError as error:
+            with error:
+                return error.code
+
+    given = json.dumps({"number": 1, "text": "yes"}).encode()
+    assert post(f"{one.address}answer", b"[]") == 400
+    assert post(f"{one.address}answer", json.dumps({"number": 1, "text": "a" * 2001}).encode()) == 400
+    assert post(f"{one.address}answer", given, Origin="http://elsewhere.example") == 403
+    token = one.address.rstrip("/").rpartition("/")[2]
+    assert post(f"{one.address.replace(token, 'x' * len(token))}answer", given) == 403
+    assert one.question  # nobody has answered it
+    assert post(f"{one.address}answer", given) == 200
+    assert one.end() == 0
+
+
+def test_a_run_that_is_killed_goes_on_where_it_was(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
+    words = ("--tasks", "nieh_gt", "--data", data, "--limit", 3)
+    one = session(*words)
+    one.await_answered(0)
+    first = one.question
+    one.tab.locator("#text").fill("mine")
+    one.tab.keyboard.press("Enter")
+    one.await_answered(1)
+    one.process.kill()
+    one.tab.get_by_text("The run has stopped. All answers are kept").wait_for()
+    again = session(*words)
+    asked = []
+    for number in range(2):
+        again.await_answered(number)
+        asked.append(again.question)
+        again.tab.locator("#unknown").click()
+    assert again.end() == 0
+    assert first not in asked
+    found = by_text(tmp_path)
+    assert {text: answer.reply for text, answer in found.items()} == {first: "mine"} | dict.fromkeys(
+        asked, "I do not know"
+    )
+
+
+def test_a_run_is_stopped_from_the_page(session: Callable[..., Session], data: Path) -> None:
+    one = session("--tasks", "nieh_gt", "--data", data)
+    one.await_answered(0)
+    one.tab.locator("#stop").click()
+    assert one.end() == 130
+
+
+@pytest.mark.parametrize("by", ["keyboard", "mouse"])
+def test_a_plan_is_acted_out(session: Callable[..., Session], tmp_path: Path, by: str) -> None:
+    document = cut(FORK, 1)
+    data = write(tmp_path / "data", document)
+    one = session("--tasks", "infthor_plans", "--data", data)
+    keys = {"MoveAhead": "ArrowUp", "RotateLeft": "ArrowLeft", "RotateRight": "ArrowRight", "LookUp": "PageUp"}
+    keys["LookDown"] = "PageDown"
+    actions = [low["api_action"]["action"] for low in document["plan"]["low_actions"]]
+    assert one.tab.locator("#title").inner_text() == f"Plan 1 of 1: {one.tab.locator('#title').inner_text()[13:]}"
+    assert "goal" in one.tab.locator("#facts").inner_text()
+    for number, action in enumerate(actions, 1):
+        if by == "keyboard":
+            one.tab.keyboard.press(keys[action])
+        else:
+            one.tab.locator("#replies button", has_text=action).first.click()
+        one.await_answered(number)
+        if one.tab.locator("#desk").is_hidden():
+            break  # the plan is done before its last actions
+    one.tab.get_by_text("All is answered. Thank you.").wait_for()
+    assert one.end() == 0
+    assert one.errors == []
+    (folder,) = (tmp_path / "out/human").iterdir()
+    (record,) = read_run(folder, PLAN_RECORDS)[1]
+    assert [step.action for step in record.payload.steps] == actions[:number]
+    assert record.payload.done
+    assert record.payload.reward == record.payload.max_reward > 0
+
+
+def test_people_are_told_apart(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
+    command = ["-c", OURS, "--model", "human:reader=../x", "--tasks", "nieh_gt", "--data", str(data)]
+    refused = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
+    assert "reader is '../x'; write a name" in refused.stderr
+    for reader in ("ann", "ben"):
+        model = f"human:browser=false,reader={reader}"
+        one = session("--model", model, "--tasks", "nieh_gt", "--data", data, "--limit", 1)
+        one.await_answered(0)
+        one.tab.locator("#unknown").click()
+        assert one.end() == 0
+    folders = list((tmp_path / "out/human").iterdir())
+    assert {read_run(folder, RECORDS)[0].config["model"]["reader"] for folder in folders} == {"ann", "ben"}
