@@ -19,6 +19,7 @@ setup(
         "infthor_eval.household": ["*.yaml"],
         "infthor_eval.nieh": ["*.yaml"],
         "infthor_eval.report": ["*.html", "web/*.html", "web/*.css", "web/*.js"],
+        "model_adapters.human": ["*.html", "*.css", "*.js"],
         "infthor_eval.training": ["recipes/*.yaml"],
         "infthor_eval.tasks": ["**/*.yaml"],
         "infthor_eval.results": ["README.md", "published/*.yaml"],
