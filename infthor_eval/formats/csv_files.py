@@ -10,7 +10,7 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import read_text
 
-__all__ = ["CsvRow", "read_rows", "unshield", "write_sheet"]
+__all__ = ["CsvRow", "read_rows", "shield", "unshield", "write_sheet"]
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a cell that begins so is a formula to a spreadsheet
 _SHIELD = "'"  # a cell that begins so is text to a spreadsheet
@@ -78,13 +78,14 @@ def write_sheet(path: Path, columns: Sequence[str], rows: Iterable[Sequence[obje
     with write_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows([_shield(str(cell)) for cell in row] for row in rows)
+        writer.writerows([shield(str(cell)) for cell in row] for row in rows)
 
 
 def unshield(cell: str) -> str:
-    """Return the text that `write_sheet` was given for a cell."""
+    """Return the text that `shield` was given."""
     return cell[1:] if cell.startswith(_SHIELD) and cell[1:].startswith((*_FORMULA, _SHIELD)) else cell
 
 
-def _shield(cell: str) -> str:
+def shield(cell: str) -> str:
+    """Return the text that a spreadsheet shows as this one: a formula gets an apostrophe before it."""
     return _SHIELD + cell if cell.startswith((*_FORMULA, _SHIELD)) else cell

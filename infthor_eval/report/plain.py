@@ -9,6 +9,7 @@ import msgspec
 
 from infthor_eval.report.presenter import Description, Figure, Replay, Timelines
 from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.sample_table import SampleColumn
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
@@ -30,6 +31,7 @@ class PlainPresenter:
     compares_scorers: bool = False
     replay: Replay | None = None
     figures: Mapping[str, Figure] = {}
+    columns: Sequence[SampleColumn] = ()
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: a metric with a value below 0 or above 1 is none."""

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Protocol
 from PIL import Image
 
 from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.sample_table import SampleColumn
 from infthor_eval.report.web.samples import StepRow, Timeline
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
@@ -215,6 +216,7 @@ class Presenter(Protocol):
         compares_scorers: whether the metrics judge the same reply, so that samples can be filtered by disagreement.
         replay: replays recorded episodes; None if the suite has no episodes.
         figures: figures by name, as `report --figure` takes it.
+        columns: columns of the suite in the table of samples (`infthor_eval.report.sample_table`).
     """
 
     title: str
@@ -225,6 +227,7 @@ class Presenter(Protocol):
     compares_scorers: bool
     replay: Replay | None
     figures: Mapping[str, Figure]
+    columns: Sequence[SampleColumn]
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """Whether a metric with these scores is a share, which is shown in percent; others are shown as they are."""

@@ -1,12 +1,13 @@
 """`infthor-eval show`: the results of runs again."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.cli.options.show import ShowOptions, show_options
+from infthor_eval.cli.options.show import ShowOptions, sample_options
 from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.results import print_results, read_run_results
 
@@ -15,11 +16,29 @@ __all__ = ["command"]
 
 @click.command("show", cls=ExampleCommand, example="infthor-eval show results/oracle/RUN results/blind/RUN --full")
 @click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=PATH)
-@show_options
-def command(folders: tuple[Path, ...], **given: Any) -> None:
+@sample_options
+def command(folders: tuple[Path, ...], per_sample: bool, **given: Any) -> None:
     """Print the results of the runs in the folders RUN..., made from their journals, as `run` prints them at its end.
 
-    Several runs of one suite stand in one table.
+    Several runs of one suite stand in one table. With `--per-sample` the samples are printed instead, for other
+    programs: `infthor-eval show RUN --format parquet > samples.parquet`.
     """
     options = ShowOptions.from_click(given)
-    print_results([read_run_results(folder) for folder in folders], options)
+    if per_sample or options.form == "parquet":
+        _print_samples(folders, options)
+    else:
+        print_results([read_run_results(folder) for folder in folders], options)
+
+
+def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
+    from infthor_eval.errors import UsageError
+    from infthor_eval.report.runs import read_report_runs
+    from infthor_eval.report.sample_table import FORMS, encode_samples, sample_table
+    from infthor_eval.suites import find_presenter, find_suite
+
+    if options.form not in FORMS or options.full:
+        raise UsageError(f"--per-sample: is for --format {' and --format '.join(FORMS)}, and --full is for tables")
+    if options.form == "parquet" and sys.stdout.isatty():
+        raise UsageError("--format parquet: is not for a terminal; write it into a file, `> samples.parquet`")
+    table = sample_table(read_report_runs(folders, find_suite, find_presenter))
+    sys.stdout.buffer.write(encode_samples(table, options.form))

@@ -8,7 +8,7 @@ import click
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["ShowOptions", "show_options"]
+__all__ = ["ShowOptions", "sample_options", "show_options"]
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,22 @@ class ShowOptions:
 
 def show_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add --full, --format and --json to a command, which passes them to `ShowOptions.from_click`."""
+    return _with_options(command, click.Choice(["csv", "latex", "markdown"]), "Write the tables in this form.")
+
+
+def sample_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add --per-sample and the options of `show_options`, among them a form for samples alone."""
+    forms = click.Choice(["csv", "latex", "markdown", "parquet"])
+    command = _with_options(command, forms, "Write the tables in this form; parquet has a row per sample.")
+    return click.option(
+        "--per-sample", is_flag=True, help="Write a row per sample, not tables: --format csv or --format parquet."
+    )(command)
+
+
+def _with_options(command: Callable[..., Any], forms: click.Choice[str], help_text: str) -> Callable[..., Any]:
     for option in (
         click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, as in results.json."),
-        click.option(
-            "--format", "form", type=click.Choice(["csv", "latex", "markdown"]), help="Write the tables in this form."
-        ),
+        click.option("--format", "form", type=forms, help=help_text),
         click.option("--full", is_flag=True, help="Show every scorer, column and table, and the published numbers."),
     ):
         command = option(command)

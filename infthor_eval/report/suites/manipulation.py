@@ -18,6 +18,7 @@ from infthor_eval.report.recordings.arm_pictures import arm_pictures
 from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, sheet_rows
 from infthor_eval.report.recordings.reach_view import draw_reach
 from infthor_eval.report.runs import ReportRun, choose_evenly
+from infthor_eval.report.suites.episode_columns import ARM_COLUMNS
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
@@ -113,6 +114,7 @@ class ManipulationPresenter(PlainPresenter):
     reply_label = "ended"
     main_metric = "success"
     replay = ArmEpisodesReplay()
+    columns = ARM_COLUMNS
     figures: Mapping[str, Figure] = {
         "6": Figure("reward of pick-ups and puts along trajectories", _build_figure_6),
         "radius": Figure("success of pick-ups and puts by the radius of the hand", _build_radius_figure, False),

@@ -9,6 +9,7 @@ from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Timelines
 from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitRecord
@@ -26,6 +27,7 @@ class NiehPresenter(PlainPresenter):
     target_label = "gold answer"
     main_metric = "strict"
     compares_scorers = True
+    columns = NIEH_COLUMNS
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`: all of them, although the reference scorer can exceed 1."""

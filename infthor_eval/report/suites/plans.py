@@ -16,6 +16,7 @@ from infthor_eval.report.presenter import Description, EpisodeSelection, Figure,
 from infthor_eval.report.recordings.plan_pictures import plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
 from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.suites.episode_columns import PLAN_COLUMNS
 from infthor_eval.report.web.samples import StepRow
 from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
@@ -90,6 +91,7 @@ class PlansPresenter(PlainPresenter):
     reply_label = "ended"
     main_metric = "success"
     replay = PlansReplay()
+    columns = PLAN_COLUMNS
     figures: Mapping[str, Figure] = {"7": Figure("reward of plans over steps and over context tokens", _build_figure_7)}
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:

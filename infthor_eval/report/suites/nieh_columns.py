@@ -1,0 +1,51 @@
+"""Columns of NIEH in the table of samples."""
+
+from functools import partial
+
+from infthor_eval.nieh.above_guessing import score_above_guessing
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.report.sample_table import SampleColumn, payload_column
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["NIEH_COLUMNS"]
+
+
+def _guess_score(scorer: str, record: UnitRecord[NiehAnswer]) -> float | None:
+    guess = record.payload.guess
+    return None if guess is None else guess.scores.get(scorer)
+
+
+def _above_guessing(scorer: str, record: UnitRecord[NiehAnswer]) -> float | None:
+    return score_above_guessing(record.payload, scorer)
+
+
+def _clues(name: str, record: UnitRecord[NiehAnswer]) -> int | None:
+    return getattr(record.payload.shown_clues, name, None)
+
+
+def _recall(name: str, record: UnitRecord[NiehAnswer]) -> float | None:
+    return getattr(record.payload.recall, name, None)
+
+
+def _n_recalled(record: UnitRecord[NiehAnswer]) -> int | None:
+    recall = record.payload.recall
+    return None if recall is None else len(recall.recalled)
+
+
+NIEH_COLUMNS = (
+    payload_column("question", str),
+    payload_column("question_type", str),
+    SampleColumn("answers", str, lambda record: ", ".join(map(str, record.payload.answers))),
+    payload_column("reply", str),
+    payload_column("thinking", str),
+    payload_column("file", str),
+    payload_column("n_clues", int),
+    SampleColumn("n_clues_shown", int, partial(_clues, "n_shown")),
+    SampleColumn("n_frames_after_clues", int, partial(_clues, "n_after")),
+    *(SampleColumn(f"guess_{scorer}", float, partial(_guess_score, scorer)) for scorer in SCORERS),
+    *(SampleColumn(f"above_guessing_{scorer}", float, partial(_above_guessing, scorer)) for scorer in SCORERS),
+    SampleColumn("n_recalled", int, _n_recalled),
+    SampleColumn("build_seconds", float, partial(_recall, "build_s")),
+    SampleColumn("recall_seconds", float, partial(_recall, "recall_s")),
+)
