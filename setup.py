@@ -18,7 +18,7 @@ setup(
         "infthor_eval.plans": ["*.yaml"],
         "infthor_eval.household": ["*.yaml"],
         "infthor_eval.nieh": ["*.yaml"],
-        "infthor_eval.report": ["*.html", "web/*.html", "web/*.css", "web/*.js"],
+        "infthor_eval.report": ["*.html", "web/*.html", "web/*.css", "web/*.js", "live/live.*"],
         "model_adapters.human": ["*.html", "*.css", "*.js"],
         "infthor_eval.training": ["recipes/*.yaml"],
         "infthor_eval.tasks": ["**/*.yaml"],

@@ -30,6 +30,7 @@ _COMMANDS = {
         "show": "Print the results of runs, also as CSV, LaTeX, Markdown or JSON.",
         "compare": "Compare two runs on the same data.",
         "report": "Write a page with results and all samples, or a figure of the paper.",
+        "watch-run": "Open a page on a run as it goes.",
         "watch": "Write a video of an agent or an arm.",
         "import-replies": "Store replies and counts of plans that others made, as runs.",
         "rescore": "Score the replies of a run again, also with your own scorer or a judge.",

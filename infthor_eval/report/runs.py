@@ -65,6 +65,12 @@ class ReportRun:
         tasks: Mapping[str, Any] = self.header.config.get("tasks", {})
         return tasks
 
+    @property
+    def simulator(self) -> str:
+        """Name of the simulator that the frames are from, or names separated by commas; empty if it is not known."""
+        of_tasks = {about.get("simulator") for about in self.tasks.values() if isinstance(about, Mapping)}
+        return str(self.header.config.get("simulator", "") or ", ".join(sorted(filter(None, of_tasks))))
+
     def dataset(self, task: str) -> Mapping[str, Any]:
         """Return the settings of a task's data (`dataset_kwargs` of its file)."""
         settings = self.tasks[task].get("config", {}).get("dataset_kwargs", {})
@@ -76,6 +82,15 @@ class ReportRun:
         if main is None:
             return next(iter(scores.values()), 0.0)
         return scores.get(main, max(scores.values(), default=0.0))
+
+    def outcome(self, record: UnitRecord[Any]) -> str:
+        """Return how a unit ended: "right", "partly", "wrong", "failed" or "excluded"."""
+        if record.excluded is not None:
+            return "excluded"
+        if record.failure is not None:
+            return "failed"
+        score = self.main_score(record)
+        return "right" if score >= 1 else "partly" if score > 0 else "wrong"
 
 
 def read_report_runs(

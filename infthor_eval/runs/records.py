@@ -74,12 +74,14 @@ class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag
         suite: name of the suite, which knows the payloads.
         name: name of the run in tables and folders.
         config: everything that can change a number, as JSON values.
+        n_units: number of units of the run; None where its records were made without a driver.
         format: format of the journal.
     """
 
     suite: str
     name: str
     config: dict[str, Any]
+    n_units: int | None = None
     format: int = FORMAT
 
     def __post_init__(self) -> None:

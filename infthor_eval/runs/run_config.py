@@ -21,7 +21,7 @@ def header_of(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -
     ours = {"suite_code": dict(request.suite_code)} if request.suite_code else {}
     model = {"name": subject.name, **subject.identity()}
     config = run_config(suite.name, model, code, {**ours, **workload.config}, tasks.limit, tasks.seed)
-    return RunHeader(suite=suite.name, name=request.label, config=config)
+    return RunHeader(suite=suite.name, name=request.label, config=config, n_units=workload.n_units)
 
 
 def run_config(

@@ -13,7 +13,7 @@ from infthor_eval.runs.records import RunHeader
 from infthor_eval.runs.results import RESULTS
 from infthor_eval.runs.shards import FOLDER, read_failures, read_header
 
-__all__ = ["BrokenRun", "Results", "StoredRun", "find_runs", "read_results"]
+__all__ = ["BrokenRun", "Results", "StoredRun", "find_runs", "read_results", "run_folders"]
 
 _DEPTH = 4  # levels of folders that are searched: results may hold sets with thousands of frames
 
@@ -61,7 +61,7 @@ def find_runs(folder: Path) -> Iterator[StoredRun | BrokenRun]:
     """
     if not folder.is_dir():
         raise DataError(f"{folder}: no such folder; give the results folder of a run (`--output`, else results)")
-    for run in _run_folders(folder, _DEPTH):
+    for run in run_folders(folder):
         try:
             yield _read_run(run)
         except InfthorError as error:
@@ -81,14 +81,19 @@ def read_results(folder: Path) -> Results | None:
         return msgspec.json.decode(read_bytes(path, hint), type=Results)
 
 
-def _run_folders(folder: Path, depth: int) -> Iterator[Path]:
+def run_folders(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
+    """Yield the folders of runs at and below a folder, at most `depth` levels deep.
+
+    Raises:
+        DataError: a folder cannot be searched.
+    """
     if (folder / FOLDER).is_dir() or (folder / RESULTS).is_file():
         yield folder
     elif depth:
         with wrap_errors(f"{folder}: cannot be searched", "make it readable, or give another folder"):
             below = sorted(path for path in folder.iterdir() if path.is_dir() and not path.is_symlink())
         for path in below:
-            yield from _run_folders(path, depth - 1)
+            yield from run_folders(path, depth - 1)
 
 
 def _read_run(folder: Path) -> StoredRun:

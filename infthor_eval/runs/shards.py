@@ -18,6 +18,8 @@ __all__ = [
     "RunLog",
     "check_format",
     "find_shards",
+    "parse_header",
+    "parse_record",
     "read_failures",
     "read_header",
     "read_lines",
@@ -75,7 +77,7 @@ def read_header(run: Path) -> RunHeader:
     """
     shards = find_shards(run)
     if shards:
-        return _read_header(shards[0], read_lines(shards[0]))
+        return parse_header(shards[0], next(iter(read_lines(shards[0])), b""))
     if (run / _FORMAT_1).is_file():
         raise DataError(f"{run}: its journal is of format 1, this version reads {FORMAT}; run the evaluation again")
     raise DataError(f"{run}: no journal in it; give the folder of a run")
@@ -153,16 +155,25 @@ def read_shard(path: Path, decoder: Decoder, log: RunLog[Any]) -> None:
     lines = read_lines(path)
     if not lines:
         return  # created by a worker that was killed before it wrote the header
-    header = _read_header(path, lines)
+    header = parse_header(path, lines[0])
     if log.header is not None and canonical_json(header.config) != canonical_json(log.header.config):
         raise DataError(f"{path}: belongs to another run than the shards beside it; take it out of the folder")
     log.header = header
     for number, line in enumerate(lines[1:], 2):
-        with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON):
-            record = decoder.decode(line)
-        if isinstance(record, RunHeader):
-            raise DataError(f"{path}, line {number}: a second header in the middle of the records; {_HINT}")
-        log.add(record)
+        log.add(parse_record(path, number, line, decoder))
+
+
+def parse_record(path: Path, number: int, line: bytes, decoder: Decoder) -> UnitRecord[Any] | ArtifactRecord[Any]:
+    """Return the record in a line of a shard; `number` is the line's, from 1.
+
+    Raises:
+        DataError: the line is bad, or a header.
+    """
+    with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON):
+        record: UnitRecord[Any] | ArtifactRecord[Any] | RunHeader = decoder.decode(line)
+    if isinstance(record, RunHeader):
+        raise DataError(f"{path}, line {number}: a second header in the middle of the records; {_HINT}")
+    return record
 
 
 def read_lines(path: Path) -> list[bytes]:
@@ -191,8 +202,12 @@ def check_format(path: Path, line: bytes) -> None:
         )
 
 
-def _read_header(path: Path, lines: list[bytes]) -> RunHeader:
-    first = lines[0] if lines else b""
-    check_format(path, first)
+def parse_header(path: Path, line: bytes) -> RunHeader:
+    """Return the header in the first line of a shard.
+
+    Raises:
+        DataError: the line is no header, or that of another format.
+    """
+    check_format(path, line)
     with wrap_errors(f"{path}, line 1: not the first line of a journal", _HINT, catch=NOT_JSON):
-        return msgspec.json.decode(first, type=RunHeader)
+        return msgspec.json.decode(line, type=RunHeader)

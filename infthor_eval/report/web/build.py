@@ -128,13 +128,12 @@ def _metrics(runs: Sequence[ReportRun], samples: Sequence[PageSample]) -> list[s
 
 def _about(run: ReportRun) -> About:
     config = run.header.config
-    simulators = {about.get("simulator") for about in run.tasks.values() if isinstance(about, dict)}
     facts = {
         "suite": run.suite.name,
         "model": str(config.get("model", {}).get("name", "")),
         "checkpoint": str(config.get("model", {}).get("checkpoint", "")),
         "tasks": ", ".join(run.tasks),
-        "simulator": str(config.get("simulator", "") or ", ".join(sorted(filter(None, simulators)))),
+        "simulator": run.simulator,
         "seed": str(config.get("seed", "")),
         "limit": str(config["limit"]) if config.get("limit") is not None else "",
         "infthor-eval": str(config.get("infthor_eval", "")),

@@ -64,7 +64,7 @@ def _sample(
 def _result(run: ReportRun, record: Record, pictures: EpisodePictures) -> SampleResult:
     presenter, tokens = run.presenter, record.tokens
     return SampleResult(
-        outcome=_outcome(record, run.main_score(record)),
+        outcome=run.outcome(record),
         reply=presenter.reply(record),
         scores=run.suite.scores(record),
         reason=record.failure or record.excluded or "",
@@ -77,14 +77,6 @@ def _result(run: ReportRun, record: Record, pictures: EpisodePictures) -> Sample
         map=pictures.map,
         note=pictures.note,
     )
-
-
-def _outcome(record: Record, score: float) -> str:
-    if record.excluded is not None:
-        return "excluded"
-    if record.failure is not None:
-        return "failed"
-    return "right" if score >= 1 else "partly" if score > 0 else "wrong"
 
 
 def _with_pictures(steps: Sequence[StepRow], frames: Sequence[int | None]) -> tuple[StepRow, ...]:

@@ -1,0 +1,48 @@
+"""`watch-run`: prints the address of a page, and ends on Ctrl-C; the run is as it was."""
+
+import json
+import signal
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+
+import pytest
+
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs.journal import Journal
+from tests.faults.told import said_in_one_line
+from tests.nieh.made import record
+from tests.report.live.conftest import header_of
+
+pytest.importorskip("uvicorn", reason="the extra `page` is not installed: pip install 'infthor-eval[page]'")
+
+
+def test_the_page_is_served_until_ctrl_c_while_the_run_goes_on(tmp_path):
+    words = [sys.executable, "-c", "from infthor_eval.cli import main; main()", "watch-run", str(tmp_path)]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        place, _, address = process.stdout.readline().strip().partition(": ")
+        assert place == str(tmp_path)
+        with Journal(tmp_path / "m" / "nieh-1", header_of(), RECORDS) as journal:
+            journal.append(record(0, "Sofa", ("Sofa",)))
+            with urllib.request.urlopen(f"{address}state.json", timeout=600) as answer:
+                state = json.load(answer)
+            journal.append(record(1, "Bed", ("Sofa",)))
+        assert (state["totals"]["n_done"], state["n_units"]) == (1, 8)
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(address.rpartition("/")[0][:-1] + "/", timeout=600)
+    finally:
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=600)
+    assert (process.returncode, out, err) == (0, "", "")
+
+
+def test_a_file_is_no_folder_of_runs(run, tmp_path):
+    (tmp_path / "file").write_text("")
+    said_in_one_line(run("watch-run", tmp_path / "file"), "is a file; give the folder of a run, or one above it")
+
+
+def test_without_the_extra_it_says_how_to_install_it(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    said_in_one_line(run("watch-run", tmp_path), "pip install 'infthor-eval[page]'")
