@@ -52,7 +52,8 @@ class Desk:
         self._question: Question | None = None
         self._answer: Answer | None = None
         self._version = 0
-        self._n_readers = 0
+        self._has_readers = False
+        self._is_told = False
         self._n_answered = 0
         self._is_closed = self._is_stopped = False
 
@@ -116,15 +117,19 @@ class Desk:
     def wait_for_change(self, version: int, timeout_s: float) -> None:
         """Wait until there is another version than this one, or for so many seconds."""
         with self._changed:
-            self._n_readers += 1
+            self._has_readers = True
             self._changed.wait_for(lambda: self._version != version, timeout_s)
-            self._n_readers -= 1
+
+    def tell_closed(self) -> None:
+        """Say that a page has learned that nothing will be asked any more."""
+        with self._changed:
+            self._is_told = True
             self._changed.notify_all()
 
-    def wait_for_readers(self, timeout_s: float) -> None:
-        """Wait until all who waited for a change have learned of it, for so many seconds at most."""
+    def wait_until_told(self, timeout_s: float) -> None:
+        """Wait until a page has learned that it is over, if there is one, for so many seconds at most."""
         with self._changed:
-            self._changed.wait_for(lambda: not self._n_readers, timeout_s)
+            self._changed.wait_for(lambda: self._is_told or not self._has_readers, timeout_s)
 
     def stop(self) -> None:
         """Let the run end as Ctrl-C does: what is asked now stays unanswered, and is asked when the run goes on."""

@@ -31,6 +31,8 @@ async function follow() {
       if (state.closed) return;
     } catch (error) {
       say("The run has stopped. All answers are kept: start the same command again, and open the address that it prints.", true);
+      byId("desk").hidden = true;
+      question = null;
       seen = "";
       await new Promise((resolve) => setTimeout(resolve, AGAIN_MS));
     }

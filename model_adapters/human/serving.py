@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import msgspec
+from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
@@ -20,7 +21,7 @@ from model_adapters.human.view import frames_of, state_of
 __all__ = ["desk_routes", "serve_desk"]
 
 _WAIT_S = 20.0  # a page asks again after so long without a change
-_LAST_LOOK_S = 1.0  # for open pages to learn that it is over
+_LAST_LOOK_S = 3.0  # for open pages to learn that it is over
 _LONGEST = 2000  # characters of an answer
 _PACKAGE = "model_adapters.human"
 
@@ -45,7 +46,7 @@ def serve_desk(desk: Desk, options: HumanOptions) -> Iterator[None]:
         if options.browser and _has_screen():
             webbrowser.open(server.address)
         yield
-        desk.wait_for_readers(_LAST_LOOK_S)
+        desk.wait_until_told(_LAST_LOOK_S)
 
 
 def desk_routes(desk: Desk) -> list[BaseRoute]:
@@ -56,7 +57,8 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
         seen = request.query_params.get("seen", "")
         if seen.isdecimal():
             await run_in_threadpool(desk.wait_for_change, int(seen), _WAIT_S)
-        return JSONResponse(state_of(desk))
+        told = state_of(desk)
+        return JSONResponse(told, background=BackgroundTask(desk.tell_closed) if told["closed"] else None)
 
     async def frame(request: Request) -> Response:
         """One frame of the question of a number."""

@@ -77,7 +77,20 @@ def test_who_waits_for_a_change_learns_of_it() -> None:
     waiting = threading.Thread(target=desk.wait_for_change, args=(seen, 60.0), daemon=True)
     waiting.start()
     desk.close()
-    desk.wait_for_readers(60.0)
     waiting.join(60.0)
     assert not waiting.is_alive() and desk.is_closed and desk.version > seen
     desk.wait_for_change(seen, 60.0)  # it has happened: returns at once
+
+
+def test_it_ends_when_a_page_has_learned_of_it_or_when_there_is_none() -> None:
+    desk = Desk()
+    desk.close()
+    desk.wait_until_told(60.0)  # nobody has asked: returns at once
+    desk.wait_for_change(-1, 60.0)
+    ending = threading.Thread(target=desk.wait_until_told, args=(60.0,), daemon=True)
+    ending.start()
+    ending.join(0.05)
+    assert ending.is_alive()
+    desk.tell_closed()
+    ending.join(60.0)
+    assert not ending.is_alive()
