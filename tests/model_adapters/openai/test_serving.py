@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import pytest
 
 from infthor_eval.errors import ModelError
@@ -116,7 +117,9 @@ def test_all_bundled_questions_are_answered_alike(
 def test_bundled_plans_are_carried_out_alike(both: Callable[..., list[list[UnitRecord[Any]]]]) -> None:
     behind, here = both("--tasks", "infthor_plans_mini", "--limit", 2, "--greedy", **WITHOUT_STOP, **WITHOUT_PENALTY)
     assert len(behind) > 40
-    assert [record.payload for record in behind] == [record.payload for record in here]
+    # A server counts the tokens of requests alone, not those of a history that it is not asked.
+    uncounted = [msgspec.structs.replace(record.payload, clue_tokens=None) for record in here]
+    assert [record.payload for record in behind] == uncounted
 
 
 def test_turns_and_systems_are_taken(served: Served, frames: list[FrameRef]) -> None:
