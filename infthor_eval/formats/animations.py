@@ -2,10 +2,11 @@
 
 import tempfile
 from collections.abc import Iterable
-from itertools import chain, count
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError, wrap_errors
@@ -16,7 +17,9 @@ __all__ = ["ANIMATION_FORMATS", "require_animation_name", "write_animation"]
 ANIMATION_FORMATS = (".mp4", ".gif")
 # VP9, which browsers play, or MPEG-4 where an OpenCV lacks VP9. No OpenCV wheel encodes H.264.
 _CODECS = ("vp09", "mp4v")
-_COLOURS = 128  # colours of a picture in a GIF
+_COLOURS = 255  # colours of a GIF; one more is for what stays as it was
+_SHADES = 32  # of red, green and blue: pixels are counted in cubes of colours, by their mean
+_COUNTED = 1 << 18  # votes of all pixels on the palette
 _HINT = "make room, or give another place with --out"
 
 
@@ -58,15 +61,40 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
 
 
 def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    taken = count()  # advances with each picture
-    # No dithering: its noise would make the file larger.
-    quantized = (
-        picture.quantize(_COLOURS, dither=Image.Dither.NONE) for picture, _ in zip(pictures, taken, strict=False)
-    )
-    first = next(quantized)
+    """Write a GIF whose pictures share one palette: with one each, what does not move would change its colours."""
+    counts = np.zeros((4, _SHADES**3))
+    kept = []
+    for number, picture in enumerate(pictures):  # all of them are needed before the first is written
+        counts += _count_colours(picture)
+        kept.append(path.with_name(f"{number}.png"))
+        picture.save(kept[-1], compress_level=1)
+    palette = _choose_palette(counts)
+    quantized = (_in_palette(file, palette) for file in kept)
     duration = max(20, round(100 / per_second) * 10)  # GIF has hundredths of a second; viewers take 10 ms for 100 ms
-    first.save(path, save_all=True, append_images=quantized, duration=duration, loop=0, optimize=False)
-    return next(taken)
+    next(quantized).save(path, save_all=True, append_images=quantized, duration=duration, loop=0, optimize=False)
+    return len(kept)
+
+
+def _count_colours(picture: Image.Image) -> NDArray[np.float64]:
+    """Return number, and sums of red, green and blue, of the pixels in each of `_SHADES`³ cubes of colours: [4, n]."""
+    pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(np.int64)
+    cubes = pixels * _SHADES // 256 @ (_SHADES**2, _SHADES, 1)
+    weights = (None, *pixels.T)
+    return np.stack([np.bincount(cubes, weight, _SHADES**3).astype(np.float64) for weight in weights])
+
+
+def _choose_palette(counts: NDArray[np.float64]) -> Image.Image:
+    """Return an image whose palette suits all counted pixels; a rare colour has a vote, too."""
+    number, *sums = counts[:, counts[0] > 0]
+    colours = np.round(np.stack(sums, axis=-1) / number[:, None]).astype(np.uint8)
+    votes = np.ceil(number * (_COUNTED / number.sum())).astype(np.int64)
+    source = Image.fromarray(np.repeat(colours, votes, axis=0)[None])
+    return source.quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
+
+
+def _in_palette(file: Path, palette: Image.Image) -> Image.Image:
+    with Image.open(file) as picture:
+        return picture.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)  # noise makes files larger
 
 
 def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:

@@ -1,6 +1,7 @@
 """Files that move."""
 
 import cv2
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -39,6 +40,24 @@ def test_a_gif_shows_every_picture_for_its_time(tmp_path):
             seen.append(gif.convert("RGB").getpixel((5, 5))[0])
     assert sum(durations) == pytest.approx(len(SHADES) * 250, abs=10 * len(SHADES))
     assert seen == sorted(set(SHADES))  # two alike are one, shown for twice as long
+
+
+def test_what_does_not_move_keeps_its_colours_in_a_gif(tmp_path):
+    path = tmp_path / "a.gif"
+    ramp = np.linspace(0, 255, 64).astype(np.uint8)
+    still = np.stack([np.broadcast_to(ramp, (48, 64)), np.full((48, 64), 90, np.uint8), ramp[::-1] + np.zeros((48, 1))])
+    still = np.moveaxis(still, 0, -1).astype(np.uint8)
+    noise = np.random.default_rng(0).integers(0, 256, (6, 48, 64, 3), dtype=np.uint8)
+    pictures = [np.concatenate([still, moving // (number + 1)], axis=1) for number, moving in enumerate(noise)]
+    write_animation(path, map(Image.fromarray, pictures), 4.0)
+    with Image.open(path) as gif:
+        seen = []
+        for number in range(gif.n_frames):
+            gif.seek(number)
+            seen.append(np.asarray(gif.convert("RGB"))[:, :64])
+    assert len(seen) == len(pictures)
+    assert all((frame == seen[0]).all() for frame in seen)
+    assert abs(seen[0].astype(int) - still).mean() < 12
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif"])

@@ -64,7 +64,8 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
         "Pick-up",
         "Put",
         "run 0",
-        "Cumulative reward on arm_pickup and arm_put: mean over 2 trajectories, 95 % intervals shaded",
+        "Cumulative reward on arm_pickup and arm_put",
+        "mean over 2 trajectories, 95 % intervals shaded",
         "embedded simulator: not comparable with the paper's curves",
         "the runs differ in the radius of the hand's sphere: 0.1, 0.5 m",
     ):

@@ -51,7 +51,8 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
         "reward so far (points)",
         "expert's steps up to the end of the plan (low-level actions)",
         "context of the plan's last request (tokens)",
-        "Cumulative reward on infthor_plans: mean over 3 trajectories, 95 % intervals shaded",
+        "Cumulative reward on infthor_plans",
+        "mean over 3 trajectories, 95 % intervals shaded",
         "embedded simulator: not comparable with the paper's curves",
         "context tokens are not reported: _random, planner",
     ):

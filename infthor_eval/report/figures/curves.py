@@ -76,5 +76,6 @@ def _draw_curve(axes: Axes, curve: Curve, look: Look, order: int) -> None:
 
 def _heading(curves: RewardCurves) -> list[str]:
     intervals = ", 95 % intervals shaded" if curves.n_trajectories > 1 else ""
-    title = f"Cumulative reward on {curves.task}: mean over {trajectories_text(curves.n_trajectories)}{intervals}"
-    return [title, *filter(None, [embedded_label(curves)])]
+    mean = f"mean over {trajectories_text(curves.n_trajectories)}{intervals}"
+    # A line each: together they would be wider than a figure of one panel, and be wrapped in the middle.
+    return [f"Cumulative reward on {curves.task}", mean, *filter(None, [embedded_label(curves)])]
