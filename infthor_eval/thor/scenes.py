@@ -2,28 +2,36 @@
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.floor_plans import write_floor_plan
+from infthor_eval.thor.room_view import find_room_view
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.view import SimulatorView
+from infthor_eval.thor.teleport import teleport_call
+from infthor_eval.thor.view import SimulatorView, Vector
 
 __all__ = ["dump_scene", "scene_pictures"]
 
 
 def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the scene from above, and the agent's first frame: RGB, uint8, [height, width, 3].
+    """Return the scene from above, and from where most of it is seen: RGB, uint8, [height, width, 3].
 
     Raises:
         SimulatorError: the simulator does not have the scene, or sends no frames.
     """
     first = simulator.reset(scene).frame
-    above = _query(simulator, "ToggleMapView").frame
-    if first is None or above is None:
+    if first is None:
         raise SimulatorError(f"scene {scene}: the simulator sends no frames; start it with rendering")
-    return above, first
+    places = [msgspec.convert(place, Vector) for place in _query(simulator, "GetReachablePositions").result]
+    pose = find_room_view(simulator, places, first.shape[0] * first.shape[1])
+    room = simulator.query(**teleport_call(pose)).frame
+    above = _query(simulator, "ToggleMapView").frame
+    assert room is not None
+    assert above is not None
+    return above, room
 
 
 def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool = False) -> int:

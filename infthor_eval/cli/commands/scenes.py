@@ -30,7 +30,7 @@ def command() -> None:
 )
 @click.option("--overwrite", is_flag=True, help="Replace a file with other content.")
 def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: bool) -> None:
-    """Draw scene NAME from above and as the agent first sees it, side by side."""
+    """Draw scene NAME from above and from where an agent sees most of it, side by side."""
     import io
 
     from PIL import Image
@@ -46,17 +46,17 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     if path.suffix.lower() not in _PICTURES:
         raise click.UsageError(f"--out {path}: not an image; use {', '.join(_PICTURES)}")
     with Simulator(embedded_launch(data), width=size, height=size, quality="Ultra") as simulator:
-        above, first = scene_pictures(simulator, name)
+        above, room = scene_pictures(simulator, name)
     sheet = Image.new("RGB", (2 * size, size))
     sheet.paste(Image.fromarray(above), (0, 0))
-    sheet.paste(Image.fromarray(first), (size, 0))
+    sheet.paste(Image.fromarray(room), (size, 0))
     picture = io.BytesIO()
     sheet.save(picture, format=Image.registered_extensions()[path.suffix.lower()])
     if not overwrite:
         refuse_overwrite(path, picture.getvalue())
     with wrap_errors(f"{path}: cannot be written", "give another place with --out"), write_atomically(path) as partial:
         partial.write_bytes(picture.getvalue())
-    print_line(f"{name}: {path} (from above; first view)")
+    print_line(f"{name}: {path} (from above; from where most is seen)")
 
 
 @command.command("dump", cls=ExampleCommand, example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes")

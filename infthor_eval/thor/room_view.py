@@ -1,0 +1,83 @@
+"""Where to stand to see a room: of the places that can be reached, the one that shows most of what is in it."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.teleport import teleport_call
+from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
+
+__all__ = ["find_room_view"]
+
+_N_PLACES = 24
+_HEADINGS = (0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0)
+_HORIZONS = (0.0, 20.0)  # degrees below the horizontal
+_N_TRIALS = 2  # headings that are tried at a place
+_HALF_FIELD = 30.0  # degrees to either side of the camera's axis
+_NEAREST = 1.0  # metres; what is nearer hides the room
+_SEEN = 0.001  # share of the frame from which on an object is seen
+_LARGEST = 0.15  # share of the frame beyond which an object hides more of the room than it shows
+_HIDDEN = 40  # objects that a frame's whole area would show
+
+
+def find_room_view(simulator: Simulator, positions: Sequence[Vector], n_pixels: int) -> AgentPose:
+    """Return the pose that shows most objects; the agent returns to its own.
+
+    Places far from each other are tried, at each the headings with the most objects before the agent.
+
+    Args:
+        simulator: the simulator, with a scene; it renders instances.
+        positions: places that the agent can reach.
+        n_pixels: number of pixels of a frame.
+    """
+    start = simulator.view
+    poses = [
+        replace(start.agent, position=place, rotation=heading, horizon=horizon)
+        for place in _far_apart(positions)
+        for heading in _promising_headings(start, place)
+        for horizon in _HORIZONS
+    ]
+    best = max([start.agent, *poses], key=lambda pose: _score(simulator, pose, n_pixels))
+    simulator.query(**teleport_call(start.agent), renderImage=False)
+    return best
+
+
+def _far_apart(positions: Sequence[Vector]) -> list[Vector]:
+    """Choose places one by one, each as far as possible from those before it: corners come first."""
+    if not positions:
+        return []
+    points = np.array([(place.x, place.z) for place in positions])
+    distances: NDArray[np.float64] = np.hypot(*(points - points.mean(axis=0)).T)
+    chosen = []
+    for _ in range(min(_N_PLACES, len(positions))):
+        place = int(distances.argmax())
+        chosen.append(positions[place])
+        distances = np.minimum(distances, np.hypot(*(points - points[place]).T))
+    return chosen
+
+
+def _promising_headings(view: SimulatorView, place: Vector) -> list[float]:
+    return sorted(_HEADINGS, key=lambda heading: -_n_before(view, place, heading))[:_N_TRIALS]
+
+
+def _n_before(view: SimulatorView, place: Vector, heading: float) -> int:
+    """Return the number of objects in the field of view, walls aside."""
+    offsets = [(item.position.x - place.x, item.position.z - place.z) for item in view.objects.values()]
+    return sum(
+        math.hypot(dx, dz) >= _NEAREST
+        and abs((math.degrees(math.atan2(dx, dz)) - heading + 180) % 360 - 180) <= _HALF_FIELD
+        for dx, dz in offsets
+    )
+
+
+def _score(simulator: Simulator, pose: AgentPose, n_pixels: int) -> float:
+    """Return how many objects a frame shows, less those that large ones hide; -1 where nobody can stand."""
+    view = simulator.query(**teleport_call(pose, force=False), renderImage=False)
+    if not view.success or not view.instances:
+        return -1.0
+    shares = [instance.pixels / n_pixels for instance in view.instances.values()]
+    return sum(share >= _SEEN for share in shares) - _HIDDEN * sum(max(0.0, share - _LARGEST) for share in shares)
