@@ -20,6 +20,8 @@ from infthor_eval.report.web.sections import Section
 
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
 
+_SCRIPTS = ("elements.js", "sample.js", "report.js")  # one script on the page, in this order
+
 # In a script element "</script" and "<!--" would end or twist it; the line separators end a line of a script.
 _ESCAPED = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
 
@@ -90,7 +92,7 @@ def write_page(page: Page, path: Path) -> int:
     Raises:
         DataError: it cannot be written.
     """
-    script = _read("report.js")
+    script = "".join(map(_read, _SCRIPTS))
     # Questions and replies come from data files and models: whatever they hold is shown as text.
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(_read("report.html")).render(

@@ -1,0 +1,21 @@
+"use strict";
+// What the parts of the browser of samples share. Whatever the data hold is put into the page as text, never as markup.
+const byId = id => document.getElementById(id);
+const { runs, suites, metrics, samples, pictures } = JSON.parse(byId("data").textContent);
+const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", excluded: "–" };
+
+const make = (name, attributes = {}, ...children) => {
+  const element = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  element.append(...children.filter(child => child !== null));
+  return element;
+};
+const picture = (number, alt) => number === undefined || number === null
+  ? make("div", { class: "blank" }, "no picture")
+  : make("img", { src: `data:image/webp;base64,${pictures[number]}`, alt, loading: "lazy" });
+const mark = (result, label) => make(
+  "span", { class: `mark ${result?.outcome ?? "none"}`, title: `${label}: ${result?.outcome ?? "not evaluated"}` },
+  result ? MARKS[result.outcome] : "·");
+
+const resultsOf = sample => sample.results.filter(Boolean);
+const ofSuite = sample => suites[sample.suite].runs.map(at => [sample.results[at], at]); // with places of the runs

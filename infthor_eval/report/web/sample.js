@@ -1,0 +1,83 @@
+// One sample: the question, the results of all runs, frames and episodes.
+const partsOf = sample => {
+  const facts = [sample.suite, sample.task, sample.kind, sample.clues && `clues: ${sample.clues}`, sample.variant,
+    sample.cluster, sample.id].filter(Boolean).join("  ·  ");
+  return [
+    make("h3", {}, sample.title),
+    sample.target ? make("p", { class: "target" }, `${suites[sample.suite].target}: `, make("b", {}, sample.target)) : "",
+    results(sample),
+    ...details(sample),
+    ...(sample.timeline ? timeline(sample.timeline) : []),
+    ...episodes(sample),
+    make("p", { class: "note" }, facts),
+  ];
+};
+
+const results = sample => {
+  const names = metrics.filter(name => resultsOf(sample).some(result => result.scores?.[name] !== undefined));
+  const head = ["run", "", suites[sample.suite].reply, ...names, "seconds", "tokens"];
+  const rows = ofSuite(sample).map(([result, at]) => {
+    if (!result) return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(null, runs[at])), make("td", { class: "note" }, "not evaluated"));
+    const reason = [result.reason, ...(result.faults ?? [])].filter(Boolean).join("; ");
+    const reply = make("td", {}, result.reply ?? "", reason ? make("span", { class: "note" }, ` (${reason})`) : "");
+    const scores = names.map(name => make("td", { class: "n" }, result.scores?.[name]?.toFixed(2) ?? "-"));
+    const [context, cached] = result.tokens ?? [];
+    const tokens = context == null ? "-" : context.toLocaleString("en") + (cached ? ` (${cached.toLocaleString("en")} cached)` : "");
+    return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(result, runs[at]), ` ${result.outcome}`), reply,
+      ...scores, make("td", { class: "n" }, (result.seconds ?? 0).toFixed(2)), make("td", { class: "n" }, tokens));
+  });
+  return make("div", { class: "scroll" }, make("table", { class: "results" },
+    make("thead", {}, make("tr", {}, ...head.map((name, at) => make("th", at > 2 ? { class: "n" } : {}, name)))),
+    make("tbody", {}, ...rows)));
+};
+
+// What the records of a suite without a presenter hold.
+const details = sample => sample.results
+  .map((result, at) => result?.details ? [result.details, runs[at]] : null).filter(Boolean)
+  .map(([facts, label]) => make("div", { class: "details" }, make("b", {}, label), make("dl", {},
+    ...Object.entries(facts).flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]))));
+
+const timeline = ({ n_frames, frames = [], note }) => {
+  const left = frame => `left: ${(100 * frame.index / Math.max(n_frames - 1, 1)).toFixed(2)}%`;
+  const line = make("div", { class: "line", role: "img", "aria-label": `where the frames lie among ${n_frames}` });
+  for (const frame of frames) {
+    const place = make("i", { class: frame.is_clue ? "clue" : "", title: `frame ${frame.index}` });
+    place.style.cssText = left(frame);
+    line.append(place);
+  }
+  const cards = frames.map(frame => make("figure", { class: frame.is_clue ? "clue" : "" },
+    picture(frame.picture, `frame ${frame.index}`),
+    make("figcaption", {}, `${frame.index}${frame.is_clue ? " clue" : ""}`)));
+  const clues = frames.some(frame => frame.is_clue) ? "; clues are framed in orange" : "";
+  const remark = make("p", { class: "note" }, `${n_frames} frames in the trajectory${clues}${note ? `; ${note}` : ""}`);
+  return [line, make("div", { class: "frames" }, ...cards), remark];
+};
+
+// Of many runs the first two are open, the others at a click.
+const episodes = sample => sample.results
+  .map((result, at) => result?.steps ? [result, runs[at]] : null).filter(Boolean)
+  .map(([result, label], number) => episode(result, label, number < 2));
+
+const episode = (result, label, isOpen) => {
+  const seen = result.start !== undefined || result.steps.some(step => step.picture !== undefined);
+  const earns = result.steps.some(step => step.reward !== undefined);
+  const head = ["", ...(seen ? ["frame after it"] : []), "action", ...(earns ? ["reward"] : []), ""];
+  const start = seen && result.start !== undefined
+    ? [make("tr", {}, make("td", {}, "0"), make("td", {}, picture(result.start, "at the start")), make("td", { class: "note" }, "at the start"))] : [];
+  const rows = result.steps.map((step, at) => make("tr", {},
+    make("td", {}, String(at + 1)),
+    ...(seen ? [make("td", {}, step.picture === undefined ? "" : picture(step.picture, `after action ${at + 1}`))] : []),
+    make("td", {}, make("code", {}, step.action || "(no valid action)"),
+      step.reply ? make("div", { class: "note" }, `reply: ${step.reply}`) : null,
+      step.error ? make("div", { class: "error" }, step.error) : null),
+    ...(earns ? [make("td", { class: "n" }, step.reward === undefined ? "" : step.reward.toFixed(1))] : []),
+    make("td", { class: "note" }, step.note ?? "")));
+  const table = make("table", {}, make("thead", {}, make("tr", {}, ...head.map(name => make("th", {}, name)))),
+    make("tbody", {}, ...start, ...rows));
+  const map = result.map === undefined ? null
+    : make("img", { class: "map", src: `data:image/webp;base64,${pictures[result.map]}`, alt: "map at the end" });
+  const count = `${result.steps.length} ${result.steps.length === 1 ? "action" : "actions"}`;
+  return make("details", isOpen ? { open: "" } : {}, make("summary", {}, make("b", {}, label), `: ${count}`),
+    result.note ? make("p", { class: "note" }, `the replay differs from the run: ${result.note}`) : null,
+    make("div", { class: "episode" }, make("div", { class: "steps" }, table), map));
+};
