@@ -88,7 +88,8 @@ class _Sets:
 def _choose_frames(data: NiehSet, question: Question) -> _FrameChoice | None:
     try:
         frames = data.frames(question.traj_id)
-        clue_frames = set(data.clue_frames(question))
+        # The clues of an absence are a sample of the trajectory, and no evidence.
+        clue_frames = set() if question.absence else set(data.clue_frames(question))
     except DataError:  # the question was skipped or failed for it, and its record has the reason
         return None
     clues = frozenset(index for index, frame in enumerate(frames) if frame in clue_frames)

@@ -61,6 +61,28 @@ def test_pictures_of_a_sample_load(page, open_page):
     assert all(width > 100 for width in widths)
 
 
+def test_an_absence_has_five_frames_and_no_clue(page, open_page):
+    tab = open_page(page).tab
+    place = next(at for at, sample in enumerate(page.samples) if "no frame is evidence" in sample.timeline.note)
+    tab.fill("#search", page.samples[place].title)
+    tab.select_option("#clues", "absence")
+    assert tab.locator("#sample .frames figure").count() == 5
+    assert tab.locator("#sample .clue").count() == 0
+    assert "no frame is evidence" in tab.locator("#sample").inner_text()
+    assert "orange" not in tab.locator("#sample").inner_text()
+
+
+def test_samples_of_a_suite_have_its_runs_alone(make_page, nieh_runs, scripted_run, open_page):
+    page = make_page(*nieh_runs, scripted_run, episodes=0)
+    tab = open_page(page).tab
+    labels = {suite: {page.runs[at].label for at in it.runs} for suite, it in page.suites.items()}
+    for suite, task in (("nieh", "nieh_mini_gt"), ("plans", "infthor_plans")):
+        tab.select_option("#task", task)
+        assert set(tab.locator("#sample .results tbody tr td:first-child").all_inner_texts()) == labels[suite]
+        assert tab.locator(".item >> nth=0").locator(".mark").count() == len(labels[suite])
+        assert "not evaluated" not in tab.locator("#sample").inner_text()
+
+
 def test_keys_go_through_the_samples(page, open_page):
     opened = open_page(page)
     for key, place in (("j", 1), ("j", 2), ("k", 1)):

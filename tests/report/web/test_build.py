@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from itertools import pairwise
 
 import pytest
 
@@ -25,10 +26,23 @@ def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
         question = questions[sample.id]
         assert (sample.title, len(sample.results)) == (question.text, len(nieh_runs))
         clues = {frame.index for frame in sample.timeline.frames if frame.is_clue}
-        assert clues == set(question.clues)
+        assert clues == (set() if question.absence else set(question.clues))
         assert all(frame.picture is not None for frame in sample.timeline.frames)
         beside = {near for at in clues for near in (at - 1, at + 1) if 0 <= near < sample.timeline.n_frames}
         assert {frame.index for frame in sample.timeline.frames} >= beside
+
+
+def test_absences_show_five_frames_evenly_spaced_and_none_is_a_clue(page):
+    asked = {question.id for question in open_set(str(DATA)).questions if question.absence}
+    absences = [sample for sample in page.samples if sample.id in asked]
+    assert absences
+    for sample in absences:
+        places = [frame.index for frame in sample.timeline.frames]
+        assert (len(places), places[0], places[-1]) == (5, 0, sample.timeline.n_frames - 1)
+        steps = [later - earlier for earlier, later in pairwise(places)]
+        assert max(steps) - min(steps) <= 1
+        assert not any(frame.is_clue for frame in sample.timeline.frames)
+        assert "no frame is evidence" in sample.timeline.note
 
 
 def test_outcomes_are_what_the_strict_scorer_says(page):
