@@ -18,4 +18,7 @@ const mark = (result, label) => make(
   result ? MARKS[result.outcome] : "·");
 
 const resultsOf = sample => sample.results.filter(Boolean);
-const ofSuite = sample => suites[sample.suite].runs.map(at => [sample.results[at], at]); // with places of the runs
+// Results with the places of their runs: those of the suite that have the task at all.
+const runsWith = {};
+for (const { task, results } of samples) results.forEach((result, at) => { if (result) (runsWith[task] ??= new Set()).add(at); });
+const ofSuite = sample => suites[sample.suite].runs.filter(at => runsWith[sample.task]?.has(at)).map(at => [sample.results[at], at]);

@@ -83,6 +83,23 @@ def test_samples_of_a_suite_have_its_runs_alone(make_page, nieh_runs, scripted_r
         assert "not evaluated" not in tab.locator("#sample").inner_text()
 
 
+def test_a_run_without_the_task_of_a_sample_is_not_listed_and_one_that_stopped_before_it_is(page, open_page):
+    def only(sample, place):
+        results = tuple(result if at == place else None for at, result in enumerate(sample.results))
+        return msgspec.structs.replace(sample, results=results)
+
+    first, second, third = (msgspec.structs.replace(it, task=task) for it, task in zip(page.samples, "aab", strict=False))
+    samples = [first, only(second, 0), only(third, 1)]
+    tab = open_page(page.__class__(**(vars(page) | {"samples": samples}))).tab
+    listed = []
+    for _ in samples:
+        rows = tab.locator("#sample .results tbody tr")
+        listed.append([rows.nth(at).inner_text().split()[0] for at in range(rows.count())])
+        tab.keyboard.press("j")
+    labels = [run.label for run in page.runs]
+    assert listed == [labels, labels, labels[1:]]
+
+
 def test_keys_go_through_the_samples(page, open_page):
     opened = open_page(page)
     for key, place in (("j", 1), ("j", 2), ("k", 1)):
