@@ -20,7 +20,7 @@ from infthor_eval.report.web.sections import Section
 
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
 
-_SCRIPTS = ("elements.js", "sample.js", "report.js")  # one script on the page, in this order
+_SCRIPTS = ("elements.js", "address.js", "sample.js", "report.js")  # one script on the page, in this order
 
 # In a script element "</script" and "<!--" would end or twist it; the line separators end a line of a script.
 _ESCAPED = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}

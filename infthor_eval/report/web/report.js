@@ -94,28 +94,48 @@
     if (clicked) choose(Number(clicked.dataset.place));
   });
 
-  const filter = () => {
+  const filter = setsAddress => {
     const tests = setFilters();
+    const before = shown[chosen];
     shown = [...samples.keys()].filter(at => tests.every(test => test(samples[at], at)));
     byId("count").textContent = `${shown.length} of ${samples.length}`;
     chosen = -1;
     list.scrollTop = 0;
     if (shown.length) {
-      choose(0);
+      choose(Math.max(shown.indexOf(before), 0), setsAddress);
     } else {
       draw();
       byId("sample").replaceChildren(make("p", { class: "note" }, "No sample matches the filters."));
     }
   };
 
-  const choose = place => {
+  const choose = (place, setsAddress = true) => {
+    const sample = samples[shown[place]];
     chosen = place;
+    draw(); // the list has its height before it is scrolled
     const top = place * HEIGHT;
     if (top < list.scrollTop) list.scrollTop = top;
     if (top + HEIGHT > list.scrollTop + list.clientHeight) list.scrollTop = top + HEIGHT - list.clientHeight;
     draw();
     list.setAttribute("aria-activedescendant", `item-${place}`);
-    byId("sample").replaceChildren(...partsOf(samples[shown[place]]));
+    byId("sample").replaceChildren(...partsOf(sample));
+    if (setsAddress) history.replaceState(null, "", addressOf(sample));
+  };
+
+  // The page opens with the sample of its address, which no filter hides then.
+  const openAddressed = () => {
+    if (!hasAddress()) return;
+    const at = findAddressed();
+    byId("samples").scrollIntoView();
+    if (at < 0) {
+      byId("sample").prepend(make("p", { class: "error" }, `This page has no sample ${location.hash}; others are in the list.`));
+      return;
+    }
+    if (!shown.includes(at)) {
+      byId("filters").reset();
+      filter(false);
+    }
+    choose(shown.indexOf(at));
   };
 
   // -- keyboard
@@ -135,8 +155,12 @@
     else return;
     event.preventDefault();
   });
-  byId("filters").addEventListener("input", filter);
+  // An address that the page has is that of the sample shown; a page without one gets it with the first choice.
+  const filterAnew = () => filter(hasAddress());
+  byId("filters").addEventListener("input", filterAnew);
   byId("filters").addEventListener("submit", event => event.preventDefault());
-  byId("filters").addEventListener("reset", () => setTimeout(filter));
-  filter();
+  byId("filters").addEventListener("reset", () => setTimeout(filterAnew)); // the fields have their values after the event
+  addEventListener("hashchange", openAddressed);
+  filter(false);
+  openAddressed();
 })();

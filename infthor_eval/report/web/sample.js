@@ -3,7 +3,7 @@ const partsOf = sample => {
   const facts = [sample.suite, sample.task, sample.kind, sample.clues && `clues: ${sample.clues}`, sample.variant,
     sample.cluster, sample.id].filter(Boolean).join("  ·  ");
   return [
-    make("h3", {}, sample.title),
+    make("div", { class: "head" }, make("h3", {}, sample.title), linkTo(sample)),
     sample.target ? make("p", { class: "target" }, `${suites[sample.suite].target}: `, make("b", {}, sample.target)) : "",
     results(sample),
     ...details(sample),

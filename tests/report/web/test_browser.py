@@ -1,5 +1,7 @@
 """The page in a real browser, from its file: it opens, filters work, pictures load, hostile text stays text."""
 
+from urllib.parse import parse_qs, quote
+
 import msgspec
 import pytest
 
@@ -98,6 +100,79 @@ def test_a_run_without_the_task_of_a_sample_is_not_listed_and_one_that_stopped_b
         tab.keyboard.press("j")
     labels = [run.label for run in page.runs]
     assert listed == [labels, labels, labels[1:]]
+
+
+def title(tab):
+    return tab.locator("#sample h3").inner_text()
+
+
+def facts(tab):
+    return tab.locator("#sample > .note").last.inner_text()
+
+
+def test_a_sample_has_an_address_that_opens_it(page, open_page):
+    opened = open_page(page)
+    tab, there = opened.tab, page.samples[-1]
+    file, _, fragment = tab.url.partition("#")
+    assert fragment == ""
+    tab.goto(f"{file}#sample={quote(there.id, safe='')}&variant={quote(there.variant)}")
+    assert (there.id in facts(tab), there.variant in facts(tab)) == (True, True)
+    tab.keyboard.press("k")
+    before = page.samples[-2]
+    address = tab.url
+    asked = parse_qs(address.partition("#")[2])
+    assert (asked["sample"], asked["task"]) == ([before.id], [before.task])
+    tab.goto("about:blank")
+    tab.goto(address)
+    assert title(tab) == before.title
+    assert tab.locator('[aria-selected="true"]').get_attribute("data-place") == str(len(page.samples) - 2)
+    assert opened.errors == []
+
+
+def test_the_address_survives_filters_that_its_sample_passes(page, open_page):
+    tab = open_page(page).tab
+    tab.locator(".item >> nth=4").click()
+    address, sample = tab.url, page.samples[4]
+    for change in (lambda: tab.select_option("#task", sample.task), lambda: tab.fill("#search", sample.title)):
+        change()
+        assert (tab.url, title(tab)) == (address, sample.title)
+    tab.fill("#search", "no such words")
+    assert tab.url == address
+    tab.keyboard.press("Escape")
+    tab.wait_for_selector("#sample h3")
+    other = next(it for it in page.samples if it.kind != sample.kind)
+    tab.select_option("#kind", other.kind)  # another sample is shown, and its address
+    assert parse_qs(tab.url.partition("#")[2])["sample"] == [other.id]
+
+
+def test_an_address_is_followed_on_the_open_page_and_past_filters(page, open_page):
+    tab = open_page(page).tab
+    tab.fill("#search", "no such words")
+    tab.evaluate("address => { location.hash = address }", f"sample={quote(page.samples[7].id, safe='')}")
+    tab.wait_for_selector("#sample h3")
+    assert title(tab) == page.samples[7].title
+    assert count(tab).startswith(f"{len(page.samples)} of")
+    tab.evaluate("location.hash = 'sample=nowhere'")
+    assert "This page has no sample #sample=nowhere" in tab.locator("#sample .error").inner_text()
+
+
+def test_the_link_of_a_sample_is_copied(page, open_page):
+    opened = open_page(page, permissions=["clipboard-read", "clipboard-write"])
+    tab = opened.tab
+    tab.keyboard.press("j")
+    tab.click("button.link")
+    tab.wait_for_function("document.querySelector('button.link').textContent === 'copied'")
+    assert tab.evaluate("navigator.clipboard.readText()") == tab.url
+    assert parse_qs(tab.url.partition("#")[2])["sample"] == [page.samples[1].id]
+
+
+def test_without_a_clipboard_the_link_is_there_to_be_copied_by_hand(page, open_page):
+    tab = open_page(page).tab
+    tab.evaluate("void (navigator.clipboard.writeText = () => Promise.reject(new Error('denied')))")
+    tab.keyboard.press("j")
+    tab.click("button.link")
+    assert tab.locator("input.link").input_value() == tab.url
+    assert tab.evaluate("getSelection().toString()") == tab.url
 
 
 def test_keys_go_through_the_samples(page, open_page):
