@@ -13,7 +13,7 @@ from PIL import Image
 
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.sample_table import SampleColumn
-from infthor_eval.report.web.samples import StepRow, Timeline
+from infthor_eval.report.web.samples import FrameFacts, StepRow, Timeline
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
@@ -58,10 +58,12 @@ class Timelines(NamedTuple):
     Attributes:
         by_unit: timeline of each unit that has one.
         notes: reasons why frames are missing, a line each.
+        facts: what is known of frames, by the numbers of their thumbnails.
     """
 
     by_unit: Mapping[UnitKey, Timeline] = {}
     notes: Sequence[str] = ()
+    facts: Mapping[int, FrameFacts] = {}
 
 
 @dataclass(frozen=True)

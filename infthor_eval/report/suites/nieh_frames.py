@@ -12,7 +12,8 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.report.presenter import Timelines
 from infthor_eval.report.runs import ReportRun, choose_evenly, records_by_unit
-from infthor_eval.report.web.samples import Timeline, TimelineFrame
+from infthor_eval.report.suites.nieh_frame_facts import read_frame_facts
+from infthor_eval.report.web.samples import FrameFacts, Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
@@ -37,14 +38,28 @@ def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thu
         for index in sorted(choice.clues):
             _picture(choice.frames[index], thumbnails)
     timelines = {key: _timeline(choice, thumbnails) for key, choice in chosen.items()}
-    return Timelines(timelines, list(sets.problems))
+    facts = {
+        frame.picture: chosen[key].facts[frame.index]
+        for key, timeline in timelines.items()
+        for frame in timeline.frames
+        if frame.picture is not None
+    }
+    return Timelines(timelines, list(sets.problems), facts)
 
 
 @dataclass(frozen=True)
 class _FrameChoice:
-    """Frames to show for a question: all frames of its trajectory, the indices of the clues and of further frames."""
+    """Frames to show for a question.
+
+    Attributes:
+        frames: all frames of its trajectory.
+        facts: what the set's log says of each of them.
+        clues: indices of the clues.
+        others: indices of further frames.
+    """
 
     frames: Sequence[FrameRef]
+    facts: Sequence[FrameFacts]
     clues: frozenset[int]
     others: frozenset[int]
 
@@ -55,6 +70,7 @@ class _Sets:
     def __init__(self, runs: Sequence[ReportRun], data: Path | None) -> None:
         self.problems: dict[str, None] = {}  # reasons why frames are missing, each once
         self._sets: dict[str, tuple[NiehSet, Mapping[str, Question]] | None] = {}
+        self._facts: dict[Path, Sequence[FrameFacts]] = {}  # by the trajectory's folder
         for run in runs:
             for task in run.tasks:
                 if task not in self._sets:
@@ -69,7 +85,15 @@ class _Sets:
         question = questions.get(key.id)
         if question is None or question.text != record.payload.question:
             return None
-        return _choose_frames(data, question)
+        try:
+            return _choose_frames(data, question, self._read_facts(data.folder(question.traj_id)))
+        except DataError:  # the question was skipped or failed for it, and its record has the reason
+            return None
+
+    def _read_facts(self, folder: Path) -> Sequence[FrameFacts]:
+        if folder not in self._facts:
+            self._facts[folder] = read_frame_facts(folder)
+        return self._facts[folder]
 
     def _read(self, run: ReportRun, task: str, data: Path | None) -> tuple[NiehSet, Mapping[str, Question]] | None:
         folder = data or run.data
@@ -85,19 +109,16 @@ class _Sets:
         return questions, {question.id: question for question in questions.questions}
 
 
-def _choose_frames(data: NiehSet, question: Question) -> _FrameChoice | None:
-    try:
-        frames = data.frames(question.traj_id)
-        # The clues of an absence are a sample of the trajectory, and no evidence.
-        clue_frames = set() if question.absence else set(data.clue_frames(question))
-    except DataError:  # the question was skipped or failed for it, and its record has the reason
-        return None
+def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts]) -> _FrameChoice:
+    frames = data.frames(question.traj_id)
+    # The clues of an absence are a sample of the trajectory, and no evidence.
+    clue_frames = set() if question.absence else set(data.clue_frames(question))
     clues = frozenset(index for index, frame in enumerate(frames) if frame in clue_frames)
     last = len(frames) - 1
     others = {near for index in clues for near in (index - 1, index + 1) if 0 <= near <= last}
     if not clues:
         others = set(choose_evenly(range(len(frames)), _OVERVIEW))
-    return _FrameChoice(frames, clues, frozenset(others - clues))
+    return _FrameChoice(frames, facts, clues, frozenset(others - clues))
 
 
 def _timeline(choice: _FrameChoice, thumbnails: ThumbnailStore) -> Timeline:

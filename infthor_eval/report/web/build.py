@@ -14,7 +14,7 @@ from infthor_eval.report.web.page import About, Page, SuiteLabels
 from infthor_eval.report.web.replays import EpisodeReplays, ReplayProgress
 from infthor_eval.report.web.run_tables import costs_table, left_out_table, primary_metrics_table
 from infthor_eval.report.web.sample_list import build_samples
-from infthor_eval.report.web.samples import PageSample
+from infthor_eval.report.web.samples import FrameFacts, PageSample
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 
@@ -61,11 +61,13 @@ def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: Replay
     replays = EpisodeReplays(runs, request.episodes, (request.data, request.scenes), thumbnails, progress)
     samples: list[PageSample] = []
     notes: list[str] = []
+    facts: dict[int, FrameFacts] = {}
     for same in by_suite.values():
-        of_suite, remarks = build_samples(same, request.data, replays, thumbnails)
+        of_suite = build_samples(same, request.data, replays, thumbnails)
         places = [runs.index(run) for run in same]
-        samples += [sample.spread_over(len(runs), places) for sample in of_suite]
-        notes += remarks
+        samples += [sample.spread_over(len(runs), places) for sample in of_suite.samples]
+        notes += of_suite.notes
+        facts |= of_suite.facts
     if thumbnails.n_left_out:
         notes.append(f"{thumbnails.n_left_out:,} pictures left out, to keep the page small")
     return Page(
@@ -78,6 +80,8 @@ def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: Replay
         metrics=_metrics(runs, samples),
         pictures=thumbnails.encoded,
         notes=notes,
+        large=thumbnails.large,
+        frames=facts,
     )
 
 

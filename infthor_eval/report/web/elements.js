@@ -1,7 +1,7 @@
 "use strict";
 // What the parts of the browser of samples share. Whatever the data hold is put into the page as text, never as markup.
 const byId = id => document.getElementById(id);
-const { runs, suites, metrics, samples, pictures } = JSON.parse(byId("data").textContent);
+const { runs, suites, metrics, samples, pictures, large, frames } = JSON.parse(byId("data").textContent);
 const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", excluded: "–" };
 
 const make = (name, attributes = {}, ...children) => {
@@ -10,9 +10,7 @@ const make = (name, attributes = {}, ...children) => {
   element.append(...children.filter(child => child !== null));
   return element;
 };
-const picture = (number, alt) => number === undefined || number === null
-  ? make("div", { class: "blank" }, "no picture")
-  : make("img", { src: `data:image/webp;base64,${pictures[number]}`, alt, loading: "lazy" });
+const sourceOf = number => `data:image/webp;base64,${pictures[number]}`;
 const mark = (result, label) => make(
   "span", { class: `mark ${result?.outcome ?? "none"}`, title: `${label}: ${result?.outcome ?? "not evaluated"}` },
   result ? MARKS[result.outcome] : "·");

@@ -4,7 +4,7 @@ import base64
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,18 @@ from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.files import write_atomically
-from infthor_eval.report.web.samples import PageSample
+from infthor_eval.report.web.samples import FrameFacts, PageSample
 from infthor_eval.report.web.sections import Section
 
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
 
-_SCRIPTS = ("elements.js", "address.js", "sample.js", "report.js")  # one script on the page, in this order
+_SCRIPTS = (
+    "elements.js",
+    "address.js",
+    "enlarged.js",
+    "sample.js",
+    "report.js",
+)  # one script on the page, in this order
 
 # In a script element "</script" and "<!--" would end or twist it; the line separators end a line of a script.
 _ESCAPED = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
@@ -73,6 +79,8 @@ class Page:
         metrics: names of the metrics, those that decide the outcome first.
         pictures: WebP in base64, by their numbers in the samples.
         notes: remarks on the samples.
+        large: number of the enlarged picture by that of its thumbnail.
+        frames: what is known of frames, by the numbers of their thumbnails.
     """
 
     title: str
@@ -84,6 +92,8 @@ class Page:
     metrics: Sequence[str]
     pictures: Sequence[str]
     notes: Sequence[str] = ()
+    large: Mapping[int, int] = field(default_factory=dict)
+    frames: Mapping[int, FrameFacts] = field(default_factory=dict)
 
 
 def write_page(page: Page, path: Path) -> int:
@@ -121,6 +131,8 @@ def _data(page: Page) -> Markup:
         "metrics": list(page.metrics),
         "samples": msgspec.to_builtins(page.samples),
         "pictures": list(page.pictures),
+        "large": page.large,
+        "frames": msgspec.to_builtins(page.frames),
     }
     text = json.dumps(document, ensure_ascii=False, separators=(",", ":"))
     for letter, escaped in _ESCAPED.items():

@@ -141,7 +141,7 @@
   // -- keyboard
 
   addEventListener("keydown", event => {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || enlarged.open) return;
     const isTyping = ["INPUT", "SELECT"].includes(event.target.tagName);
     if (event.key === "Escape") { byId("filters").reset(); event.target.blur(); return; }
     if (isTyping) return;

@@ -37,18 +37,27 @@ const details = sample => sample.results
   .map(([facts, label]) => make("div", { class: "details" }, make("b", {}, label), make("dl", {},
     ...Object.entries(facts).flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]))));
 
-const timeline = ({ n_frames, frames = [], note }) => {
+const factsOf = ({ index, picture, is_clue }) => {
+  const { step, action, error, objects = [], held = [], pose } = frames[picture] ?? {};
+  return [
+    ["frame", is_clue ? `${index}, a clue` : index], ["step", step], ["action", action || (index === 0 ? "none yet" : "")],
+    ["succeeded", action ? (error ? `no: ${error}` : "yes") : ""], ["in the hand", held.join(", ")],
+    ["in view", objects.join(", ")], ["agent", pose]];
+};
+
+const timeline = ({ n_frames, frames: shown = [], note }) => {
   const left = frame => `left: ${(100 * frame.index / Math.max(n_frames - 1, 1)).toFixed(2)}%`;
   const line = make("div", { class: "line", role: "img", "aria-label": `where the frames lie among ${n_frames}` });
-  for (const frame of frames) {
+  for (const frame of shown) {
     const place = make("i", { class: frame.is_clue ? "clue" : "", title: `frame ${frame.index}` });
     place.style.cssText = left(frame);
     line.append(place);
   }
-  const cards = frames.map(frame => make("figure", { class: frame.is_clue ? "clue" : "" },
-    picture(frame.picture, `frame ${frame.index}`),
+  const views = [];
+  const cards = shown.map(frame => make("figure", { class: frame.is_clue ? "clue" : "" },
+    picture(frame.picture, `frame ${frame.index}`, views, factsOf(frame)),
     make("figcaption", {}, `${frame.index}${frame.is_clue ? " clue" : ""}`)));
-  const clues = frames.some(frame => frame.is_clue) ? "; clues are framed in orange" : "";
+  const clues = shown.some(frame => frame.is_clue) ? "; clues are framed in orange" : "";
   const remark = make("p", { class: "note" }, `${n_frames} frames in the trajectory${clues}${note ? `; ${note}` : ""}`);
   return [line, make("div", { class: "frames" }, ...cards), remark];
 };
@@ -58,15 +67,20 @@ const episodes = sample => sample.results
   .map((result, at) => result?.steps ? [result, runs[at]] : null).filter(Boolean)
   .map(([result, label], number) => episode(result, label, number < 2));
 
+const factsOfStep = ({ action, error, reply, reward, note }) => [
+  ["action", action || "none that is valid"], ["succeeded", error ? `no: ${error}` : "yes"], ["reply", reply],
+  ["reward", reward?.toFixed(1)], ["note", note]];
+
 const episode = (result, label, isOpen) => {
+  const views = [];
   const seen = result.start !== undefined || result.steps.some(step => step.picture !== undefined);
   const earns = result.steps.some(step => step.reward !== undefined);
   const head = ["", ...(seen ? ["frame after it"] : []), "action", ...(earns ? ["reward"] : []), ""];
   const start = seen && result.start !== undefined
-    ? [make("tr", {}, make("td", {}, "0"), make("td", {}, picture(result.start, "at the start")), make("td", { class: "note" }, "at the start"))] : [];
+    ? [make("tr", {}, make("td", {}, "0"), make("td", {}, picture(result.start, "at the start", views)), make("td", { class: "note" }, "at the start"))] : [];
   const rows = result.steps.map((step, at) => make("tr", {},
     make("td", {}, String(at + 1)),
-    ...(seen ? [make("td", {}, step.picture === undefined ? "" : picture(step.picture, `after action ${at + 1}`))] : []),
+    ...(seen ? [make("td", {}, step.picture === undefined ? "" : picture(step.picture, `after action ${at + 1}`, views, factsOfStep(step)))] : []),
     make("td", {}, make("code", {}, step.action || "(no valid action)"),
       step.reply ? make("div", { class: "note" }, `reply: ${step.reply}`) : null,
       step.error ? make("div", { class: "error" }, step.error) : null),
@@ -75,7 +89,7 @@ const episode = (result, label, isOpen) => {
   const table = make("table", {}, make("thead", {}, make("tr", {}, ...head.map(name => make("th", {}, name)))),
     make("tbody", {}, ...start, ...rows));
   const map = result.map === undefined ? null
-    : make("img", { class: "map", src: `data:image/webp;base64,${pictures[result.map]}`, alt: "map at the end" });
+    : picture(result.map, "map at the end", [], [], { class: "map", loading: "eager" });
   const count = `${result.steps.length} ${result.steps.length === 1 ? "action" : "actions"}`;
   return make("details", isOpen ? { open: "" } : {}, make("summary", {}, make("b", {}, label), `: ${count}`),
     result.note ? make("p", { class: "note" }, `the replay differs from the run: ${result.note}`) : null,

@@ -2,25 +2,39 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
 from infthor_eval.report.runs import ReportRun, records_by_unit
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
-from infthor_eval.report.web.samples import PageSample, SampleResult, StepRow, Timeline
+from infthor_eval.report.web.samples import FrameFacts, PageSample, SampleResult, StepRow, Timeline
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["build_samples"]
+__all__ = ["SuiteSamples", "build_samples"]
 
 Record = UnitRecord[Any]
 
 
+class SuiteSamples(NamedTuple):
+    """Samples of the runs of a suite.
+
+    Attributes:
+        samples: samples of all units that have a record, in the order of their keys.
+        notes: reasons why pictures are missing, a line each.
+        facts: what is known of frames, by the numbers of their thumbnails.
+    """
+
+    samples: list[PageSample]
+    notes: list[str]
+    facts: Mapping[int, FrameFacts]
+
+
 def build_samples(
     runs: Sequence[ReportRun], data: Path | None, replays: EpisodeReplays, thumbnails: ThumbnailStore
-) -> tuple[list[PageSample], list[str]]:
-    """Build the samples of all units that have a record, in the order of their keys, and notes on missing pictures.
+) -> SuiteSamples:
+    """Build the samples of runs.
 
     Args:
         runs: runs of one suite.
@@ -34,7 +48,8 @@ def build_samples(
         _sample(key, runs, records, [pictures.get(key) for pictures, _ in replayed], timelines.by_unit)
         for key, records in records_by_unit(runs).items()
     ]
-    return samples, [*timelines.notes, *(note for _, notes in replayed for note in notes)]
+    notes = [*timelines.notes, *(note for _, notes in replayed for note in notes)]
+    return SuiteSamples(samples, notes, timelines.facts)
 
 
 def _sample(

@@ -4,7 +4,27 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 
-__all__ = ["PageSample", "SampleResult", "StepRow", "Timeline", "TimelineFrame"]
+__all__ = ["FrameFacts", "PageSample", "SampleResult", "StepRow", "Timeline", "TimelineFrame"]
+
+
+class FrameFacts(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What the set's log says of a frame.
+
+    Attributes:
+        step: number of the step; None if it is not known.
+        action: the action before the frame, in the log's words; empty for the first frame, and where the log has none.
+        error: why the simulator refused the action; empty if it did not.
+        objects: types of the visible objects.
+        held: types of the objects in the agent's hand.
+        pose: the agent's pose in words; empty if the log has none.
+    """
+
+    step: int | None = None
+    action: str = ""
+    error: str = ""
+    objects: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
+    pose: str = ""
 
 
 class TimelineFrame(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -1,34 +1,43 @@
-"""Thumbnails for a page, each once, up to a total size."""
+"""Pictures for a page: thumbnails, each once, and the same ones enlarged, up to a total size."""
 
 import base64
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 from PIL import Image
 
 __all__ = ["ThumbnailStore"]
 
-_QUALITY = 55  # of WebP: about 3 kB for a frame of 132 pixels, so that thousands fit into a page
+_QUALITY = 55  # of WebP: 1 to 3 kB for a frame of 132 pixels, so that thousands fit into a page
+_LARGE_SIDE = 480  # the published frames, of 300 pixels, keep their size
+_LARGE_QUALITY = 70  # about 5 kB for a frame of the embedded simulator
 
 
 class ThumbnailStore:
-    """Thumbnails by number; pictures that come first get the room.
-
-    Attributes:
-        encoded: all pictures as WebP in base64, in the order of their numbers.
-    """
+    """Thumbnails by number; pictures that come first get the room, and every thumbnail before any enlarged picture."""
 
     def __init__(self, budget: int, side: int = 132) -> None:
         """Start without pictures.
 
         Args:
             budget: maximum size of all pictures together, in bytes of base64.
-            side: length of a picture's longer side in pixels.
+            side: length of a thumbnail's longer side in pixels.
         """
-        self._left = budget
+        self._left = budget  # as enlarged pictures leave it
         self._side = side
-        self.encoded: list[str] = []
+        self._encoded: list[str] = []
+        self._enlarged: list[tuple[int, str]] = []  # with the numbers of their thumbnails
         self._numbers: dict[str, int | None] = {}
+
+    @property
+    def encoded(self) -> Sequence[str]:
+        """All pictures as WebP in base64, in the order of their numbers: thumbnails, then enlarged ones."""
+        return [*self._encoded, *(picture for _, picture in self._enlarged)]
+
+    @property
+    def large(self) -> Mapping[int, int]:
+        """Number of the enlarged picture by that of its thumbnail, where there was room for it."""
+        return {thumbnail: number for number, (thumbnail, _) in enumerate(self._enlarged, len(self._encoded))}
 
     @property
     def n_left_out(self) -> int:
@@ -44,21 +53,38 @@ class ThumbnailStore:
             side: length of its longer side, if it differs from that of the others.
         """
         if key not in self._numbers:
-            self._numbers[key] = self._add(load, side or self._side) if self._left > 0 else None
+            self._numbers[key] = self._add(load, side or self._side) if self._left > 0 or self._enlarged else None
         return self._numbers[key]
 
     def _add(self, load: Callable[[], Image.Image], side: int) -> int | None:
-        encoded = _encode(load(), side)
+        picture = load().convert("RGB")
+        encoded = _encode(picture, side, _QUALITY)
+        self._make_room(len(encoded))
         self._left -= len(encoded)
         if self._left < 0:
             return None
-        self.encoded.append(encoded)
-        return len(self.encoded) - 1
+        self._encoded.append(encoded)
+        number = len(self._encoded) - 1
+        if self._left > 0 and max(picture.size) > side:
+            self._enlarge(number, picture)
+        return number
+
+    def _enlarge(self, number: int, picture: Image.Image) -> None:
+        encoded = _encode(picture, _LARGE_SIDE, _LARGE_QUALITY)
+        if len(encoded) <= self._left:
+            self._left -= len(encoded)
+            self._enlarged.append((number, encoded))
+
+    def _make_room(self, size: int) -> None:
+        """Drop the last enlarged pictures until a thumbnail of that size fits, or none is left."""
+        while self._enlarged and self._left < size:
+            _, dropped = self._enlarged.pop()
+            self._left += len(dropped)
 
 
-def _encode(picture: Image.Image, side: int) -> str:
-    small = picture.convert("RGB")
+def _encode(picture: Image.Image, side: int, quality: int) -> str:
+    small = picture.copy()
     small.thumbnail((side, side), Image.Resampling.LANCZOS)
     encoded = io.BytesIO()
-    small.save(encoded, format="webp", quality=_QUALITY, method=4)
+    small.save(encoded, format="webp", quality=quality, method=4)
     return base64.b64encode(encoded.getvalue()).decode("ascii")

@@ -90,7 +90,9 @@ def test_a_run_without_the_task_of_a_sample_is_not_listed_and_one_that_stopped_b
         results = tuple(result if at == place else None for at, result in enumerate(sample.results))
         return msgspec.structs.replace(sample, results=results)
 
-    first, second, third = (msgspec.structs.replace(it, task=task) for it, task in zip(page.samples, "aab", strict=False))
+    first, second, third = (
+        msgspec.structs.replace(page.samples[at], task=task) for at, task in enumerate(("a", "a", "b"))
+    )
     samples = [first, only(second, 0), only(third, 1)]
     tab = open_page(page.__class__(**(vars(page) | {"samples": samples}))).tab
     listed = []
@@ -173,6 +175,52 @@ def test_without_a_clipboard_the_link_is_there_to_be_copied_by_hand(page, open_p
     tab.click("button.link")
     assert tab.locator("input.link").input_value() == tab.url
     assert tab.evaluate("getSelection().toString()") == tab.url
+
+
+def enlarged(tab):
+    terms, values = (tab.locator(f"#enlarged {name}").all_inner_texts() for name in ("dt", "dd"))
+    return dict(zip(terms, values, strict=True))
+
+
+def test_a_frame_opens_large_with_its_step_and_the_arrows_go_on(page, open_page):
+    opened = open_page(page)
+    tab, frames = opened.tab, page.samples[0].timeline.frames
+    tab.fill("#search", page.samples[0].title)
+    tab.locator("#sample button.frame").nth(1).click()
+    image = tab.locator("#enlarged img")
+    image.evaluate("it => it.decode()")
+    assert image.evaluate("it => it.naturalWidth") == 300  # the set's own size
+    facts = page.frames[frames[1].picture]
+    assert enlarged(tab)["action"] == facts.action
+    assert enlarged(tab)["step"] == str(facts.step)
+    assert enlarged(tab)["succeeded"] == "yes"
+    assert enlarged(tab)["in view"] == ", ".join(facts.objects)
+    assert enlarged(tab)["agent"] == facts.pose
+    shown = [enlarged(tab)["frame"]]
+    for key in ("ArrowRight", "ArrowLeft", "ArrowLeft", "ArrowLeft"):  # the first one has none before it
+        tab.keyboard.press(key)
+        shown.append(enlarged(tab)["frame"])
+    at = [f"{frame.index}, a clue" if frame.is_clue else str(frame.index) for frame in frames]
+    assert shown == [at[1], at[2], at[1], at[0], at[0]]
+    tab.keyboard.press("j")  # a key of the page behind it
+    assert title(tab) == page.samples[0].title
+    tab.keyboard.press("Escape")
+    assert tab.locator("#enlarged").is_hidden()
+    assert tab.input_value("#search") == page.samples[0].title  # which Esc would have emptied
+    assert opened.errors == []
+
+
+def test_a_frame_of_an_episode_opens_large_with_its_action(make_page, scripted_run, scripted_data, open_page):
+    page = make_page(scripted_run, data=scripted_data, episodes=2)
+    opened = open_page(page)
+    place = next(at for at, sample in enumerate(page.samples) if sample.results[0].map is not None)
+    for _ in range(place):
+        opened.tab.keyboard.press("j")
+    opened.tab.locator(".steps button.frame").nth(1).click()
+    assert enlarged(opened.tab)["action"] == page.samples[place].results[0].steps[0].action
+    opened.tab.get_by_title("Close").click()
+    assert opened.tab.locator("#enlarged").is_hidden()
+    assert opened.errors == []
 
 
 def test_keys_go_through_the_samples(page, open_page):
