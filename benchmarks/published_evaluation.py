@@ -116,7 +116,7 @@ def main() -> None:
         for mode in modes(options)
         for shape in MODELS
     ]
-    print(table(runs, machine.load_seconds, options.price))
+    print(f"{work_table(runs)}\n\n{cost_table(runs, machine.load_seconds, options.price)}")
     print("\nlargest context by memory, in 1,000 tokens, on 1, 2, 4, 8 GPUs")
     for shape in MODELS:
         fitting = [f"{largest_context(shape, machine, n) / 1000:8,.0f}" for n in (1, 2, 4, 8)]
@@ -333,29 +333,40 @@ def run(
     )
 
 
-_HEAD = (
-    f"{'mode':20s}{'model':17s}{'requests':>9s}{'no window':>10s}{'too long':>9s}{'no memory':>10s}{'Mtokens':>9s}"
-    f"{'encoded':>9s}{'longest':>9s}{'RoPE':>6s}{'GPUs':>5s}{'h on 1':>9s}{'on 8':>9s}{'on 64':>8s}{'USD 8':>9s}"
-    f"{'USD 64':>9s}{'h on 8, not shared':>20s}{'saved':>8s}"
+_NAMES = f"{'mode':20s}{'model':17s}"
+_WORK = (
+    f"{_NAMES}{'requests':>9s}{'no window':>10s}{'too long':>9s}{'no memory':>10s}{'Mtokens':>9s}{'encoded':>9s}"
+    f"{'longest':>9s}{'RoPE':>6s}"
+)
+_COST = (
+    f"{_NAMES}{'GPUs':>5s}{'h on 1':>9s}{'on 8':>9s}{'on 64':>8s}{'USD 8':>9s}{'USD 64':>9s}{'h on 8, not shared':>20s}"
+    f"{'saved':>8s}"
 )
 
 
-def table(runs: Sequence[Run], load: float, price: float) -> str:
-    """Return a line for each run, one for the sum of each model, and one for the sum of all."""
-    lines = [_HEAD]
+def work_table(runs: Sequence[Run]) -> str:
+    """Return a line for each run: its requests and their tokens."""
+    lines = [_WORK]
     for one in runs:
         extension = one.largest / one.model.limit
         lines.append(
             f"{one.mode:20s}{one.model.name:17s}{one.n_requests:9d}"
             f"{one.n_skipped[0]:10d}{one.n_skipped[1]:9d}{one.n_skipped[2]:10d}"
             f"{one.tokens / 1e6:9.0f}{one.encoded / 1e6:9.0f}{one.largest:9d}"
-            f"{f'x{extension:.1f}' if extension > 1 else '-':>6s}{one.n_gpus or '-':>5}" + _times([one], load, price)
+            f"{f'x{extension:.1f}' if extension > 1 else '-':>6s}"
         )
+    return "\n".join(lines)
+
+
+def cost_table(runs: Sequence[Run], load: float, price: float) -> str:
+    """Return a line for each run, one for the sum of each model, and one for the sum of all: hours and cost."""
+    lines = [_COST]
+    for one in runs:
+        lines.append(f"{one.mode:20s}{one.model.name:17s}{one.n_gpus or '-':>5}" + _times([one], load, price))
     for name in dict.fromkeys(one.model.name for one in runs):
-        lines.append(
-            f"{'all':20s}{name:17s}{'':76s}" + _times([one for one in runs if one.model.name == name], load, price)
-        )
-    lines.append(f"{'all':20s}{'all':17s}{'':76s}" + _times(runs, load, price))
+        of_model = [one for one in runs if one.model.name == name]
+        lines.append(f"{'all':20s}{name:17s}{'':5s}" + _times(of_model, load, price))
+    lines.append(f"{'all':20s}{'all':17s}{'':5s}" + _times(runs, load, price))
     return "\n".join(lines)
 
 

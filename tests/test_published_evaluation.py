@@ -155,6 +155,6 @@ def test_the_same_seed_gives_the_same_table(simulation: Any, capsys: pytest.Capt
         for mode in simulation.modes(options)
         for model in simulation.MODELS
     ]
-    shown = simulation.table(runs, 120, 3.0).splitlines()
+    shown = simulation.cost_table(runs, 120, 3.0).splitlines()
     assert len(shown) == 1 + 4 * 4 + 4 + 1
     assert {len(line) for line in shown} == {len(shown[0])}
