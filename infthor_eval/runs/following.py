@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from infthor_eval.errors import wrap_errors
 from infthor_eval.runs.records import RunHeader, UnitRecord
 from infthor_eval.runs.shards import Decoder, RunLog, find_shards, parse_header, parse_record
 from infthor_eval.runs.suite import Suite
@@ -61,13 +60,10 @@ class FollowedJournal:
         """Read what is new; return whether there was anything. A last line without its end is left for the next time.
 
         Raises:
-            DataError: a line is bad, or a shard cannot be read.
+            DataError: a line is bad.
+            OSError: a shard cannot be read, or was moved away meanwhile.
             UsageError: the suite of the run is not known here.
         """
-        with wrap_errors(f"{self._run}: its journal cannot be read", "restore it"):  # also one that is set aside now
-            return self._read()
-
-    def _read(self) -> bool:
         # The shard that was written last comes last, so that its records are the newest.
         shards = sorted(find_shards(self._run), key=lambda path: path.stat().st_mtime)
         files = {path: _file_and_size(path) for path in shards}
@@ -113,12 +109,14 @@ def is_written(run: Path) -> bool | None:
 
     The system's list of locks is read: to try a lock would be to hold it for a moment, and a run that starts in that
     moment would be refused.
+
+    Raises:
+        OSError: a shard was moved away meanwhile.
     """
     if not _LOCKS.is_file():
         return None
     held = {tuple(line.split()[5].split(":")) for line in _LOCKS.read_text().splitlines() if " FLOCK " in line}
-    with wrap_errors(f"{run}: its journal cannot be read", "restore it"):
-        return any(_lock_name(path) in held for path in find_shards(run))
+    return any(_lock_name(path) in held for path in find_shards(run))
 
 
 def _lock_name(path: Path) -> tuple[str, str, str]:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from infthor_eval.errors import InfthorError
+from infthor_eval.errors import InfthorError, wrap_errors
 from infthor_eval.rates import Rate
 from infthor_eval.report.presenter import Presenter
 from infthor_eval.report.runs import ReportRun
@@ -124,10 +124,12 @@ class LiveRun:
     def state(self) -> LiveState:
         """Return the state of the run now."""
         with self._asking:
+            folder = str(self._run or self._folder)
             try:
-                return self._read()
+                with wrap_errors(f"{folder}: cannot be read", "restore it"):  # also what is set aside just now
+                    return self._read()
             except InfthorError as error:
-                return LiveState(status="unknown", folder=str(self._run or self._folder), problem=str(error))
+                return LiveState(status="unknown", folder=folder, problem=str(error))
 
     def _read(self) -> LiveState:
         self._run = self._run or _newest_run(self._folder)

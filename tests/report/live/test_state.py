@@ -167,3 +167,26 @@ def test_long_texts_are_cut(live, open_journal) -> None:
         journal.append(record(0, "x" * 100_000, ("Sofa",)))
     (sample,) = live.state().newest
     assert len(sample.reply) == 2001
+
+
+def test_a_run_that_is_moved_away_is_waited_for(live, open_journal, tmp_path) -> None:
+    with open_journal() as journal:
+        journal.append(record(0, "Sofa", ("Sofa",)))
+    assert live.state().totals.n_done == 1
+    (tmp_path / "results").rename(tmp_path / "elsewhere")
+    assert (live.state().status, live.state().totals.n_done) == ("waiting", 0)
+    (tmp_path / "elsewhere").rename(tmp_path / "results")
+    assert (live.state().totals.n_done, live.state().problem) == (1, "")
+
+
+def test_what_the_system_refuses_is_told_in_one_line(live, open_journal, tmp_path, monkeypatch) -> None:
+    with open_journal() as journal:
+        journal.append(record(0, "Sofa", ("Sofa",)))
+
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    state = live.state()
+    assert state.status == "unknown"
+    assert state.problem.endswith("cannot be read (Permission denied); restore it")
