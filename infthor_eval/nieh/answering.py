@@ -4,7 +4,7 @@ This is the one way from a sample to its record, whoever drives it: our own run,
 """
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
@@ -15,6 +15,7 @@ from msgspec.structs import replace as replace_fields
 from infthor_eval.errors import DataError, ModelError, UserCodeError
 from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.question import Answer
 from infthor_eval.formats.video import Video
 from infthor_eval.memory import Write
 from infthor_eval.nieh.baselines import Predict
@@ -30,7 +31,7 @@ from infthor_eval.nieh.units import NiehUnit
 from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
 from model_adapters import Attended, Decoding, Model, Notice, Part, Reply, answer_of, wrap_request_errors
 
-__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "answer_units"]
+__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "answer_units", "request_fingerprint"]
 
 
 @dataclass(frozen=True)
@@ -49,19 +50,8 @@ class _UnitRequest:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of the inputs: context with the frames' content, text, gold answers, decoding.
-
-        Raises:
-            DataError: a frame cannot be read.
-        """
-        return fingerprint(
-            {
-                "context": [_content(part) for part in self.context],
-                "text": self.text,
-                "answers": list(self.unit.payload.answers),
-                "decoding": self.decoding.document(),
-            }
-        )
+        """See `request_fingerprint`."""
+        return request_fingerprint(self.context, self.text, self.unit.payload.answers, self.decoding.document())
 
     @property
     def decoding(self) -> Decoding:
@@ -213,6 +203,18 @@ def answer_units(
             yield from _answer_in_batches(waiting, answerer, session)
             waiting = []
     yield from _answer_in_batches(waiting, answerer, session)
+
+
+def request_fingerprint(
+    context: Sequence[Part], text: str, answers: Sequence[Answer], decoding: Mapping[str, Any]
+) -> str:
+    """Return the hash of a request: context with the frames' content, text, gold answers, decoding.
+
+    Raises:
+        DataError: a frame cannot be read.
+    """
+    contents = [_content(part) for part in context]
+    return fingerprint({"context": contents, "text": text, "answers": list(answers), "decoding": decoding})
 
 
 def _content(part: Part) -> Any:

@@ -10,10 +10,10 @@ import msgspec
 from infthor_eval.report.presenter import Description, Figure, Replay, Timelines
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.sample_table import SampleColumn
-from infthor_eval.report.web.samples import StepRow
+from infthor_eval.report.web.samples import Prompt, StepRow
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
-from infthor_eval.runs import UnitRecord
+from infthor_eval.runs import UnitKey, UnitRecord
 
 __all__ = ["PlainPresenter"]
 
@@ -66,6 +66,10 @@ class PlainPresenter:
     def steps(self, record: UnitRecord[Any]) -> Sequence[StepRow]:
         """See `Presenter.steps`: none."""
         return ()
+
+    def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
+        """See `Presenter.prompts`: none."""
+        return {}
 
     def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
         """See `Presenter.timelines`: none."""

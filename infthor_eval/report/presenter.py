@@ -13,7 +13,7 @@ from PIL import Image
 
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.sample_table import SampleColumn
-from infthor_eval.report.web.samples import FrameFacts, StepRow, Timeline
+from infthor_eval.report.web.samples import FrameFacts, Prompt, StepRow, Timeline
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
@@ -254,6 +254,9 @@ class Presenter(Protocol):
 
     def steps(self, record: Record) -> Sequence[StepRow]:
         """Return the steps of a recorded episode; empty if it has none."""
+
+    def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
+        """Return the requests of a run's records, equal ones as one object; `data` is as for `timelines`."""
 
     def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
         """Find the frames that the samples are about; `data` is the set's folder, None for the one a run names."""

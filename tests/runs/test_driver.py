@@ -16,6 +16,7 @@ import pytest
 from infthor_eval.errors import DataError, ModelError, UsageError
 from infthor_eval.runs import Group, RunRequest, Unit, UnitKey, execute, prepare, read_header, read_run
 from infthor_eval.runs.scheduling import run_groups
+from infthor_eval.runs.tracebacks import StoredTracebacks
 from infthor_eval.workers import WorkerSettings
 from model_adapters import Capabilities
 from tests.runs.toy import Adder, Sum, Sums, ToySuite, is_broken, suite_of
@@ -132,6 +133,12 @@ def test_tracebacks_are_kept_beside_the_shards_by_unit_and_attempt(tmp_path):
     run(request(tmp_path), broken_by(ZeroDivisionError("of its own")))
     assert file.read_text().count("== sums: 2+3, attempt ") == 2
     assert "== sums: 2+4, attempt 2\nas for sums: 2+3, attempt 2\n" in file.read_text()
+    stored = StoredTracebacks(first.folder / "journal")
+    told = [stored.find(UnitKey("sums", name), attempt) for name in ("2+3", "2+4") for attempt in (1, 2)]
+    assert all(text.endswith("ZeroDivisionError: of its own") for text in told)
+    assert told[:2] == told[2:]
+    assert stored.find(UnitKey("sums", "1+3"), 1) == ""
+    assert StoredTracebacks(tmp_path).find(UnitKey("sums", "2+3"), 1) == ""
 
 
 def test_what_a_suite_says_itself_needs_no_traceback(tmp_path):

@@ -4,15 +4,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from infthor_eval.nieh.above_guessing import score_above_guessing
-from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.records import Guess, NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Timelines
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
+from infthor_eval.report.web.samples import Prompt
 from infthor_eval.report.web.sections import Chart
 from infthor_eval.report.web.thumbnails import ThumbnailStore
-from infthor_eval.runs import UnitRecord
+from infthor_eval.runs import UnitKey, UnitRecord
 
 __all__ = ["NiehPresenter"]
 
@@ -55,12 +56,33 @@ class NiehPresenter(PlainPresenter):
         return record.payload.reply or ""
 
     def details(self, record: Record) -> Mapping[str, str]:
-        """See `Presenter.details`: what the model thought; the page shows the rest elsewhere."""
-        thinking = record.payload.thinking
-        return {} if thinking is None else {"thought": thinking}
+        """See `Presenter.details`: evidence, guessing and thoughts; the page shows the rest elsewhere."""
+        payload = record.payload
+        details: dict[str, str] = {}
+        if payload.shown_clues is not None:
+            details["clue frames shown"] = f"{payload.shown_clues.n_shown} of {payload.shown_clues.n_clues}"
+        if payload.guess is not None:
+            details["guessing"] = _guessing(payload.guess)
+            details |= {name: f"{score:+.2f}" for name, score in self.further_scores(record).items()}
+        if payload.thinking is not None:
+            details["thought"] = payload.thinking
+        return details
+
+    def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
+        """See `Presenter.prompts`."""
+        from infthor_eval.report.suites.nieh_prompts import find_prompts
+
+        return find_prompts(run, data)
 
     def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
         """See `Presenter.timelines`."""
         from infthor_eval.report.suites.nieh_frames import find_timelines
 
         return find_timelines(runs, data, thumbnails)
+
+
+def _guessing(guess: Guess) -> str:
+    """Return what the best guesser of a question's form scores, in words."""
+    means = guess.form_scores.items()
+    scores = [f"{name} {guess.scores[name]:.2f}, in its form {mean:.2f}" for name, mean in means]
+    return f"{'; '.join(scores)} ({guess.form})"

@@ -1,25 +1,23 @@
 """Frames of questions: the clues with their neighbours, or some of all frames where there are no clues."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from infthor_eval.errors import DataError, UsageError
+from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.samples import find_set
 from infthor_eval.report.presenter import Timelines
 from infthor_eval.report.runs import ReportRun, choose_evenly, records_by_unit
 from infthor_eval.report.suites.nieh_frame_facts import read_frame_facts
+from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import FrameFacts, Timeline, TimelineFrame
 from infthor_eval.report.web.thumbnails import ThumbnailStore
-from infthor_eval.runs import UnitKey, UnitRecord
+from infthor_eval.runs import UnitKey
 
 __all__ = ["find_timelines"]
 
-Record = UnitRecord[NiehAnswer]
 _OVERVIEW = 5  # frames of a trajectory that are shown for a question without clues
 
 
@@ -28,15 +26,21 @@ def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thu
 
     Clues of all questions get their pictures before any neighbour does, as there is a limit on the size of all.
     """
-    sets = _Sets(runs, data)
+    sets, logs = RunSets(runs, data), _TrajectoryFacts()
     chosen: dict[UnitKey, _FrameChoice] = {}
     for key, records in records_by_unit(runs).items():
-        choice = sets.choose_frames(key, next(record for record in records if record))
-        if choice is not None:
-            chosen[key] = choice
+        question = sets.find_question(key, next(record for record in records if record))
+        opened = sets.find_set(key.task)
+        if opened is None or question is None:
+            continue
+        try:
+            chosen[key] = _choose_frames(opened, question, logs.read(opened.folder(question.traj_id)))
+        except DataError:  # the question was skipped or failed for it, and its record has the reason
+            continue
     for choice in chosen.values():
         for index in sorted(choice.clues):
             _picture(choice.frames[index], thumbnails)
+    notes = [f"{task}: no frames are shown: {problem}" for task, problem in sets.problems.items()]
     timelines = {key: _timeline(choice, thumbnails) for key, choice in chosen.items()}
     facts = {
         frame.picture: chosen[key].facts[frame.index]
@@ -44,7 +48,7 @@ def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thu
         for frame in timeline.frames
         if frame.picture is not None
     }
-    return Timelines(timelines, list(sets.problems), facts)
+    return Timelines(timelines, notes, facts)
 
 
 @dataclass(frozen=True)
@@ -64,49 +68,16 @@ class _FrameChoice:
     others: frozenset[int]
 
 
-class _Sets:
-    """The question sets of the tasks, as far as they are there and unchanged."""
+class _TrajectoryFacts:
+    """What the logs of trajectories say of their frames, each log read once."""
 
-    def __init__(self, runs: Sequence[ReportRun], data: Path | None) -> None:
-        self.problems: dict[str, None] = {}  # reasons why frames are missing, each once
-        self._sets: dict[str, tuple[NiehSet, Mapping[str, Question]] | None] = {}
+    def __init__(self) -> None:
         self._facts: dict[Path, Sequence[FrameFacts]] = {}  # by the trajectory's folder
-        for run in runs:
-            for task in run.tasks:
-                if task not in self._sets:
-                    self._sets[task] = self._read(run, task, data)
 
-    def choose_frames(self, key: UnitKey, record: Record) -> _FrameChoice | None:
-        """Choose frames of a record's question; None if its set is missing or has another question there."""
-        question_set = self._sets[key.task]
-        if question_set is None:
-            return None
-        data, questions = question_set
-        question = questions.get(key.id)
-        if question is None or question.text != record.payload.question:
-            return None
-        try:
-            return _choose_frames(data, question, self._read_facts(data.folder(question.traj_id)))
-        except DataError:  # the question was skipped or failed for it, and its record has the reason
-            return None
-
-    def _read_facts(self, folder: Path) -> Sequence[FrameFacts]:
+    def read(self, folder: Path) -> Sequence[FrameFacts]:
         if folder not in self._facts:
             self._facts[folder] = read_frame_facts(folder)
         return self._facts[folder]
-
-    def _read(self, run: ReportRun, task: str, data: Path | None) -> tuple[NiehSet, Mapping[str, Question]] | None:
-        folder = data or run.data
-        try:
-            questions = find_set(str(folder) if folder else None, run.dataset(task).get("bundled"))
-        except (UsageError, DataError) as error:
-            self.problems[f"{task}: no frames are shown: {error}; give the set's folder with --data"] = None
-            return None
-        if questions.fingerprint != run.tasks[task].get("data"):
-            problem = f"{task}: no frames are shown: {questions.root} has changed since {run.label} was run"
-            self.problems[problem] = None
-            return None
-        return questions, {question.id: question for question in questions.questions}
 
 
 def _choose_frames(data: NiehSet, question: Question, facts: Sequence[FrameFacts]) -> _FrameChoice:

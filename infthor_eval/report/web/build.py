@@ -13,7 +13,7 @@ from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.page import About, Page, SuiteLabels
 from infthor_eval.report.web.replays import EpisodeReplays, ReplayProgress
 from infthor_eval.report.web.run_tables import costs_table, left_out_table, primary_metrics_table
-from infthor_eval.report.web.sample_list import build_samples
+from infthor_eval.report.web.sample_list import SharedTexts, build_samples
 from infthor_eval.report.web.samples import FrameFacts, PageSample
 from infthor_eval.report.web.sections import Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
@@ -62,8 +62,9 @@ def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: Replay
     samples: list[PageSample] = []
     notes: list[str] = []
     facts: dict[int, FrameFacts] = {}
+    texts = SharedTexts()
     for same in by_suite.values():
-        of_suite = build_samples(same, request.data, replays, thumbnails)
+        of_suite = build_samples(same, request.data, replays, thumbnails, texts)
         places = [runs.index(run) for run in same]
         samples += [sample.spread_over(len(runs), places) for sample in of_suite.samples]
         notes += of_suite.notes
@@ -82,6 +83,8 @@ def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: Replay
         notes=notes,
         large=thumbnails.large,
         frames=facts,
+        prompts=texts.prompts.values,
+        tracebacks=texts.tracebacks.values,
     )
 
 

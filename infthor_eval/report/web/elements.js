@@ -1,7 +1,7 @@
 "use strict";
 // What the parts of the browser of samples share. Whatever the data hold is put into the page as text, never as markup.
 const byId = id => document.getElementById(id);
-const { runs, suites, metrics, samples, pictures, large, frames } = JSON.parse(byId("data").textContent);
+const { runs, suites, metrics, samples, pictures, large, frames, prompts, tracebacks } = JSON.parse(byId("data").textContent);
 const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", excluded: "–" };
 
 const make = (name, attributes = {}, ...children) => {

@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.files import write_atomically
-from infthor_eval.report.web.samples import FrameFacts, PageSample
+from infthor_eval.report.web.samples import FrameFacts, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
@@ -24,6 +24,7 @@ _SCRIPTS = (
     "elements.js",
     "address.js",
     "enlarged.js",
+    "prompts.js",
     "sample.js",
     "report.js",
 )  # one script on the page, in this order
@@ -81,6 +82,8 @@ class Page:
         notes: remarks on the samples.
         large: number of the enlarged picture by that of its thumbnail.
         frames: what is known of frames, by the numbers of their thumbnails.
+        prompts: requests as they were sent, by their numbers in the samples.
+        tracebacks: tracebacks of failures, by their numbers in the samples.
     """
 
     title: str
@@ -94,6 +97,8 @@ class Page:
     notes: Sequence[str] = ()
     large: Mapping[int, int] = field(default_factory=dict)
     frames: Mapping[int, FrameFacts] = field(default_factory=dict)
+    prompts: Sequence[Prompt] = ()
+    tracebacks: Sequence[str] = ()
 
 
 def write_page(page: Page, path: Path) -> int:
@@ -133,6 +138,8 @@ def _data(page: Page) -> Markup:
         "pictures": list(page.pictures),
         "large": page.large,
         "frames": msgspec.to_builtins(page.frames),
+        "prompts": msgspec.to_builtins(page.prompts),
+        "tracebacks": list(page.tracebacks),
     }
     text = json.dumps(document, ensure_ascii=False, separators=(",", ":"))
     for letter, escaped in _ESCAPED.items():

@@ -7,8 +7,10 @@ const partsOf = sample => {
     sample.target ? make("p", { class: "target" }, `${suites[sample.suite].target}: `, make("b", {}, sample.target)) : "",
     results(sample),
     ...details(sample),
-    ...(sample.timeline ? timeline(sample.timeline) : []),
+    ...(sample.timeline ? timeline(sample, sample.timeline) : []),
     ...episodes(sample),
+    ...tracebacksOf(sample),
+    ...promptsOf(sample),
     make("p", { class: "note" }, facts),
   ];
 };
@@ -37,27 +39,38 @@ const details = sample => sample.results
   .map(([facts, label]) => make("div", { class: "details" }, make("b", {}, label), make("dl", {},
     ...Object.entries(facts).flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]))));
 
-const factsOf = ({ index, picture, is_clue }) => {
+const factsOf = ({ index, picture, is_clue }, without) => {
   const { step, action, error, objects = [], held = [], pose } = frames[picture] ?? {};
   return [
     ["frame", is_clue ? `${index}, a clue` : index], ["step", step], ["action", action || (index === 0 ? "none yet" : "")],
     ["succeeded", action ? (error ? `no: ${error}` : "yes") : ""], ["in the hand", held.join(", ")],
-    ["in view", objects.join(", ")], ["agent", pose]];
+    ["in view", objects.join(", ")], ["agent", pose],
+    ["not shown to", without.join(", ")]];
 };
 
-const timeline = ({ n_frames, frames: shown = [], note }) => {
+// Whether a frame is a clue, and whether the contexts of the runs showed it; the enlarged frame says which left it out.
+const rankOf = (frame, without, n_known) => {
+  if (!frame.is_clue) return "";
+  if (without.length === 0) return "clue";
+  return without.length === n_known ? "clue outside" : "clue partly-outside";
+};
+const RANKS = { "": "", clue: " clue", "clue outside": " clue, not shown", "clue partly-outside": " clue, not shown to all" };
+
+const timeline = (sample, { n_frames, frames: shown = [], note }) => {
   const left = frame => `left: ${(100 * frame.index / Math.max(n_frames - 1, 1)).toFixed(2)}%`;
   const line = make("div", { class: "line", role: "img", "aria-label": `where the frames lie among ${n_frames}` });
-  for (const frame of shown) {
-    const place = make("i", { class: frame.is_clue ? "clue" : "", title: `frame ${frame.index}` });
+  const n_known = ofSuite(sample).filter(([result]) => isKnown(result)).length;
+  const views = [];
+  const cards = shown.map(frame => {
+    const without = runsWithout(sample, frame.index);
+    const rank = rankOf(frame, without, n_known);
+    const place = make("i", { class: rank, title: `frame ${frame.index}${RANKS[rank]}` });
     place.style.cssText = left(frame);
     line.append(place);
-  }
-  const views = [];
-  const cards = shown.map(frame => make("figure", { class: frame.is_clue ? "clue" : "" },
-    picture(frame.picture, `frame ${frame.index}`, views, factsOf(frame)),
-    make("figcaption", {}, `${frame.index}${frame.is_clue ? " clue" : ""}`)));
-  const clues = shown.some(frame => frame.is_clue) ? "; clues are framed in orange" : "";
+    return make("figure", { class: rank }, picture(frame.picture, `frame ${frame.index}`, views, factsOf(frame, without)),
+      make("figcaption", {}, `${frame.index}${RANKS[rank]}`));
+  });
+  const clues = shown.some(frame => frame.is_clue) ? "; clues are framed in orange, dashed where a context left them out" : "";
   const remark = make("p", { class: "note" }, `${n_frames} frames in the trajectory${clues}${note ? `; ${note}` : ""}`);
   return [line, make("div", { class: "frames" }, ...cards), remark];
 };

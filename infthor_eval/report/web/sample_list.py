@@ -1,6 +1,7 @@
 """From records to samples: what was asked, and the result of each run."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,11 +9,13 @@ import msgspec
 
 from infthor_eval.report.runs import ReportRun, records_by_unit
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
-from infthor_eval.report.web.samples import FrameFacts, PageSample, SampleResult, StepRow, Timeline
+from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt, SampleResult, StepRow, Timeline
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
+from infthor_eval.runs.shards import FOLDER
+from infthor_eval.runs.tracebacks import StoredTracebacks
 
-__all__ = ["SuiteSamples", "build_samples"]
+__all__ = ["SharedTexts", "SuiteSamples", "build_samples"]
 
 Record = UnitRecord[Any]
 
@@ -31,8 +34,20 @@ class SuiteSamples(NamedTuple):
     facts: Mapping[int, FrameFacts]
 
 
+@dataclass(frozen=True)
+class SharedTexts:
+    """Long texts that samples refer to by number, as many samples have the same."""
+
+    prompts: Numbered[Prompt] = field(default_factory=Numbered)
+    tracebacks: Numbered[str] = field(default_factory=Numbered)
+
+
 def build_samples(
-    runs: Sequence[ReportRun], data: Path | None, replays: EpisodeReplays, thumbnails: ThumbnailStore
+    runs: Sequence[ReportRun],
+    data: Path | None,
+    replays: EpisodeReplays,
+    thumbnails: ThumbnailStore,
+    texts: SharedTexts,
 ) -> SuiteSamples:
     """Build the samples of runs.
 
@@ -41,43 +56,67 @@ def build_samples(
         data: folder of the data set; None for the one that each run names.
         replays: replays some of the episodes.
         thumbnails: collects the pictures.
+        texts: collects prompts and tracebacks.
     """
     timelines = runs[0].presenter.timelines(runs, data, thumbnails)
     replayed = [replays.replay(run) for run in runs]
+    sources = [
+        _Source(run, run.presenter.prompts(run, data), StoredTracebacks(run.folder / FOLDER), texts) for run in runs
+    ]
     samples = [
-        _sample(key, runs, records, [pictures.get(key) for pictures, _ in replayed], timelines.by_unit)
+        _sample(key, sources, records, [pictures.get(key) for pictures, _ in replayed], timelines.by_unit)
         for key, records in records_by_unit(runs).items()
     ]
     notes = [*timelines.notes, *(note for _, notes in replayed for note in notes)]
     return SuiteSamples(samples, notes, timelines.facts)
 
 
+@dataclass(frozen=True)
+class _Source:
+    """A run with what is known of its records beside them."""
+
+    run: ReportRun
+    prompts: Mapping[UnitKey, Prompt]
+    tracebacks: StoredTracebacks
+    texts: SharedTexts
+
+    def prompt(self, record: Record) -> int | None:
+        prompt = self.prompts.get(record.key)
+        return None if prompt is None else self.texts.prompts.number(prompt)
+
+    def traceback(self, record: Record) -> int | None:
+        text = "" if record.failure is None else self.tracebacks.find(record.key, record.attempt)
+        return self.texts.tracebacks.number(text) if text else None
+
+
 def _sample(
     key: UnitKey,
-    runs: Sequence[ReportRun],
+    sources: Sequence[_Source],
     records: Sequence[Record | None],
     pictures: Sequence[EpisodePictures | None],
     timelines: Mapping[UnitKey, Timeline],
 ) -> PageSample:
     first = next(record for record in records if record is not None)
     results = (
-        None if record is None else _result(run, record, shown or EpisodePictures())
-        for run, record, shown in zip(runs, records, pictures, strict=True)
+        None if record is None else _result(source, record, shown or EpisodePictures())
+        for source, record, shown in zip(sources, records, pictures, strict=True)
     )
+    first_run = sources[0].run
     return PageSample(
-        suite=runs[0].suite.name,
+        suite=first_run.suite.name,
         task=key.task,
         id=key.id,
         variant=" ".join(filter(None, (key.variant, f"answer {key.repeat}" if key.repeat > 1 else ""))),
         cluster=first.cluster,
         results=tuple(results),
         timeline=timelines.get(key),
-        **runs[0].presenter.describe(first)._asdict(),
+        **first_run.presenter.describe(first)._asdict(),
     )
 
 
-def _result(run: ReportRun, record: Record, pictures: EpisodePictures) -> SampleResult:
-    presenter, tokens = run.presenter, record.tokens
+def _result(source: _Source, record: Record, pictures: EpisodePictures) -> SampleResult:
+    run, tokens = source.run, record.tokens
+    presenter = run.presenter
     return SampleResult(
         outcome=run.outcome(record),
         reply=presenter.reply(record),
@@ -91,6 +130,8 @@ def _result(run: ReportRun, record: Record, pictures: EpisodePictures) -> Sample
         start=pictures.frames[0] if pictures.frames else None,
         map=pictures.map,
         note=pictures.note,
+        prompt=source.prompt(record),
+        traceback=source.traceback(record),
     )
 
 

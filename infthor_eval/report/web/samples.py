@@ -1,10 +1,23 @@
 """Samples as the page's browser has them: what was asked, and the result of each run."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Generic, TypeVar
 
 import msgspec
 
-__all__ = ["FrameFacts", "PageSample", "SampleResult", "StepRow", "Timeline", "TimelineFrame"]
+__all__ = [
+    "FrameFacts",
+    "Numbered",
+    "PageSample",
+    "Prompt",
+    "PromptFrames",
+    "SampleResult",
+    "StepRow",
+    "Timeline",
+    "TimelineFrame",
+]
+
+T = TypeVar("T", bound=Hashable)
 
 
 class FrameFacts(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -25,6 +38,22 @@ class FrameFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     objects: tuple[str, ...] = ()
     held: tuple[str, ...] = ()
     pose: str = ""
+
+
+class Numbered(Generic[T]):
+    """Values that samples refer to by number, each once."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[T, int] = {}
+
+    @property
+    def values(self) -> list[T]:
+        """The values in the order of their numbers."""
+        return list(self._numbers)
+
+    def number(self, value: T) -> int:
+        """Return the number of a value, a new one if it was not there."""
+        return self._numbers.setdefault(value, len(self._numbers))
 
 
 class TimelineFrame(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -52,6 +81,37 @@ class Timeline(msgspec.Struct, frozen=True, omit_defaults=True):
 
     n_frames: int
     frames: tuple[TimelineFrame, ...] = ()
+    note: str = ""
+
+
+class PromptFrames(msgspec.Struct, frozen=True):
+    """Frames in a prompt.
+
+    Attributes:
+        what: what they are, in words ("frames", "blank frames", "video of 1 frames per second").
+        places: first and last place in the trajectory of each stretch of neighbours, in the order shown; empty where
+            they are no frames of it.
+        n: number of frames.
+    """
+
+    what: str
+    places: tuple[tuple[int, int], ...]
+    n: int
+
+
+class Prompt(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The request of a sample as it was sent, which ends with the sample's title.
+
+    Attributes:
+        parts: texts, and frames in their places.
+        shown: first and last place in the trajectory of each stretch of frames that it shows.
+        problem: why it cannot be shown; empty if it is.
+        note: a remark.
+    """
+
+    parts: tuple[str | PromptFrames, ...] = ()
+    shown: tuple[tuple[int, int], ...] = ()
+    problem: str = ""
     note: str = ""
 
 
@@ -91,6 +151,8 @@ class SampleResult(msgspec.Struct, frozen=True, omit_defaults=True):
         start: number of the thumbnail of the frame before the first step.
         map: number of the picture of the map at the end.
         note: how the replay differs from the recorded episode.
+        prompt: number of the request among the prompts of the page; None if the suite shows none.
+        traceback: number of the failure's traceback among those of the page; None if there is none.
     """
 
     outcome: str
@@ -105,6 +167,8 @@ class SampleResult(msgspec.Struct, frozen=True, omit_defaults=True):
     start: int | None = None
     map: int | None = None
     note: str = ""
+    prompt: int | None = None
+    traceback: int | None = None
 
 
 class PageSample(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -1,0 +1,99 @@
+"""The requests of questions for the page: their texts, and which frames are where."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+
+from infthor_eval.errors import InfthorError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.video import Video
+from infthor_eval.nieh.contexts import ContextPart
+from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.rebuilt_requests import RebuiltRequest, RequestRebuilder
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.suites.nieh_sets import RunSets
+from infthor_eval.report.web.samples import Prompt, PromptFrames
+from infthor_eval.runs import UnitKey, UnitRecord
+
+__all__ = ["find_prompts"]
+
+Record = UnitRecord[NiehAnswer]
+_OF_BASELINES = "a baseline is not sent it: it answers from the questions alone"
+
+
+def find_prompts(run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
+    """See `Presenter.prompts`."""
+    sets = RunSets([run], data)
+    rebuilders: dict[str, RequestRebuilder | str] = {task: _rebuilder(run, task, sets) for task in run.tasks}
+    note = _OF_BASELINES if "baseline" in run.header.config["model"] else ""
+    ablation = run.header.config["frames"]
+    kept: dict[Prompt, Prompt] = {}
+    prompts = {}
+    for record in run.records:
+        prompt = _prompt(rebuilders[record.task], record, sets.find_set(record.task), ablation, note)
+        prompts[record.key] = kept.setdefault(prompt, prompt)
+    return prompts
+
+
+def _rebuilder(run: ReportRun, task: str, sets: RunSets) -> RequestRebuilder | str:
+    """Return what makes the requests of a task again, or why nothing can."""
+    opened = sets.find_set(task)
+    if opened is None:
+        return sets.problems[task]
+    try:
+        return RequestRebuilder(run.header, task, opened)
+    except InfthorError as error:
+        return str(error)
+
+
+def _prompt(
+    rebuilder: RequestRebuilder | str, record: Record, data: NiehSet | None, ablation: str, note: str
+) -> Prompt:
+    if data is None or isinstance(rebuilder, str):
+        return Prompt(problem=str(rebuilder))
+    try:
+        request = rebuilder.rebuild(record)
+        places = {frame: place for place, frame in enumerate(data.frames(record.cluster))}
+    except InfthorError as error:
+        return Prompt(problem=str(error))
+    before = request.text.removesuffix(record.payload.question)
+    return Prompt((*_parts(request, places, ablation), before), _stretches(sorted(set(request.positions))), note=note)
+
+
+def _parts(request: RebuiltRequest, places: Mapping[FrameRef, int], ablation: str) -> Iterator[str | PromptFrames]:
+    """Yield texts and frames; neighbours of one kind are one part."""
+    for kind, group in groupby(request.context, type):
+        parts = list(group)
+        if kind is str:
+            yield "".join(part for part in parts if isinstance(part, str))
+        elif kind is FrameRef:
+            yield _frames("frames", [part for part in parts if isinstance(part, FrameRef)], places, ablation)
+        else:
+            yield from (_film(part, places, ablation) for part in parts)
+
+
+def _film(part: ContextPart, places: Mapping[FrameRef, int], ablation: str) -> PromptFrames:
+    assert isinstance(part, Video)
+    return _frames(f"video of {part.fps:g} frames per second", part.frames, places, ablation)
+
+
+def _frames(what: str, frames: Sequence[FrameRef], places: Mapping[FrameRef, int], ablation: str) -> PromptFrames:
+    """Return frames by their places; frames of another trajectory, blank or decoded ones have none in this one."""
+    found = [places.get(frame) for frame in frames]
+    own = [place for place in found if place is not None]
+    is_own = len(own) == len(found)
+    shown = what if ablation == SHOWN else f"{what} ({ablation})"
+    return PromptFrames(shown, _stretches(own) if is_own else (), len(frames))
+
+
+def _stretches(places: Sequence[int]) -> tuple[tuple[int, int], ...]:
+    """Return first and last of each stretch of ascending neighbours."""
+    stretches: list[tuple[int, int]] = []
+    for place in places:
+        if stretches and place == stretches[-1][1] + 1:
+            stretches[-1] = stretches[-1][0], place
+        else:
+            stretches.append((place, place))
+    return tuple(stretches)

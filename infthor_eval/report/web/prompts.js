@@ -1,0 +1,37 @@
+// What was sent: the whole prompt of a sample, which frames it shows, and the tracebacks of failures.
+const within = (place, stretches) => stretches.some(([first, last]) => first <= place && place <= last);
+const promptOf = result => (result?.prompt === undefined ? undefined : prompts[result.prompt]);
+const isKnown = result => promptOf(result) !== undefined && !promptOf(result).problem;
+
+const stretchesOf = places => places.map(([first, last]) => first === last ? `${first}` : `${first}–${last}`).join(", ");
+const framesPart = ({ what, places, n }) => make("span", { class: "frames-part" },
+  `⟦${n} × ${what}${places.length ? `: ${stretchesOf(places)}` : ""}⟧`);
+
+// Labels of the runs by the value that their results have, in the order of the runs.
+const runsByValue = (sample, valueOf) => {
+  const labels = new Map();
+  for (const [result, at] of ofSuite(sample)) {
+    const value = result ? valueOf(result) : undefined;
+    if (value !== undefined) labels.set(value, [...(labels.get(value) ?? []), runs[at]]);
+  }
+  return [...labels];
+};
+
+const promptsOf = sample => runsByValue(sample, result => result.prompt).map(([number, labels]) => {
+  const { parts = [], problem, note } = prompts[number];
+  const body = problem
+    ? [make("p", { class: "note" }, `It is not known exactly: ${problem}.`)]
+    : [make("pre", {}, ...parts.map(part => typeof part === "string" ? part : framesPart(part)), sample.title),
+      make("p", { class: "note" }, "Made again from the run's settings and its set; by its hash it is what was asked. Each model has its own chat template around it.")];
+  return make("details", { class: "prompt" }, make("summary", {}, "The whole prompt, ", make("b", {}, labels.join(", "))),
+    note ? make("p", { class: "note" }, note) : null, ...body);
+});
+
+const tracebacksOf = sample => runsByValue(sample, result => result.traceback).map(([number, labels]) =>
+  make("details", { class: "traceback" }, make("summary", {}, "Traceback, ", make("b", {}, labels.join(", "))),
+    make("pre", {}, tracebacks[number])));
+
+// Labels of the runs whose context left out a frame, of those whose prompt is known.
+const runsWithout = (sample, place) => ofSuite(sample)
+  .filter(([result]) => isKnown(result) && !within(place, promptOf(result).shown ?? []))
+  .map(([, at]) => runs[at]);
