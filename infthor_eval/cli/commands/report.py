@@ -14,6 +14,7 @@ from infthor_eval.cli.options.values import PATH, WholeNumber
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+    from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.report.presenter import Figure, FigureRequest
     from infthor_eval.report.runs import ReportRun
     from infthor_eval.report.web.build import PageRequest
@@ -90,24 +91,25 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
     path = prepare_file(out)
     runs = read_report_runs(folders, find_suite, find_presenter)
     with progress_bar(error_console()) as progress:
-        page = build_page(runs, request, _ReplayBar(progress))
+        page = build_page(runs, request, _PageBars(progress))
     size = write_page(page, path)
     print_line(f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: {path}")
 
 
-class _ReplayBar:
-    """See `ReplayProgress`: a bar on a terminal, lines elsewhere."""
+class _PageBars:
+    """See `PageProgress`: a bar per piece of work on a terminal, lines elsewhere."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
+        self._bars: dict[str, PacedBar] = {}
 
-    def begin(self, n_episodes: int) -> None:
+    def begin(self, what: str, n: int) -> None:
         from infthor_eval.cli.progress.bar import PacedBar
 
-        self._bar = PacedBar(self._progress, "episodes replayed", n_episodes)
+        self._bars[what] = PacedBar(self._progress, what, n)
 
-    def advance(self, run: str, trajectory: str) -> None:
-        self._bar.advance(detail=f"{run}, {trajectory}")
+    def advance(self, what: str, detail: str = "") -> None:
+        self._bars[what].advance(detail=detail)
 
 
 def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Path) -> None:

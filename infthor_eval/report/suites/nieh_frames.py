@@ -37,6 +37,7 @@ def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thu
             chosen[key] = _choose_frames(opened, question, logs.read(opened.folder(question.traj_id)))
         except DataError:  # the question was skipped or failed for it, and its record has the reason
             continue
+    thumbnails.expect(len({choice.frames[at] for choice in chosen.values() for at in choice.clues | choice.others}))
     for choice in chosen.values():
         for index in sorted(choice.clues):
             _picture(choice.frames[index], thumbnails)

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 
@@ -11,7 +11,8 @@ from infthor_eval.errors import DataError
 from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.page import About, Page, SuiteLabels
-from infthor_eval.report.web.replays import EpisodeReplays, ReplayProgress
+from infthor_eval.report.web.progress import PageProgress, Silent
+from infthor_eval.report.web.replays import EpisodeReplays
 from infthor_eval.report.web.run_tables import costs_table, left_out_table, primary_metrics_table
 from infthor_eval.report.web.sample_list import SharedTexts, build_samples
 from infthor_eval.report.web.samples import FrameFacts, PageSample
@@ -20,6 +21,7 @@ from infthor_eval.report.web.thumbnails import ThumbnailStore
 
 __all__ = ["PageRequest", "build_page"]
 
+_SUMMARIES = "runs summarised"
 _FEW = 4  # runs of which each is compared with each
 
 
@@ -40,15 +42,19 @@ class PageRequest:
     pictures: int = 15_000_000
 
 
-def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: ReplayProgress | None = None) -> Page:
-    """Build the page of some runs, of one suite or of several.
+def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: PageProgress | None = None) -> Page:
+    """Build the page of some runs, of one suite or of several; `progress` observes what takes long.
 
     Raises:
         DataError: a run's header is not one of its suite.
     """
+    progress = progress or Silent()
     by_suite: dict[str, list[ReportRun]] = {}
+    progress.begin(_SUMMARIES, len(runs))
     for run in runs:
         by_suite.setdefault(run.suite.name, []).append(run)
+        _ = run.summary  # computed once, here, where it is seen to take its time
+        progress.advance(_SUMMARIES, run.label)
     sections = [Section("results", "Results", tables=(primary_metrics_table(runs),))]
     for same in by_suite.values():
         sections += _suite_sections(same)
@@ -57,14 +63,14 @@ def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: Replay
     left_out = left_out_table(runs)
     if left_out is not None:
         sections.append(Section("left-out", "Failed, skipped, excluded", tables=(left_out,)))
-    thumbnails = ThumbnailStore(request.pictures)
+    thumbnails = ThumbnailStore(request.pictures, progress=progress)
     replays = EpisodeReplays(runs, request.episodes, (request.data, request.scenes), thumbnails, progress)
     samples: list[PageSample] = []
     notes: list[str] = []
     facts: dict[int, FrameFacts] = {}
     texts = SharedTexts()
     for same in by_suite.values():
-        of_suite = build_samples(same, request.data, replays, thumbnails, texts)
+        of_suite = build_samples(same, request.data, replays, thumbnails, texts, progress)
         places = [runs.index(run) for run in same]
         samples += [sample.spread_over(len(runs), places) for sample in of_suite.samples]
         notes += of_suite.notes
@@ -98,7 +104,8 @@ def _suite_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
     title = presenter.title or suite.name.replace("_", " ").capitalize()
     tables = suite.tables([run.summary for run in runs])
     yield Section(suite.name, title, tuple(presenter.charts(runs)), tuple(tables))
-    yield from presenter.sections(runs)
+    for section in presenter.sections(runs):
+        yield replace(section, is_linked=False)
 
 
 def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:

@@ -3,21 +3,23 @@
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from PIL import Image
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.report.presenter import EpisodeSelection, OpenReplay, Replay
 from infthor_eval.report.runs import ReportRun, choose_evenly
+from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
 
-__all__ = ["EpisodePictures", "EpisodeReplays", "ReplayProgress"]
+__all__ = ["EpisodePictures", "EpisodeReplays"]
 
 Record = UnitRecord[Any]
 # Pixels of a map's side: drawn larger than it is shown, since small letters are easier to read when they are reduced.
 _DRAWN, _SHOWN = 560, 300
+_WORK = "episodes replayed"
 
 
 class EpisodePictures(NamedTuple):
@@ -34,16 +36,6 @@ class EpisodePictures(NamedTuple):
     note: str = ""
 
 
-class ReplayProgress(Protocol):
-    """Observes replays, which take seconds each."""
-
-    def begin(self, n_episodes: int) -> None:
-        """Start to count; called once, before the first episode."""
-
-    def advance(self, run: str, trajectory: str) -> None:
-        """Count an episode of a run."""
-
-
 class EpisodeReplays:
     """Replays some episodes of each run of a page."""
 
@@ -53,7 +45,7 @@ class EpisodeReplays:
         most: int,
         folders: tuple[Path | None, Path | None],
         thumbnails: ThumbnailStore,
-        progress: ReplayProgress | None,
+        progress: PageProgress,
     ) -> None:
         """Choose the episodes.
 
@@ -62,14 +54,14 @@ class EpisodeReplays:
             most: number of episodes of each run to replay.
             folders: those of the trajectories and of recorded floor plans, see `Recording.open`.
             thumbnails: collects the pictures.
-            progress: observes the replays, if given.
+            progress: observes the replays.
         """
         self._chosen = {run.folder: _choose(run, most) for run in runs if run.presenter.replay is not None}
         self._data, self._scenes = folders
         self._thumbnails, self._progress = thumbnails, progress
         n_episodes = sum(map(len, self._chosen.values()))
-        if progress is not None and n_episodes:
-            progress.begin(n_episodes)
+        if n_episodes:
+            progress.begin(_WORK, n_episodes)
 
     def replay(self, run: ReportRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
         """Replay the chosen episodes of a run; return their pictures, and why a trajectory could not be replayed."""
@@ -96,8 +88,7 @@ class EpisodeReplays:
         return pictures, notes
 
     def _count(self, run: ReportRun, trajectory: str) -> None:
-        if self._progress is not None:
-            self._progress.advance(run.label, trajectory)
+        self._progress.advance(_WORK, f"{run.label}, {trajectory}")
 
     def _draw(self, replay: Replay, session: OpenReplay, run: ReportRun, record: Record) -> EpisodePictures:
         frames = list(session.frames([record]))

@@ -6,7 +6,15 @@
     root.dataset.theme = dark ? "light" : "dark";
   };
   byId("theme").addEventListener("click", toggleTheme);
+  // Tables that are wider than the page say that they scroll.
+  const markWide = (part = document) => {
+    for (const scroll of part.querySelectorAll(".scroll")) {
+      scroll.toggleAttribute("data-wide", scroll.scrollWidth > scroll.clientWidth);
+    }
+  };
+  addEventListener("resize", () => markWide());
   if (!byId("samples")) {
+    markWide();
     addEventListener("keydown", event => { if (event.key === "t") toggleTheme(); });
     return;
   }
@@ -119,6 +127,7 @@
     draw();
     list.setAttribute("aria-activedescendant", `item-${place}`);
     byId("sample").replaceChildren(...partsOf(sample));
+    markWide(byId("sample"));
     if (setsAddress) history.replaceState(null, "", addressOf(sample));
   };
 
@@ -163,4 +172,5 @@
   addEventListener("hashchange", openAddressed);
   filter(false);
   openAddressed();
+  markWide();
 })();

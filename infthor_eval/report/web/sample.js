@@ -6,9 +6,9 @@ const partsOf = sample => {
     make("div", { class: "head" }, make("h3", {}, sample.title), linkTo(sample)),
     sample.target ? make("p", { class: "target" }, `${suites[sample.suite].target}: `, make("b", {}, sample.target)) : "",
     results(sample),
-    ...details(sample),
     ...(sample.timeline ? timeline(sample, sample.timeline) : []),
     ...episodes(sample),
+    ...details(sample),
     ...tracebacksOf(sample),
     ...promptsOf(sample),
     make("p", { class: "note" }, facts),
@@ -18,26 +18,34 @@ const partsOf = sample => {
 const results = sample => {
   const names = metrics.filter(name => resultsOf(sample).some(result => result.scores?.[name] !== undefined));
   const head = ["run", "", suites[sample.suite].reply, ...names, "seconds", "tokens"];
+  // On narrow pages a row is a block, and each number has its name beside it.
+  const number = (name, value) => make("td", { class: "n", "data-name": name }, value);
   const rows = ofSuite(sample).map(([result, at]) => {
-    if (!result) return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(null, runs[at])), make("td", { class: "note" }, "not evaluated"));
+    const name = make("td", { class: "run" }, runs[at]);
+    if (!result) return make("tr", {}, name, make("td", {}, mark(null, runs[at])), make("td", { class: "note" }, "not evaluated"));
     const reason = [result.reason, ...(result.faults ?? [])].filter(Boolean).join("; ");
-    const reply = make("td", {}, result.reply ?? "", reason ? make("span", { class: "note" }, ` (${reason})`) : "");
-    const scores = names.map(name => make("td", { class: "n" }, result.scores?.[name]?.toFixed(2) ?? "-"));
+    const reply = make("td", { class: "reply" }, result.reply ?? "", reason ? make("span", { class: "note" }, ` (${reason})`) : "");
+    const scores = names.map(metric => number(metric, result.scores?.[metric]?.toFixed(2) ?? "-"));
     const [context, cached] = result.tokens ?? [];
     const tokens = context == null ? "-" : context.toLocaleString("en") + (cached ? ` (${cached.toLocaleString("en")} cached)` : "");
-    return make("tr", {}, make("td", {}, runs[at]), make("td", {}, mark(result, runs[at]), ` ${result.outcome}`), reply,
-      ...scores, make("td", { class: "n" }, (result.seconds ?? 0).toFixed(2)), make("td", { class: "n" }, tokens));
+    return make("tr", {}, name, make("td", {}, mark(result, runs[at]), ` ${result.outcome}`), reply,
+      ...scores, number("seconds", (result.seconds ?? 0).toFixed(2)), number("tokens", tokens));
   });
   return make("div", { class: "scroll" }, make("table", { class: "results" },
     make("thead", {}, make("tr", {}, ...head.map((name, at) => make("th", at > 2 ? { class: "n" } : {}, name)))),
     make("tbody", {}, ...rows)));
 };
 
-// What the records of a suite without a presenter hold.
-const details = sample => sample.results
-  .map((result, at) => result?.details ? [result.details, runs[at]] : null).filter(Boolean)
-  .map(([facts, label]) => make("div", { class: "details" }, make("b", {}, label), make("dl", {},
-    ...Object.entries(facts).flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]))));
+// Further facts: once where all runs have the same, else by run.
+const details = sample => {
+  const told = ofSuite(sample).filter(([result]) => result?.details).map(([result, at]) => [result.details, runs[at]]);
+  const isCommon = (name, value) => told.length > 1 && told.every(([facts]) => facts[name] === value);
+  const block = (heading, facts) => facts.length === 0 ? [] : [make("div", { class: "details" }, make("b", {}, heading),
+    make("dl", {}, ...facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)])))];
+  const [common, own] = [true, false].map(wanted => told.map(([facts, label]) =>
+    [label, Object.entries(facts).filter(([name, value]) => isCommon(name, value) === wanted)]));
+  return [...(common.length ? block("all runs", common[0][1]) : []), ...own.flatMap(([label, facts]) => block(label, facts))];
+};
 
 const factsOf = ({ index, picture, is_clue }, without) => {
   const { step, action, error, objects = [], held = [], pose } = frames[picture] ?? {};

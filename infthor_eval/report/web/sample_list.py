@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from infthor_eval.report.runs import ReportRun, records_by_unit
+from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt, SampleResult, StepRow, Timeline
 from infthor_eval.report.web.thumbnails import ThumbnailStore
@@ -18,6 +19,7 @@ from infthor_eval.runs.tracebacks import StoredTracebacks
 __all__ = ["SharedTexts", "SuiteSamples", "build_samples"]
 
 Record = UnitRecord[Any]
+_PROMPTS = "runs with their prompts"
 
 
 class SuiteSamples(NamedTuple):
@@ -48,6 +50,7 @@ def build_samples(
     replays: EpisodeReplays,
     thumbnails: ThumbnailStore,
     texts: SharedTexts,
+    progress: PageProgress,
 ) -> SuiteSamples:
     """Build the samples of runs.
 
@@ -57,12 +60,15 @@ def build_samples(
         replays: replays some of the episodes.
         thumbnails: collects the pictures.
         texts: collects prompts and tracebacks.
+        progress: observes what takes long.
     """
     timelines = runs[0].presenter.timelines(runs, data, thumbnails)
     replayed = [replays.replay(run) for run in runs]
-    sources = [
-        _Source(run, run.presenter.prompts(run, data), StoredTracebacks(run.folder / FOLDER), texts) for run in runs
-    ]
+    progress.begin(_PROMPTS, len(runs))
+    sources = []
+    for run in runs:
+        sources.append(_Source(run, run.presenter.prompts(run, data), StoredTracebacks(run.folder / FOLDER), texts))
+        progress.advance(_PROMPTS, run.label)
     samples = [
         _sample(key, sources, records, [pictures.get(key) for pictures, _ in replayed], timelines.by_unit)
         for key, records in records_by_unit(runs).items()

@@ -32,6 +32,7 @@ class Section:
         charts: charts, above the tables.
         tables: tables with the numbers.
         notes: remarks, a paragraph each.
+        is_linked: whether the head of the page has a link to it; parts of another section have none.
     """
 
     key: str
@@ -39,6 +40,7 @@ class Section:
     charts: tuple[Chart, ...] = ()
     tables: tuple[Table, ...] = ()
     notes: tuple[str, ...] = ()
+    is_linked: bool = True
 
     @property
     def is_empty(self) -> bool:

@@ -6,23 +6,29 @@ from collections.abc import Callable, Mapping, Sequence
 
 from PIL import Image
 
+from infthor_eval.report.web.progress import PageProgress, Silent
+
 __all__ = ["ThumbnailStore"]
 
 _QUALITY = 55  # of WebP: 1 to 3 kB for a frame of 132 pixels, so that thousands fit into a page
 _LARGE_SIDE = 480  # the published frames, of 300 pixels, keep their size
+_WORK = "frames read"
 _LARGE_QUALITY = 70  # about 5 kB for a frame of the embedded simulator
 
 
 class ThumbnailStore:
     """Thumbnails by number; pictures that come first get the room, and every thumbnail before any enlarged picture."""
 
-    def __init__(self, budget: int, side: int = 132) -> None:
+    def __init__(self, budget: int, side: int = 132, progress: PageProgress | None = None) -> None:
         """Start without pictures.
 
         Args:
             budget: maximum size of all pictures together, in bytes of base64.
             side: length of a thumbnail's longer side in pixels.
+            progress: observes the pictures that are expected.
         """
+        self._progress = progress or Silent()
+        self._n_expected = 0
         self._left = budget  # as enlarged pictures leave it
         self._side = side
         self._encoded: list[str] = []
@@ -44,6 +50,12 @@ class ThumbnailStore:
         """Number of pictures that there was no room for."""
         return sum(number is None for number in self._numbers.values())
 
+    def expect(self, n: int) -> None:
+        """Announce the next n pictures, so that whoever waits for them sees how far they are."""
+        self._n_expected = n
+        if n:
+            self._progress.begin(_WORK, n)
+
     def add(self, key: str, load: Callable[[], Image.Image], side: int | None = None) -> int | None:
         """Add a picture, unless it was added before, and return its number; None if there is no room for it.
 
@@ -53,6 +65,9 @@ class ThumbnailStore:
             side: length of its longer side, if it differs from that of the others.
         """
         if key not in self._numbers:
+            if self._n_expected:
+                self._n_expected -= 1
+                self._progress.advance(_WORK)
             self._numbers[key] = self._add(load, side or self._side) if self._left > 0 or self._enlarged else None
         return self._numbers[key]
 

@@ -2,12 +2,16 @@
 
 import json
 import shutil
+from collections import Counter
 from itertools import pairwise
 
 import pytest
 
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.nieh.samples import open_set
+from infthor_eval.report.runs import read_report_runs
+from infthor_eval.report.web.build import PageRequest, build_page
+from infthor_eval.suites import find_presenter, find_suite
 
 DATA = packaged_folder("sets/nieh_mini")
 
@@ -129,3 +133,19 @@ def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scrip
         assert not result.note  # it went as it was recorded
     unseen = next(sample for sample in page.samples if sample.results[0].steps and sample not in seen)
     assert unseen.results[0].steps[0].action
+
+
+def test_what_takes_long_is_counted_to_its_end(nieh_runs, scripted_run, scripted_data):
+    begun, counted = {}, Counter()
+
+    class Watching:
+        def begin(self, what, n):
+            begun[what] = begun.get(what, 0) + n
+
+        def advance(self, what, detail=""):
+            counted[what] += 1
+
+    runs = read_report_runs([*nieh_runs, scripted_run], find_suite, find_presenter)
+    build_page(runs, PageRequest(episodes=1), Watching())
+    assert set(begun) == {"runs summarised", "frames read", "runs with their prompts", "episodes replayed"}
+    assert counted == begun
