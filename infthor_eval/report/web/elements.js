@@ -1,7 +1,7 @@
 "use strict";
 // What the parts of the browser of samples share. Whatever the data hold is put into the page as text, never as markup.
 const byId = id => document.getElementById(id);
-const { runs, suites, metrics, samples, pictures, large, frames, prompts, tracebacks } = JSON.parse(byId("data").textContent);
+const { runs, suites, metrics, samples, details, pictures, large, frames, prompts, tracebacks } = JSON.parse(byId("data").textContent);
 const MARKS = { right: "✓", partly: "◐", wrong: "✗", failed: "!", excluded: "–" };
 
 const make = (name, attributes = {}, ...children) => {
@@ -19,4 +19,5 @@ const resultsOf = sample => sample.results.filter(Boolean);
 // Results with the places of their runs: those of the suite that have the task at all.
 const runsWith = {};
 for (const { task, results } of samples) results.forEach((result, at) => { if (result) (runsWith[task] ??= new Set()).add(at); });
+const detailsOf = result => Object.fromEntries((result?.details ?? []).map(number => details[number]));
 const ofSuite = sample => suites[sample.suite].runs.filter(at => runsWith[sample.task]?.has(at)).map(at => [sample.results[at], at]);

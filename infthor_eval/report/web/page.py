@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.files import write_atomically
-from infthor_eval.report.web.samples import FrameFacts, PageSample, Prompt
+from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
 
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
@@ -130,11 +130,13 @@ def _read(name: str) -> str:
 
 def _data(page: Page) -> Markup:
     """Return the data of the samples' browser, as JSON that is safe in a script element."""
+    samples, facts = _share_details(msgspec.to_builtins(page.samples))
     document: dict[str, Any] = {
         "runs": [run.label for run in page.runs],
         "suites": msgspec.to_builtins(page.suites),
         "metrics": list(page.metrics),
-        "samples": msgspec.to_builtins(page.samples),
+        "samples": samples,
+        "details": facts,
         "pictures": list(page.pictures),
         "large": page.large,
         "frames": msgspec.to_builtins(page.frames),
@@ -145,3 +147,13 @@ def _data(page: Page) -> Markup:
     for letter, escaped in _ESCAPED.items():
         text = text.replace(letter, escaped)
     return Markup(text)
+
+
+def _share_details(samples: list[Any]) -> tuple[list[Any], list[tuple[str, str]]]:
+    """Return samples with the numbers of their details, and the details: many samples have the same."""
+    facts: Numbered[tuple[str, str]] = Numbered()
+    for sample in samples:
+        for result in filter(None, sample["results"]):
+            if "details" in result:
+                result["details"] = [facts.number(pair) for pair in result["details"].items()]
+    return samples, facts.values

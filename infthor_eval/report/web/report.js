@@ -42,11 +42,13 @@
   const textOf = sample => [
     sample.title, sample.target, sample.cluster, sample.id, sample.variant,
     ...resultsOf(sample).flatMap(result => [
-      result.reply, result.reason, ...Object.values(result.details ?? {}), ...(result.steps ?? []).map(step => step.action)]),
+      result.reply, result.reason, ...(result.details ?? []).map(number => details[number][1]), ...(result.steps ?? []).map(step => step.action)]),
   ].join("\n").toLowerCase();
-  let texts = null; // made at the first search, as the page need not wait for them when it opens
+  let texts = null; // made when the page is there and nobody waits, or at the first search if that comes before
+  const index = () => { texts ??= samples.map(textOf); };
+  (window.requestIdleCallback ?? setTimeout)(index); // Safari has no idle callbacks
   const contains = wanted => {
-    texts ??= samples.map(textOf);
+    index();
     return (_, at) => texts[at].includes(wanted);
   };
 

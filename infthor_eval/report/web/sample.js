@@ -8,7 +8,7 @@ const partsOf = sample => {
     results(sample),
     ...(sample.timeline ? timeline(sample, sample.timeline) : []),
     ...episodes(sample),
-    ...details(sample),
+    ...detailRows(sample),
     ...tracebacksOf(sample),
     ...promptsOf(sample),
     make("p", { class: "note" }, facts),
@@ -37,8 +37,8 @@ const results = sample => {
 };
 
 // Further facts: once where all runs have the same, else by run.
-const details = sample => {
-  const told = ofSuite(sample).filter(([result]) => result?.details).map(([result, at]) => [result.details, runs[at]]);
+const detailRows = sample => {
+  const told = ofSuite(sample).filter(([result]) => result?.details).map(([result, at]) => [detailsOf(result), runs[at]]);
   const isCommon = (name, value) => told.length > 1 && told.every(([facts]) => facts[name] === value);
   const block = (heading, facts) => facts.length === 0 ? [] : [make("div", { class: "details" }, make("b", {}, heading),
     make("dl", {}, ...facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)])))];
