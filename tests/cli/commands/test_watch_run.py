@@ -6,7 +6,6 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-from functools import partial
 
 import pytest
 
@@ -18,12 +17,18 @@ from tests.report.live.conftest import header_of
 
 pytest.importorskip("uvicorn", reason="the extra `page` is not installed: pip install 'infthor-eval[page]'")
 
+# Where the tests run in the background of a shell, what they start would ignore Ctrl-C.
+OURS = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from infthor_eval.cli import main
+main()
+"""
+
 
 def test_the_page_is_served_until_ctrl_c_while_the_run_goes_on(tmp_path):
-    words = [sys.executable, "-c", "from infthor_eval.cli import main; main()", "watch-run", str(tmp_path)]
-    # Where the tests run in the background of a shell, Ctrl-C is ignored, and would be in what they start.
-    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed)
+    words = [sys.executable, "-c", OURS, "watch-run", str(tmp_path)]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         place, _, address = process.stdout.readline().strip().partition(": ")
         assert place == str(tmp_path)
