@@ -7,6 +7,7 @@ from msgspec import Meta
 
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
+from infthor_eval.runs.counts import Count
 from infthor_eval.runs.records import RecordTypes
 
 __all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "NiehRecall", "NiehVerdict", "ShownClues"]
@@ -25,6 +26,11 @@ class Guess(msgspec.Struct, frozen=True, kw_only=True):
     scores: dict[str, float]
     form_scores: dict[str, float]
 
+    def __post_init__(self) -> None:
+        """Check that both have the same scorers; msgspec turns the error into its own."""
+        if self.scores.keys() != self.form_scores.keys():
+            raise ValueError("`scores` and `form_scores` of a guess are of different scorers")
+
 
 class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
     """How much of the evidence was among the shown frames.
@@ -35,9 +41,9 @@ class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
         n_after: number of frames of the trajectory after the last clue; None if its length is not known.
     """
 
-    n_shown: int
-    n_clues: int
-    n_after: int | None = None
+    n_shown: Count
+    n_clues: Count
+    n_after: Count | None = None
 
 
 class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_recall"):
@@ -75,7 +81,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
 
     question: str
     question_type: str
-    n_clues: int
+    n_clues: Count
     clue_column: str
     answers: Annotated[tuple[str | int | float, ...], Meta(min_length=1)]
     file: str = ""
@@ -85,7 +91,7 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     reply: str | None = None
     scores: dict[str, float] = {}
     thinking: str | None = None
-    n_watched: int | None = None
+    n_watched: Count | None = None
 
     @classmethod
     def of(cls, question: Question, guess: Guess | None = None, shown_clues: ShownClues | None = None) -> "NiehAnswer":

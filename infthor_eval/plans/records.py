@@ -3,6 +3,7 @@
 import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
+from infthor_eval.runs.counts import Count, Total
 from infthor_eval.runs.records import RecordTypes
 
 __all__ = ["RECORDS", "PlanRecord", "StepRecord"]
@@ -24,7 +25,7 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     call: dict[str, bool | float | str | None] | None = None
     message: str = ""
     reward: float = 0.0
-    n_context_tokens: int | None = None
+    n_context_tokens: Count | None = None
 
 
 class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="plan"):
@@ -49,16 +50,16 @@ class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, t
 
     plan: str
     goal: str
-    task: int
-    first_step: int
-    n_expert_steps: int
+    task: Count
+    first_step: Count
+    n_expert_steps: Count
     is_final: bool = False
     expert_reward: float | None = None
     steps: tuple[StepRecord, ...] = ()
     goal_reached: bool = False
-    conditions: tuple[int, int] | None = None
-    clue_distance: int | None = None
-    clue_tokens: int | None = None
+    conditions: tuple[Count, Total] | None = None
+    clue_distance: Count | None = None
+    clue_tokens: Count | None = None
 
 
 RECORDS = RecordTypes(unit=PlanRecord)

@@ -11,6 +11,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import msgspec
 
 from infthor_eval.errors import InfthorError, describe_exception
+from infthor_eval.runs.counts import Count
 from infthor_eval.runs.usage import NOTHING, Usage
 
 __all__ = [
@@ -62,9 +63,9 @@ class UnitKey(NamedTuple):
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
     """Tokens of a unit's requests, of those that were not encoded again, and of its replies; None if not counted."""
 
-    context: int | None = None
-    cached: int | None = None
-    reply: int | None = None
+    context: Count | None = None
+    cached: Count | None = None
+    reply: Count | None = None
 
 
 class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="run"):
@@ -81,7 +82,7 @@ class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag
     suite: str
     name: str
     config: dict[str, Any]
-    n_units: int | None = None
+    n_units: Count | None = None
     format: int = FORMAT
 
     def __post_init__(self) -> None:
@@ -115,8 +116,8 @@ class UnitRecord(
     fingerprint: str
     payload: P
     variant: str = ""
-    repeat: int = 1
-    attempt: int = 1
+    repeat: Count = 1
+    attempt: Count = 1
     failure: str | None = None
     excluded: str | None = None
     faults: tuple[str, ...] = ()

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 import msgspec
 
+from infthor_eval.runs.counts import Count
 from model_adapters import Reply
 
 __all__ = ["NOTHING", "Usage"]
@@ -23,10 +24,10 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
         cost: cost in US dollars by the prices given for the run; None without prices.
     """
 
-    requests: int = 0
-    context: int = 0
-    cached: int = 0
-    reply: int = 0
+    requests: Count = 0
+    context: Count = 0
+    cached: Count = 0
+    reply: Count = 0
     cost: float | None = None
 
     @classmethod
