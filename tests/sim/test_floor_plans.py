@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -131,6 +132,8 @@ def test_poses_rearrange_the_loose_objects(folder):
     ids = {o["objectId"] for o in loose}
     assert "AlarmClock|+00.50|+00.10|+00.50" in ids
     assert {o["parentReceptacles"][0].split("|")[0] for o in loose if o["objectType"] == "Mug"} == {"DiningTable"}
+    for place in (None, "", [0, 1, 0], {"x": math.inf}, {"x": 10**400}, {"w": 1}, {"x": "1"}):
+        bench.refused("SetObjectPoses", objectPoses=[{"objectName": "Mug_1", "position": place}])
     bench.refused("SetObjectPoses", objectPoses=[{"objectName": "Mug_1"}])
     bench.refused("SetObjectPoses", objectPoses=["Mug_1"])
 

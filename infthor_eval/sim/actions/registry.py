@@ -7,7 +7,7 @@ import types
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Concatenate
+from typing import Any, Concatenate, TypeGuard
 
 from infthor_eval.sim.actions.signatures import type_name, unknown_arguments_text
 from infthor_eval.sim.actions.vectors import Vector3
@@ -15,7 +15,7 @@ from infthor_eval.sim.errors import ActionError, ErrorCode
 from infthor_eval.sim.settings import AGENT_MODES
 from infthor_eval.sim.simulation import Simulation
 
-__all__ = ["Action", "Vector3", "action", "action_names", "bind"]
+__all__ = ["Action", "Vector3", "action", "action_names", "bind", "is_vector"]
 
 # The client adds these to messages of any action; Unity reads them before it looks for the action's own arguments.
 _MESSAGE_KEYS = frozenset(
@@ -151,12 +151,17 @@ def _matches(value: Any, annotation: Any) -> bool:
     if origin in (types.UnionType, typing.Union):
         return any(_matches(value, option) for option in inner)
     if annotation is Vector3:
-        return isinstance(value, dict) and set(value) <= set("xyz") and all(_is_number(v) for v in value.values())
+        return is_vector(value)
     if annotation in (int, float):
         return _is_number(value) and (annotation is float or value == int(value))
     if origin is list:
         return isinstance(value, list) and all(_matches(v, inner[0]) for v in value)
     return isinstance(value, origin or annotation)
+
+
+def is_vector(value: Any) -> TypeGuard[dict[str, float]]:
+    """Return whether a JSON value is a vector: {"x", "y", "z"}, where what is absent is 0."""
+    return isinstance(value, dict) and set(value) <= set("xyz") and all(_is_number(v) for v in value.values())
 
 
 def _is_number(value: Any) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from infthor_eval.formats.limits import OBJECT_POSES
 from infthor_eval.sim.actions.interaction import set_openness
-from infthor_eval.sim.actions.registry import action
+from infthor_eval.sim.actions.registry import action, is_vector
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.geometry import to_array
 from infthor_eval.sim.rearrange import NamedPose, set_poses, spawn_randomly
@@ -33,12 +33,11 @@ def set_object_poses(
 def _named_pose(entry: Any) -> NamedPose:
     if not isinstance(entry, Mapping) or not isinstance(entry.get("objectName"), str):
         raise ActionError(f"objectPoses needs entries with objectName, position and rotation, not {entry!r}")
-    try:
-        # Unity appends "(Clone)" to the names of copies.
-        name, rotation = entry["objectName"].removesuffix("(Clone)"), entry.get("rotation") or {}
-        return NamedPose(name, to_array(entry["position"]), to_array(rotation))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ActionError(f"objectPoses: {entry['objectName']} has no usable position or rotation ({error})") from error
+    name, position, rotation = entry["objectName"], entry.get("position"), entry.get("rotation") or {}
+    if not is_vector(position) or not is_vector(rotation):
+        raise ActionError(f"objectPoses: {name:.60} has no usable position or rotation")
+    # Unity appends "(Clone)" to the names of copies.
+    return NamedPose(name.removesuffix("(Clone)"), to_array(position), to_array(rotation))
 
 
 @action("SetObjectToggles")
