@@ -1,8 +1,6 @@
 """The part of a run's config that its summary and tables read, as `task.ManipulationTask.config` writes it."""
 
-import msgspec
-
-from infthor_eval.episodes.config_form import EpisodeTaskForm
+from infthor_eval.episodes.config_form import EpisodesConfig, EpisodeTaskForm
 
 __all__ = ["ManipulationConfig"]
 
@@ -12,9 +10,4 @@ class _Task(EpisodeTaskForm, kw_only=True):
     radius: float
 
 
-class ManipulationConfig(msgspec.Struct):
-    """The config of a run."""
-
-    tasks: dict[str, _Task]
-    simulator: str
-    frames: str
+ManipulationConfig = EpisodesConfig[_Task]

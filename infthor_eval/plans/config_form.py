@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.episodes.config_form import EpisodeTaskForm
+from infthor_eval.episodes.config_form import EpisodesConfig, EpisodeTaskForm
 
 __all__ = ["PlansConfig"]
 
@@ -19,9 +19,4 @@ class _Task(EpisodeTaskForm, kw_only=True):
     after_failure: str | None = None
 
 
-class PlansConfig(msgspec.Struct):
-    """The config of a run."""
-
-    tasks: dict[str, _Task]
-    simulator: str
-    frames: str
+PlansConfig = EpisodesConfig[_Task]

@@ -210,14 +210,20 @@ def test_a_frame_opens_large_with_its_step_and_the_arrows_go_on(page, open_page)
     assert opened.errors == []
 
 
+def go_to_episode(tab, page):
+    """Choose the first sample with pictures of its episode; its result."""
+    place = next(at for at, sample in enumerate(page.samples) if sample.results[0].map is not None)
+    for _ in range(place):
+        tab.keyboard.press("j")
+    return page.samples[place].results[0]
+
+
 def test_a_frame_of_an_episode_opens_large_with_its_action(make_page, scripted_run, scripted_data, open_page):
     page = make_page(scripted_run, data=scripted_data, episodes=2)
     opened = open_page(page)
-    place = next(at for at, sample in enumerate(page.samples) if sample.results[0].map is not None)
-    for _ in range(place):
-        opened.tab.keyboard.press("j")
+    episode = go_to_episode(opened.tab, page)
     opened.tab.locator(".steps button.frame").nth(1).click()
-    assert enlarged(opened.tab)["action"] == page.samples[place].results[0].steps[0].action
+    assert enlarged(opened.tab)["action"] == episode.steps[0].action
     opened.tab.get_by_title("Close").click()
     assert opened.tab.locator("#enlarged").is_hidden()
     assert opened.errors == []
@@ -269,10 +275,7 @@ def test_hostile_text_stays_text(page, open_page):
 def test_an_episode_has_its_steps_and_its_map(make_page, scripted_run, scripted_data, open_page):
     page = make_page(scripted_run, data=scripted_data, episodes=2)
     opened = open_page(page)
-    place = next(at for at, sample in enumerate(page.samples) if sample.results[0].map is not None)
-    for _ in range(place):
-        opened.tab.keyboard.press("j")
-    steps = page.samples[place].results[0].steps
+    steps = go_to_episode(opened.tab, page).steps
     assert opened.tab.locator(".steps tbody tr").count() == len(steps) + 1
     assert opened.tab.locator("img.map").evaluate("it => it.naturalWidth") == 300
     assert opened.errors == []
