@@ -61,6 +61,7 @@ class Draft:
         self._sub_tasks: list[SubTask] = []
         self._sub_trajs: list[SubTrajectory] = []
         self._final: SubTask | None = None
+        self._n_put_downs = 0
         self._log_frame(view)
 
     @property
@@ -72,6 +73,11 @@ class Draft:
     def n_tasks(self) -> int:
         """Number of tasks so far."""
         return len(self._sub_tasks)
+
+    @property
+    def n_subgoals(self) -> int:
+        """Number of sub-goals in the sense of Algorithm 1: tasks, and put-downs of what they left in the hand."""
+        return len(self._sub_tasks) + self._n_put_downs
 
     def add(self, trace: Trace) -> None:
         """Add the actions and sub-goals of a rollout."""
@@ -86,10 +92,27 @@ class Draft:
         del self._low[length.low :], self._high[length.high :], self._log[length.low + 1 :]
 
     def add_task(self, task: SubTask, start: Length, end: Length) -> None:
-        """Add a completed task, with the lengths before its first action and after its last one."""
+        """Add a completed task, with the lengths before its first action and after its last one.
+
+        Actions after its end, which are part of the draft already, put down what it left in the hand.
+        """
         number = len(self._sub_tasks)
+        self._n_put_downs += self.length.low > end.low
         self._sub_trajs.append(SubTrajectory(number, (start.high, end.high), (start.low, end.low), task.task_desc))
         self._sub_tasks.append(task)
+
+    def drop_last_task(self) -> None:
+        """Remove the last task with its actions, and those that put down what it left in the hand."""
+        self._sub_tasks.pop()
+        part = self._sub_trajs.pop()
+        self._n_put_downs -= self.length.low > part.low_pddl_idx[1]
+        self.cut(Length(part.low_pddl_idx[0], part.high_pddl_idx[0]))
+
+    def copy(self) -> "Draft":
+        """Return a copy, which changes of this draft leave as it is."""
+        other = Draft.__new__(Draft)
+        other.__dict__ = {key: list(value) if isinstance(value, list) else value for key, value in vars(self).items()}
+        return other
 
     def make_last_task_final(self) -> None:
         """Make the last task the final one, which trajectories of test sets name once more beside the others."""
@@ -99,8 +122,8 @@ class Draft:
         """Return the log of each frame, by object type."""
         return [msgspec.json.decode(entry) for entry in self._log]
 
-    def trajectory(self, tried: dict[str, int], accepted: dict[str, int]) -> Trajectory:
-        """Return the trajectory, with the numbers of tried tasks and of those in the trajectory, by type."""
+    def trajectory(self, history: dict[str, Any]) -> Trajectory:
+        """Return the trajectory, with what happened while it was generated (`AttemptStatistics.document`)."""
         return Trajectory(
             scene=self._scene,
             plan=ExpertPlan(self._low, self._high),
@@ -114,8 +137,7 @@ class Draft:
                 "generator": f"infthor-eval {__version__}",
                 "ai2thor": version("ai2thor"),
                 "settings": self._settings.document(),
-                "tried": tried,
-                "accepted": accepted,
+                **history,
             },
         )
 

@@ -1,49 +1,43 @@
-"""The paper's Algorithm 1: a long trajectory of sampled, planned and simulated tasks."""
+"""The paper's Algorithm 1: a long trajectory of sampled, planned and simulated tasks.
+
+Failures are counted as the published generator of July 2026 does. Those of tasks of which something was executed count
+in a row; when there are too many, the last sub-goals are dropped: 1, then 2, 4, ... until a task is accepted. Those of
+tasks of which nothing was executed add up, and end the attempt. (They begin anew with the pool of tasks, which ends an
+attempt there.)
+"""
 
 import random
-from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import InitAction, Trajectory
 from infthor_eval.generation.draft import Draft, initial_scene
 from infthor_eval.generation.final_task import end_types
 from infthor_eval.generation.known_failures import KnownFailures
+from infthor_eval.generation.rehearsal import rehearse
 from infthor_eval.generation.rollout import Rollout
 from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.generation.trace import RolloutError
-from infthor_eval.household.affordances import MAX_PLAN_STEPS, goes_into
-from infthor_eval.household.goals import goal_holds
+from infthor_eval.generation.statistics import AttemptStatistics, RollBack
+from infthor_eval.generation.trace import RolloutError, Trace
+from infthor_eval.generation.walking import Walker
+from infthor_eval.household.affordances import MAX_PLAN_STEPS
+from infthor_eval.household.goals import goal_holds, is_achieved
 from infthor_eval.household.pddl import problem
-from infthor_eval.household.planner import plan
+from infthor_eval.household.planner import is_feasible, plan
 from infthor_eval.household.possible_tasks import tasks_of
 from infthor_eval.household.scene_types import usual_tasks
 from infthor_eval.household.scout import reachable_grid
-from infthor_eval.household.symbolic import Operator, SymbolicRoom, room_of
+from infthor_eval.household.symbolic import Operator, SymbolicRoom
 from infthor_eval.household.tasks import Task, sub_task
 from infthor_eval.thor.restore import restore
-from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.simulator import Simulator, SimulatorMark
 
-__all__ = ["GeneratedTrajectory", "TaskStatistics", "generate"]
+__all__ = ["GeneratedTrajectory", "generate"]
 
 _MAX_EXTENSIONS = 4  # ordinary tasks that are added at most because no final task works
-
-
-@dataclass
-class TaskStatistics:
-    """Numbers of tasks tried and accepted by type, and of failures by reason."""
-
-    tried: Counter[str] = field(default_factory=Counter)
-    accepted: Counter[str] = field(default_factory=Counter)
-    reasons: Counter[str] = field(default_factory=Counter)
-
-    def add(self, other: "TaskStatistics") -> None:
-        """Add the numbers of another trajectory."""
-        self.tried += other.tried
-        self.accepted += other.accepted
-        self.reasons += other.reasons
+_MIN_NOT_EXECUTED = 200  # tasks without any executed action that end an attempt, at least
 
 
 @dataclass
@@ -51,7 +45,7 @@ class GeneratedTrajectory:
     """One trajectory, with the planning problem of each of its tasks as PDDL (the final one last)."""
 
     trajectory: Trajectory
-    statistics: TaskStatistics
+    statistics: AttemptStatistics
     problems: list[str]
 
 
@@ -59,15 +53,35 @@ def generate(settings: TrajectorySettings, simulator: Simulator) -> GeneratedTra
     """Generate one trajectory in a simulator, which loads its scene.
 
     Raises:
-        UsageError: no task in the scene can be completed.
+        UsageError: the trajectory gave up, with fewer steps than `save_floor`.
         SimulatorError: the simulator fails, or has no such scene.
     """
     factory = _Factory(settings, simulator)
-    while not factory.long_enough():
-        factory.extend()
-    if settings.final_task:
-        factory.finish()
+    try:
+        while not factory.long_enough():
+            factory.extend()
+        if settings.final_task:
+            factory.finish()
+    except _GaveUp as reason:
+        return factory.bank(str(reason))
     return factory.result()
+
+
+class _GaveUp(Exception):
+    """The attempt ends before its lengths are reached; the message says why."""
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """How a task that was sampled ended.
+
+    Attributes:
+        failure: why it failed; None if it became part of the trajectory.
+        executed: True if at least one of its actions was executed.
+    """
+
+    failure: RolloutError | None
+    executed: bool
 
 
 class _Factory:
@@ -79,12 +93,17 @@ class _Factory:
         # One stream for all random choices, seeded by a text, which Python hashes alike in every process. Another order
         # of draws would be another trajectory.
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
-        self._pool = TaskPool(usual_tasks(settings.scene).intersection(settings.task_types), self._rng)
+        self._task_types = usual_tasks(settings.scene).intersection(settings.task_types)
+        self._pool = TaskPool(self._rng)
         self._known_failures = KnownFailures()
-        self._statistics = TaskStatistics()
-        self._n_failed = 0
+        self._statistics = AttemptStatistics()
+        self._n_in_row = 0  # failures of executed tasks since the last one that was accepted
+        self._n_roll_backs = 0  # since the last task that was accepted
+        self._n_not_executed = 0  # failures of tasks of which nothing was executed, since the pool began
         self._problems: list[str] = []
+        self._marks: list[SimulatorMark] = []  # the state before each task
         self._draft = self._start_draft()
+        self._longest = self._draft, list(self._problems)
 
     def _start_draft(self) -> Draft:
         view = self._simulator.reset(self._settings.scene)
@@ -97,130 +116,236 @@ class _Factory:
         restore(self._simulator, scene)
         return Draft(self._settings, scene, self._simulator.view)
 
+    # -- the whole trajectory
+
     def long_enough(self) -> bool:
         draft, settings = self._draft, self._settings
-        return draft.length.low >= settings.min_steps and draft.n_tasks >= settings.min_subgoals
+        return draft.length.low >= settings.min_steps and draft.n_subgoals >= settings.min_subgoals
 
     def result(self) -> GeneratedTrajectory:
-        statistics = self._statistics
-        trajectory = self._draft.trajectory(dict(statistics.tried), dict(statistics.accepted))
-        return GeneratedTrajectory(trajectory, statistics, self._problems)
+        trajectory = self._draft.trajectory(self._statistics.document())
+        return GeneratedTrajectory(trajectory, self._statistics, self._problems)
+
+    def bank(self, reason: str) -> GeneratedTrajectory:
+        """Return the longest trajectory so far, if it has `save_floor` steps.
+
+        The embedded simulator repeats every action exactly, so all of its prefixes replay.
+
+        Raises:
+            UsageError: it has fewer, or none are to be kept.
+        """
+        self._note_longest()
+        self._draft, self._problems = self._longest
+        floor = self._settings.save_floor
+        if not floor or self._draft.length.low < floor:
+            raise UsageError(f"{self._name}: {reason}")
+        self._statistics.gave_up = True
+        return self.result()
 
     def extend(self) -> None:
         """Add one task, the first sampled one that can be planned and completed.
 
         If it leaves an object in the hand, that is put down in a sub-goal after the task.
+
+        Raises:
+            _GaveUp: there is nothing left to try, or nothing left to drop.
         """
-        if self._add_task(lambda _: True) is None:
-            reasons = "; ".join(f"{reason} ({count})" for reason, count in self._statistics.reasons.most_common(3))
-            hint = "choose another scene or seed" + (" or a higher --max-fail" if self._out_of_tries else "")
-            raise UsageError(
-                f"{self._name}: no further task works after {self._draft.length.low} steps and "
-                f"{self._n_failed} failed tasks ({reasons or 'no possible task'}); {hint}"
-            )
+        length = self._draft.length
+        while self._draft.length.low <= length.low:
+            room = self._room()
+            candidates = self._candidates(room)
+            task = self._pool.draw(candidates)
+            if task is None:
+                self._begin_pool_again(candidates)
+                continue
+            self._count(self._try(task, room))
+            if self._n_in_row > self._settings.max_fail:
+                self._roll_back()
+                length = self._draft.length
 
     def finish(self) -> None:
-        """Add the final task; if none works, an ordinary task is added before the next try."""
+        """Add the final task; if none works, an ordinary task is added before the next try.
+
+        Raises:
+            _GaveUp: none works after some more tasks either.
+        """
         for _ in range(_MAX_EXTENSIONS):
-            directions = list(end_types(self._draft.object_log()))
-            self._rng.shuffle(directions)
-            for types in directions:
-                self._n_failed = 0
-                if self._add_task(types.allows_task, is_last=True) is not None:
-                    self._draft.make_last_task_final()
-                    return
-            self._n_failed = 0
+            if self._add_final_task():
+                self._draft.make_last_task_final()
+                return
             self.extend()
-        raise UsageError(f"{self._name}: no final task works; choose another scene or seed")
+        raise _GaveUp("no final task works; choose another scene or seed")
 
-    @property
-    def _out_of_tries(self) -> bool:
-        return self._n_failed >= self._settings.max_fail
+    def _add_final_task(self) -> bool:
+        """Try the tasks between the two ends of the trajectory, each once, in a direction drawn anew for each."""
+        directions = end_types(self._draft.object_log())
+        pool = TaskPool(self._rng)
+        while True:
+            room = self._room()
+            candidates = [
+                [task for task in self._candidates(room) if types.allows_task(task)] for types in directions
+            ]
+            self._rng.shuffle(candidates)
+            task = pool.draw(candidates[0]) or pool.draw(candidates[1])
+            if task is None:
+                return False
+            if self._try(task, room, is_last=True).failure is None:
+                return True
 
-    def _add_task(self, allowed: Callable[[Task], bool], is_last: bool = False) -> Task | None:
-        """Try sampled tasks until one becomes part of the trajectory; returns None if none does."""
-        task = self._try_sampled(allowed, is_last)
-        if task is None and self._known_failures and not self._out_of_tries:
-            self._known_failures.forget()  # they may be outdated, so everything is tried again before giving up
-            task = self._try_sampled(allowed, is_last)
-        return task
+    # -- dead ends
 
-    def _try_sampled(self, allowed: Callable[[Task], bool], is_last: bool) -> Task | None:
-        view = self._simulator.view
-        types = {item.object_type for item in view.objects.values()}
-        room = self._known_failures.room(view)
-        possible = set(tasks_of(room, types))
-        for task in self._pool.sample(room, types):
-            if self._out_of_tries:
-                return None
-            operators = plan(task, room) if task in possible and allowed(task) else None
-            if not operators or all(step.name == "GotoLocation" for step in operators):
-                continue  # its goal holds already, or would after walking alone
-            failure = self._try(task, room, operators, is_last)
-            if failure is None:
-                return task
-            self._n_failed += 1
-            if failure.item is not None:
-                self._known_failures.note(view, failure.item, failure.receptacle)
-            room = self._known_failures.room(view)
-            possible = set(tasks_of(room, types))
-        return None
+    def _begin_pool_again(self, candidates: Sequence[Task]) -> None:
+        # The published generator would save what is there; here the same tasks are drawn again. First those that were
+        # left out, as what is known of failures may be outdated.
+        if self._known_failures:
+            self._known_failures.forget()
+        elif self._pool.begin_again(candidates):
+            self._statistics.pool_restarts.append(self._draft.length.low)
+            self._n_not_executed = 0
+        else:
+            raise _GaveUp(self._no_further_task("choose another scene or seed"))
 
-    def _try(self, task: Task, room: SymbolicRoom, operators: Sequence[Operator], is_last: bool) -> RolloutError | None:
-        name = f"{task.task_type}{' sliced' if task.sliced else ''}"
-        self._statistics.tried[name] += 1
+    def _count(self, outcome: _Outcome) -> None:
+        """Count the failures, or begin to count anew.
+
+        Raises:
+            _GaveUp: too many tasks of which nothing was executed.
+        """
+        if outcome.failure is None:
+            self._n_in_row = self._n_roll_backs = 0
+            return
+        if outcome.executed:
+            self._n_in_row += 1
+            return
+        self._n_not_executed += 1
+        if self._n_not_executed > max(_MIN_NOT_EXECUTED, 10 * self._settings.max_fail):
+            raise _GaveUp(self._no_further_task("choose another scene or seed or a higher --max-fail"))
+
+    def _roll_back(self) -> None:
+        """Drop the last sub-goals, twice as many as the last time, and go on from the state before them.
+
+        Raises:
+            _GaveUp: there is nothing to drop.
+        """
+        if not self._draft.n_tasks:
+            raise _GaveUp(self._no_further_task("choose another scene or seed or a higher --max-fail"))
+        self._note_longest()
+        before, n_before = self._draft.length, self._draft.n_subgoals
+        n_to_drop = min(2**self._n_roll_backs, max(1, n_before - 1))
+        while self._draft.n_tasks and n_before - self._draft.n_subgoals < n_to_drop:
+            self._draft.drop_last_task()
+            self._problems.pop()
+            mark = self._marks.pop()
+        self._simulator.rewind(mark, exactly=True)
+        self._known_failures.forget()
+        self._n_in_row = 0
+        self._n_roll_backs += 1
+        dropped = n_before - self._draft.n_subgoals
+        self._statistics.roll_backs.append(RollBack(before.low, self._draft.length.low, dropped))
+
+    def _note_longest(self) -> None:
+        if self._draft.length.low > self._longest[0].length.low:
+            self._longest = self._draft.copy(), list(self._problems)
+
+    def _no_further_task(self, hint: str) -> str:
+        statistics = self._statistics
+        reasons = (statistics.reasons + statistics.not_executed).most_common(3)
+        causes = "; ".join(f"{reason} ({count})" for reason, count in reasons)
+        n_failed = statistics.reasons.total()
+        return (
+            f"no further task works after {self._draft.length.low} steps and {n_failed} failed tasks "
+            f"({causes or 'no possible task'}); {hint}"
+        )
+
+    # -- one task
+
+    def _room(self) -> SymbolicRoom:
+        return self._known_failures.room(self._simulator.view)
+
+    def _candidates(self, room: SymbolicRoom) -> list[Task]:
+        """Return the tasks that are possible now: what is known to be full or out of reach is left out."""
+        types = {item.object_type for item in self._simulator.view.objects.values()}
+        tasks = [task for task in tasks_of(room, types) if task.task_type in self._task_types]
+        return [task for task in tasks if is_feasible(task, room) and not is_achieved(task, room, room.start)]
+
+    def _try(self, task: Task, room: SymbolicRoom, is_last: bool = False) -> _Outcome:
+        """Plan a task, rehearse it and carry it out; after a failure everything is as before."""
+        operators = plan(task, room) or []
+        objection = self._objection(task, operators)
+        if objection is not None:
+            return self._failed(task, _Outcome(objection, executed=False))
         mark, start = self._simulator.mark(), self._draft.length
-        failure = self._execute(operators) or self._check_goal(task)
+        outcome = self._execute(operators)
+        if outcome.failure is None:
+            outcome = _Outcome(_unmet_goal(task, self._simulator), outcome.executed)
         end = self._draft.length
-        if failure is None and not is_last:
-            failure = self._put_down()
-        if failure is not None:
-            if self._draft.length.low > start.low:
-                self._simulator.rewind(mark)
-                self._draft.cut(start)
-            self._pool.note_failure(task)
-            return failure
-        self._statistics.accepted[name] += 1
-        self._pool.note_use(task)
+        if outcome.failure is None and not is_last:
+            outcome = _Outcome(self._put_down(), outcome.executed)
+        if outcome.failure is not None:
+            self._simulator.rewind(mark)
+            self._draft.cut(start)
+            return self._failed(task, outcome)
+        self._statistics.tried[_name(task)] += 1
+        self._statistics.accepted[_name(task)] += 1
         self._known_failures.task_done()
         self._problems.append(problem(task, room, f"task-{len(self._problems):03d}"))
+        self._marks.append(mark)
         self._draft.add_task(sub_task(task, self._settings.scene), start, end)
-        return None
+        return outcome
 
-    def _check_goal(self, task: Task) -> RolloutError | None:
-        # A completed plan is no proof: objects can slide.
-        if goal_holds(task, self._simulator.view):
-            return None
-        error = RolloutError(f"{task.task_type}: its plan was completed, but its goal does not hold")
-        self._statistics.reasons[str(error)] += 1
-        return error
+    def _objection(self, task: Task, operators: list[Operator]) -> RolloutError | None:
+        """Return why a task is not worth walking for."""
+        if all(step.name == "GotoLocation" for step in operators):
+            return RolloutError(f"{task.task_type}: no plan, or walking alone")
+        if len(operators) > MAX_PLAN_STEPS:
+            return RolloutError(f"a plan of more than {MAX_PLAN_STEPS} steps")
+        return rehearse(task, operators, self._simulator)
+
+    def _failed(self, task: Task, outcome: _Outcome) -> _Outcome:
+        """Count a failed task, with the simulator as it was before it, and remember what failed."""
+        failure = outcome.failure
+        assert failure is not None
+        if failure.item is not None:
+            self._known_failures.note(self._simulator.view, failure.item, failure.receptacle)
+        if outcome.executed:
+            self._statistics.tried[_name(task)] += 1
+            self._statistics.reasons[str(failure)] += 1
+        else:
+            self._statistics.not_executed[str(failure)] += 1
+        return outcome
 
     def _put_down(self) -> RolloutError | None:
         """Put a held object into a random receptacle that has room for it."""
-        room = room_of(self._simulator.view)
+        room = self._room()
         held = room.start.held
         if held is None:
             return None
-        places = sorted(key for key in room.places & room.receptacles if goes_into(room.types[held], room.types[key]))
+        places = sorted(key for key in room.places & room.receptacles if room.fits(held, key))
         self._rng.shuffle(places)
         for place in places:
-            if self._execute([Operator("PutObject", held, place)]) is None:
+            if self._execute([Operator("PutObject", held, place)]).failure is None:
                 return None
-        error = RolloutError(f"no receptacle has room for {room.types[held]}", held)
-        self._statistics.reasons[str(error)] += 1
-        return error
+        return RolloutError(f"no receptacle has room for {room.types[held]}", held)
 
-    def _execute(self, operators: Sequence[Operator]) -> RolloutError | None:
+    def _execute(self, operators: list[Operator]) -> _Outcome:
         """Run operators and add their actions; if one fails, the simulator is rewound and nothing is added."""
         mark = self._simulator.mark()
-        rollout = Rollout(self._simulator, self._draft.length.high)
+        trace = Trace(self._simulator, self._draft.length.high)
         try:
-            rollout.run(list(operators))
-            if len(rollout.trace.actions) > MAX_PLAN_STEPS:
-                raise RolloutError(f"a plan of more than {MAX_PLAN_STEPS} steps")
+            Rollout(trace, Walker(trace)).run(operators)
         except RolloutError as error:
-            self._statistics.reasons[str(error)] += 1
             self._simulator.rewind(mark)
-            return error
-        self._draft.add(rollout.trace)
+            return _Outcome(error, executed=bool(trace.actions))
+        self._draft.add(trace)
+        return _Outcome(None, executed=True)
+
+
+def _unmet_goal(task: Task, simulator: Simulator) -> RolloutError | None:
+    # A completed plan is no proof: objects can slide.
+    if goal_holds(task, simulator.view):
         return None
+    return RolloutError(f"{task.task_type}: its plan was completed, but its goal does not hold")
+
+
+def _name(task: Task) -> str:
+    return f"{task.task_type}{' sliced' if task.sliced else ''}"

@@ -10,16 +10,19 @@ import msgspec
 from infthor_eval.errors import InfthorError, UsageError, wrap_errors
 from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
-from infthor_eval.generation.factory import GeneratedTrajectory, TaskStatistics, generate
+from infthor_eval.generation.factory import GeneratedTrajectory, generate
 from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.simulator_jobs import SimulatorWorker, collect_outcomes
+from infthor_eval.generation.statistics import AttemptStatistics
 from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
 __all__ = ["GeneratedSet", "GenerationSummary", "TaskCounts", "generate_set", "generate_with_workers"]
+
+_MAX_COPIES = 16  # of the simulator's state
 
 
 class TaskCounts(msgspec.Struct):
@@ -38,6 +41,10 @@ class GenerationSummary(msgspec.Struct):
         steps: number of low-level actions in all trajectories.
         tasks: numbers of tasks in this run, by task type.
         refusals: numbers of failed tasks in this run by reason, the most frequent first.
+        not_executed: numbers of sampled tasks in this run of which nothing was executed, by reason.
+        roll_backs: sub-goals dropped at dead ends in this run, as text: "1 sub-goal at step 215, back to 203".
+        pool_restarts: how often in this run all tasks had been drawn, and were drawn again.
+        kept: number of trajectories in this run that gave up, and were kept as far as they got.
         failures: trajectories that could not be generated, one line each.
     """
 
@@ -46,6 +53,10 @@ class GenerationSummary(msgspec.Struct):
     steps: int
     tasks: dict[str, TaskCounts]
     refusals: dict[str, int]
+    not_executed: dict[str, int]
+    roll_backs: list[str]
+    pool_restarts: int
+    kept: int
     failures: list[str]
 
 
@@ -58,6 +69,7 @@ class GeneratedSet:
         resumed: number of trajectories of earlier runs.
         steps: number of low-level actions in all trajectories.
         failures: trajectories that could not be generated, one line each.
+        kept: number of trajectories in this run that gave up, and were kept as far as they got.
         statistics: tasks tried and accepted in this run.
     """
 
@@ -65,17 +77,23 @@ class GeneratedSet:
     resumed: int = 0
     steps: int = 0
     failures: list[str] = field(default_factory=list)
-    statistics: TaskStatistics = field(default_factory=TaskStatistics)
+    kept: int = 0
+    statistics: AttemptStatistics = field(default_factory=AttemptStatistics)
 
     def summary(self) -> GenerationSummary:
         """Return the numbers of the set."""
-        tried, accepted = self.statistics.tried, self.statistics.accepted
+        statistics = self.statistics
+        tried, accepted = statistics.tried, statistics.accepted
         return GenerationSummary(
             trajectories=len(self.paths),
             resumed=self.resumed,
             steps=self.steps,
             tasks={name: TaskCounts(tried[name], accepted[name]) for name in sorted(tried)},
-            refusals=dict(self.statistics.reasons.most_common()),
+            refusals=dict(statistics.reasons.most_common()),
+            not_executed=dict(statistics.not_executed.most_common()),
+            roll_backs=[str(item) for item in statistics.roll_backs],
+            pool_restarts=len(statistics.pool_restarts),
+            kept=self.kept,
             failures=self.failures,
         )
 
@@ -93,7 +111,7 @@ class _GenerationOutcome:
 
     path: Path | None = None
     steps: int = 0
-    statistics: TaskStatistics | None = None
+    statistics: AttemptStatistics | None = None
     failure: str | None = None
 
     @property
@@ -143,7 +161,9 @@ def generate_with_workers(
         say: called with messages about the workers.
     """
     out.mkdir(parents=True, exist_ok=True)
-    start = partial(SimulatorWorker, launch, partial(_generate_one, out=out))
+    # Frames are drawn by the replay. A dead end goes back some tasks, whose states are kept.
+    simulator = partial(Simulator, launch, image=False, max_copies=_MAX_COPIES)
+    start = partial(SimulatorWorker, simulator, partial(_generate_one, out=out))
     return _summarise(run_jobs(start, jobs, worker_settings, say), progress)
 
 
@@ -161,6 +181,7 @@ def _summarise(
             result.resumed += 1
         else:
             result.statistics.add(outcome.statistics)
+            result.kept += outcome.statistics.gave_up
     return result
 
 

@@ -19,6 +19,7 @@ def trajectory_jobs(
     min_subgoals: int,
     final_task: bool,
     max_fail: int = MAX_FAIL,
+    save_floor: int = 0,
 ) -> list[TrajectorySettings]:
     """Return the settings of all trajectories of a set, scene by scene.
 
@@ -27,9 +28,10 @@ def trajectory_jobs(
         seed: seed of the first trajectory of each scene; the others have the next seeds.
         count: number of trajectories for each scene.
         min_steps: minimum number of low-level actions.
-        min_subgoals: minimum number of tasks.
+        min_subgoals: minimum number of sub-goals: tasks and put-downs.
         final_task: True to end each trajectory with a final task.
-        max_fail: maximum number of failed tasks in one trajectory.
+        max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
+        save_floor: number of steps from which a trajectory that gives up is kept as far as it got; 0: never.
 
     Raises:
         UsageError: the number of trajectories exceeds the limit.
@@ -38,7 +40,7 @@ def trajectory_jobs(
         raise UsageError(f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.hint}")
     seeds = range(seed, seed + count)
     return [
-        TrajectorySettings(scene, k, min_steps, min_subgoals, final_task, max_fail=max_fail)
+        TrajectorySettings(scene, k, min_steps, min_subgoals, final_task, max_fail=max_fail, save_floor=save_floor)
         for scene in scenes
         for k in seeds
     ]

@@ -155,7 +155,7 @@ def replay_with_workers(
         say: called with messages about the workers.
     """
     metadata = _prepare_set(out, launch.label)
-    start = partial(SimulatorWorker, launch, partial(_replay_one, metadata=metadata, frames=frames))
+    start = partial(SimulatorWorker, partial(Simulator, launch), partial(_replay_one, metadata=metadata, frames=frames))
     return _collect(run_jobs(start, selection.items, worker_settings, say), selection, progress)
 
 

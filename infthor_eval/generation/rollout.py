@@ -4,17 +4,32 @@ Receptacles are opened and closed where this is needed. The first action that th
 """
 
 from collections.abc import Callable
+from typing import Protocol
 
 from infthor_eval.formats.trajectory import ApiAction, PlannerAction
 from infthor_eval.generation.trace import RolloutError, Trace
-from infthor_eval.generation.walking import Walker
 from infthor_eval.household.containment import direct_parent
 from infthor_eval.household.symbolic import Operator
 from infthor_eval.household.wording import compact_name
-from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
-__all__ = ["Rollout"]
+__all__ = ["Rollout", "Walking"]
+
+
+class Walking(Protocol):
+    """Brings the agent to where it can act; see `walking.Walker`."""
+
+    def go(self, shown: list[str], inside: str | None = None) -> None:
+        """Walk to where objects can be acted on."""
+        ...
+
+    def step_aside(self, item: str) -> None:
+        """Walk to where an object is visible, within the current sub-goal."""
+        ...
+
+    def forget_grid(self) -> None:
+        """Learn anew where the agent can stand."""
+        ...
 
 
 class Rollout:
@@ -24,10 +39,10 @@ class Rollout:
         trace: actions and sub-goals so far.
     """
 
-    def __init__(self, simulator: Simulator, first_high: int = 0) -> None:
-        """Start without actions, at the sub-goal with the number `first_high`."""
-        self.trace = Trace(simulator, first_high)
-        self._walker = Walker(self.trace)
+    def __init__(self, trace: Trace, walker: Walking) -> None:
+        """Start with a trace without actions, to which the walker adds its own."""
+        self.trace = trace
+        self._walker = walker
         self._slices: dict[str, str] = {}  # real ids of planned slices
 
     def run(self, operators: list[Operator]) -> None:
@@ -106,7 +121,12 @@ class Rollout:
         if not self._view.objects[acted_on].visible:
             # An object that was just put down or uncovered may not be visible from here.
             self._walker.step_aside(acted_on)
-        self.trace.act(ApiAction(action, object_id=item, receptacle_id=receptacle), {"objectId": acted_on})
+        force = {} if receptacle is None else _FORCED
+        api = ApiAction(
+            action, object_id=item, receptacle_id=receptacle, force_action=force.get("forceAction"),
+            place_stationary=force.get("placeStationary"),
+        )  # fmt: skip
+        self.trace.act(api, {"objectId": acted_on, **force})
         self._walker.forget_grid()  # a door or an object on the floor may block cells now, or no longer
 
     # -- objects
@@ -156,6 +176,8 @@ class Rollout:
         return min(candidates, key=lambda item: (item.position.x - at.x) ** 2 + (item.position.z - at.z) ** 2).object_id
 
 
+# As the published generator puts.
+_FORCED = {"forceAction": True, "placeStationary": True}
 _SUBGOALS: dict[str, Callable[[Rollout, Operator], None]] = {
     "PickupObject": Rollout._pickup_or_slice,
     "PutObject": Rollout._put,

@@ -1,75 +1,71 @@
-"""Sampling the next task among those that are possible, so that types, objects and receptacles are diverse.
+"""Sampling the next task, as the published generator does when it runs.
 
-A task is sampled variable by variable: its type, the object, the movable receptacle and the receptacle or lamp, each
-conditioned on those before it. The weight of a value is 1 / (1 + n) for its n uses after the same values (conditional),
-times 1 / (1 + n) for all its uses (prior), with noise, as in the paper.
+A task is a tuple of a goal, the object, the movable receptacle, and the receptacle or lamp. Each value of each variable
+gets the weight 1 / (1 + n), n drawn from 0 to 10. (The published weights also have counts of uses, which stay 0 as it
+runs.) The value that leads the others of its variable by most is taken, and the same is repeated with the tuples that
+have it. A tuple that was drawn is not drawn again, whether it was accepted or not.
 """
 
 import random
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
-from infthor_eval.household.possible_tasks import tasks_of
-from infthor_eval.household.symbolic import SymbolicRoom
-from infthor_eval.household.tasks import Task, TaskType
+from infthor_eval.household.tasks import Task
 
 __all__ = ["TaskPool"]
 
-_MAX_FAILURES = 3  # further failures do not lower a weight: rooms change, and other tasks must not crowd this one out
-_NOISE = 0.1  # relative noise of a weight
+_NOISE = 10  # largest n of a weight (`inject_noise`)
 _N_VARIABLES = 4
 
 
 class TaskPool:
-    """Samples tasks; used and failed ones become less likely."""
+    """Draws tasks, each at most once until the pool begins again.
 
-    def __init__(self, task_types: Iterable[TaskType], rng: random.Random) -> None:
-        """Start without uses; `rng` is the source of all random choices."""
-        self._task_types = frozenset(task_types)
+    Attributes:
+        restarts: how often the pool began again.
+    """
+
+    def __init__(self, rng: random.Random) -> None:
+        """Start with no task drawn; `rng` is the source of all random choices."""
         self._rng = rng
-        self._uses: Counter[tuple[int, str]] = Counter()  # of a value of the variable with this index
-        self._joint_uses: Counter[tuple[str, ...]] = Counter()  # of the first values together
-        self._failures: Counter[Task] = Counter()
+        self._drawn: set[Task] = set()
+        self.restarts = 0
 
-    def sample(self, room: SymbolicRoom, extra_types: Iterable[str] = ()) -> Iterator[Task]:
-        """Yield the possible tasks in weighted random order; for `extra_types` see `tasks_of`."""
-        tasks = [task for task in tasks_of(room, extra_types) if task.task_type in self._task_types]
-        # Sorting by exponential waiting times is weighted sampling without replacement (Efraimidis and Spirakis 2006).
-        waits = {task: self._rng.expovariate(probability) for task, probability in self._probabilities(tasks)}
-        yield from sorted(tasks, key=lambda task: waits[task])
+    def draw(self, candidates: Iterable[Task]) -> Task | None:
+        """Return one of some tasks that was not drawn before; None if all of them were."""
+        tasks = [task for task in candidates if task not in self._drawn]
+        if not tasks:
+            return None
+        while len(tasks) > 1:
+            tasks = self._narrow(tasks)
+        self._drawn.add(tasks[0])
+        return tasks[0]
 
-    def note_use(self, task: Task) -> None:
-        """Count a task that became part of the trajectory."""
-        values = _values(task)
-        self._uses.update(enumerate(values))
-        self._joint_uses.update(values[:length] for length in range(1, len(values) + 1))
+    def begin_again(self, candidates: Collection[Task]) -> bool:
+        """Let all tasks be drawn again; returns False if that does not help, as none of `candidates` was drawn."""
+        if self._drawn.isdisjoint(candidates):
+            return False
+        self._drawn.clear()
+        self.restarts += 1
+        return True
 
-    def note_failure(self, task: Task) -> None:
-        """Count a task that was tried and failed."""
-        self._failures[task] += 1
+    def _narrow(self, tasks: Sequence[Task]) -> list[Task]:
+        """Return the tasks with the value that leads by most; there are at least two tasks, and fewer afterwards."""
+        variable, value = max(self._leads(tasks))[2:]
+        return [task for task in tasks if _values(task)[variable] == value]
 
-    def _probabilities(
-        self, tasks: Sequence[Task], n_fixed: int = 0, probability: float = 1.0
-    ) -> Iterator[tuple[Task, float]]:
-        """Yield the tasks with their probabilities; the first `n_fixed` variables of all of them are equal."""
-        if n_fixed == _N_VARIABLES:
-            yield from ((task, probability * 0.5 ** min(self._failures[task], _MAX_FAILURES)) for task in tasks)
-            return
-        groups: dict[tuple[str, ...], list[Task]] = {}
-        for task in tasks:
-            groups.setdefault(_values(task)[: n_fixed + 1], []).append(task)
-        weights = {values: self._weight(values) for values in groups}
-        total = sum(weights.values())
-        for values, group in groups.items():
-            yield from self._probabilities(group, n_fixed + 1, probability * weights[values] / total)
-
-    def _weight(self, values: tuple[str, ...]) -> float:
-        """Return the weight of the last value, given those before it."""
-        prior = 1 / (1 + self._uses[len(values) - 1, values[-1]])
-        conditional = 1 / (1 + self._joint_uses[values]) if len(values) > 1 else 1.0
-        return prior * conditional * self._rng.uniform(1 - _NOISE, 1 + _NOISE)
+    def _leads(self, tasks: Sequence[Task]) -> list[tuple[float, float, int, str]]:
+        """Return the lead of each value over the last of its variable, a tie-breaker, the variable, and the value."""
+        leads = []
+        for variable in range(_N_VARIABLES):
+            values = sorted({_values(task)[variable] for task in tasks} - {""})
+            if len(values) > 1:
+                weights = [1 / (1 + self._rng.randint(0, _NOISE)) for _ in values]
+                for value, weight in zip(values, weights, strict=True):
+                    lead = round((weight - min(weights)) / sum(weights), 9)
+                    leads.append((lead, self._rng.random(), variable, value))
+        return leads
 
 
-def _values(task: Task) -> tuple[str, ...]:
-    """Return the variables of a task in the order in which they are sampled."""
+def _values(task: Task) -> tuple[str, str, str, str]:
+    """Return the variables of a task, as published: slices are objects of their own; "" for none."""
     return str(task.task_type), task.target, task.movable or "", task.receptacle or task.light or ""

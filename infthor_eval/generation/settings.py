@@ -20,10 +20,11 @@ class TrajectorySettings:
         scene: name of the scene.
         seed: seed of all random choices.
         min_steps: minimum number of low-level actions.
-        min_subgoals: minimum number of tasks without the final one. Algorithm 1 calls a task's part a sub-goal.
+        min_subgoals: minimum number of sub-goals, as Algorithm 1 calls tasks and put-downs, without the final task.
         final_task: True to end with a final task (see the module `final_task`).
         task_types: task types to sample from, if the scene's room type has them.
-        max_fail: maximum number of failed tasks; the final task has the same number of tries again.
+        max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
+        save_floor: number of steps from which a trajectory that gives up is kept as far as it got; 0: never.
     """
 
     scene: str
@@ -33,6 +34,7 @@ class TrajectorySettings:
     final_task: bool = False
     task_types: tuple[TaskType, ...] = tuple(TaskType)
     max_fail: int = MAX_FAIL
+    save_floor: int = 0
 
     @property
     def traj_id(self) -> str:

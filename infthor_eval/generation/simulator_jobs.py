@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Protocol, TypeVar
 
 from infthor_eval.errors import InfthorError
-from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 
 __all__ = ["SimulatorWorker", "collect_outcomes"]
@@ -21,19 +20,21 @@ T = TypeVar("T", bound=_JobOutcome)
 
 
 class SimulatorWorker:
-    """A worker with a simulator; see `infthor_eval.workers.Worker`. A `partial` with `launch` and `run_job` opens it.
+    """A worker with a simulator; see `infthor_eval.workers.Worker`. A `partial` with its first arguments opens it.
 
     Args:
-        launch: the simulator to start.
+        open_simulator: starts the simulator; pickled as `run_job` is.
         run_job: does one job in the simulator; it is pickled, so it must be a module's function or a `partial` of one.
         number: number of the worker.
     """
 
     greeting = None
 
-    def __init__(self, launch: Launch, run_job: Callable[[Any, Simulator], Any], number: int) -> None:
+    def __init__(
+        self, open_simulator: Callable[[], Simulator], run_job: Callable[[Any, Simulator], Any], number: int
+    ) -> None:
         self._run_job = run_job
-        self._simulator = Simulator(launch)
+        self._simulator = open_simulator()
 
     def do(self, job: Any) -> Iterator[Any]:
         """Yield the outcome of a job."""

@@ -6,15 +6,36 @@ from infthor_eval.generation.generate_set import GenerationSummary
 from infthor_eval.generation.replay_summary import OverlapStatistics, ReplaySummary
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["overlaps_table", "refusals_table", "regular_numbers", "tasks_table"]
+__all__ = ["generation_notes", "overlaps_table", "refusals_table", "regular_numbers", "tasks_table"]
 
+_MAX_REASONS = 3  # in a line
 _EXACT = 0.995  # an IoU that is shown as 1.00
 
 
 def tasks_table(summary: GenerationSummary) -> Table:
     """Return the numbers of tasks tried and accepted, one row per task type."""
     rows = [Row((name, str(counts.tried), str(counts.accepted))) for name, counts in summary.tasks.items()]
+    tried = sum(counts.tried for counts in summary.tasks.values())
+    accepted = sum(counts.accepted for counts in summary.tasks.values())
+    rows.append(Row(("all", str(tried), str(accepted))))
     return Table("", (Column("task", False), Column("tried"), Column("accepted")), tuple(rows))
+
+
+def generation_notes(summary: GenerationSummary) -> list[str]:
+    """Return lines on what happened besides: tasks of which nothing was executed, dead ends, a pool that began again."""
+    n_not_executed = sum(summary.not_executed.values())
+    notes = [
+        (n_not_executed, f"{n_not_executed} sampled tasks not executed: {_most_frequent(summary.not_executed)}"),
+        (len(summary.refusals), f"tried and failed: {_most_frequent(summary.refusals)}"),
+        (len(summary.roll_backs), f"dropped at dead ends: {'; '.join(summary.roll_backs)}"),
+        (summary.pool_restarts, f"all tasks had been drawn, and were drawn again: {summary.pool_restarts} times"),
+        (summary.kept, f"gave up and were kept as far as they got: {summary.kept}"),
+    ]
+    return [note for number, note in notes if number]
+
+
+def _most_frequent(reasons: dict[str, int]) -> str:
+    return "; ".join(f"{reason} ({count})" for reason, count in list(reasons.items())[:_MAX_REASONS])
 
 
 def refusals_table(summary: ReplaySummary) -> Table | None:

@@ -15,14 +15,14 @@ from infthor_eval.household.goals import APPLIANCE, lower_bound
 from infthor_eval.household.symbolic import ABSENT, FLOOR, Operator, State, SymbolicRoom, slice_item
 from infthor_eval.household.tasks import Task, TaskType
 
-__all__ = ["plan", "relevant_items"]
+__all__ = ["is_feasible", "plan", "relevant_items"]
 
 _LIMIT = 60_000  # states of a search; the hardest of the solvable problems tried needed a quarter of it
 
 
 def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
     """Return the shortest plan for a task in a room's current state: empty if the goal holds, None if there is none."""
-    if _is_infeasible(task, room):
+    if not is_feasible(task, room):
         return None
     problem = _Problem(task, room)
     start = problem.start
@@ -46,14 +46,27 @@ def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
     return None
 
 
-def _is_infeasible(task: Task, room: SymbolicRoom) -> bool:
-    """Return True if no item fits into any goal receptacle; without this check the search would run to its limit."""
+def is_feasible(task: Task, room: SymbolicRoom) -> bool:
+    """Return False if no item fits into any goal receptacle, or into any movable one that must go there.
+
+    Without this check the search would run to its limit.
+    """
     if task.receptacle is None:
-        return False
-    carried = {task.movable} if task.movable is not None else {task.pickup, task.target}
-    items = [item for item, _ in room.start.where if room.types[item] in carried]
+        return True
+    items = _of_types(room, {task.pickup, task.target})
     goals = [key for key in room.receptacles if room.types[key] == task.receptacle]
-    return all((item, goal) in room.refused for item in items for goal in goals)
+    if task.movable is None:
+        return _any_fits(room, items, goals)
+    carriers = _of_types(room, {task.movable})
+    return _any_fits(room, items, carriers) and _any_fits(room, carriers, goals)
+
+
+def _of_types(room: SymbolicRoom, types: set[str | None]) -> list[str]:
+    return [item for item, _ in room.start.where if room.types[item] in types]
+
+
+def _any_fits(room: SymbolicRoom, items: list[str], receptacles: list[str]) -> bool:
+    return any((item, receptacle) not in room.refused for item in items for receptacle in receptacles)
 
 
 def relevant_items(task: Task, room: SymbolicRoom) -> set[str]:

@@ -171,6 +171,10 @@ class Simulator:
         self._failures = 0  # the episode made progress since the last failure
         return mark
 
+    def stores(self, mark: SimulatorMark) -> bool:
+        """Return True if the state at a mark is stored, so that `rewind` need not repeat the episode."""
+        return mark in self._copies
+
     def rewind(self, mark: SimulatorMark, *, exactly: bool = False) -> SimulatorView:
         """Return to the state at a mark of the current scene, whether or not it is in the current episode's past.
 

@@ -33,8 +33,27 @@ __all__ = ["command"]
 @click.option(
     "--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions, at least."
 )
-@click.option("--min-subgoals", type=click.IntRange(1), default=10, show_default=True, help="Tasks, at least.")
-@click.option("--max-fail", type=click.IntRange(1), default=20, show_default=True, help="Failed tasks, at most.")
+@click.option(
+    "--min-subgoals",
+    type=click.IntRange(1),
+    default=10,
+    show_default=True,
+    help="Sub-goals, at least: tasks, and put-downs of what they leave in the hand.",
+)
+@click.option(
+    "--max-fail",
+    type=click.IntRange(1),
+    default=20,
+    show_default=True,
+    help="Failed tasks in a row after which the last sub-goals are dropped.",
+)
+@click.option(
+    "--save-floor",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Keep a trajectory that gives up as far as it got, if it has so many low-level actions; 0: never.",
+)
 @click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of the first trajectory.")
 @click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
 @click.option(
@@ -54,6 +73,7 @@ def command(
     min_steps: int,
     min_subgoals: int,
     max_fail: int,
+    save_floor: int,
     seed: int,
     count: int,
     final_task: bool,
@@ -87,6 +107,7 @@ def command(
         min_subgoals=min_subgoals,
         final_task=final_task or test_set,
         max_fail=max_fail,
+        save_floor=save_floor,
     )
     prepare_folder(out)
     with progress_bar(notes) as progress:
@@ -104,10 +125,12 @@ def command(
 
 
 def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
-    from infthor_eval.generation.tables import tasks_table
+    from infthor_eval.generation.tables import generation_notes, tasks_table
     from infthor_eval.report.terminal import print_table
 
     output.print(
         f"{summary.trajectories} trajectories ({summary.resumed} generated earlier), {summary.steps} steps: {out}"
     )
     print_table(tasks_table(summary), output)
+    for note in generation_notes(summary):
+        output.print(note, markup=False, highlight=False)

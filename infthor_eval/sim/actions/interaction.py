@@ -14,8 +14,8 @@ from infthor_eval.sim.receptacles import drawer_offset
 from infthor_eval.sim.simulation import Simulation
 from infthor_eval.sim.unfolding import unfold
 
-# Overlaps of boxes that `forceAction` tolerates in a full receptacle, smallest first. Recorded boxes are coarse; where
-# things are drawn to the box, more than the first would show.
+# Overlaps of boxes that `forceAction` tolerates in a full receptacle of a recording, smallest first: recorded boxes are
+# coarse. Where things are drawn to the box, an overlap would show.
 _CROWDED = (0.12, 0.24, 0.35)
 
 
@@ -74,8 +74,7 @@ def _find_place(sim: Simulation, held: SimObject, target: SimObject, force: bool
     """Return the held object at the best free place; a forced put squeezes in where it is crowded."""
     # Best first: without overlap, clear of fixed things, in view. Recorded boxes of fixed things are too large, so a
     # place within one is better than none; Unity, which has the meshes, would find room there.
-    tolerated = _CROWDED if sim.world.coarse else _CROWDED[:1]
-    for overlap in (0.0, *tolerated) if force else (0.0,):
+    for overlap in (0.0, *_CROWDED) if force and sim.world.coarse else (0.0,):
         for among_fixed in (False, True):
             for point_filter in (sim.vision.in_frame, None):
                 placed = find_place(
