@@ -103,7 +103,7 @@ class _Factory:
         self._problems: list[str] = []
         self._marks: list[SimulatorMark] = []  # the state before each task
         self._draft = self._start_draft()
-        self._longest = self._draft, list(self._problems)
+        self._longest = self._draft.copy(), list(self._problems)
 
     def _start_draft(self) -> Draft:
         view = self._simulator.reset(self._settings.scene)
@@ -182,9 +182,7 @@ class _Factory:
         pool = TaskPool(self._rng)
         while True:
             room = self._room()
-            candidates = [
-                [task for task in self._candidates(room) if types.allows_task(task)] for types in directions
-            ]
+            candidates = [[task for task in self._candidates(room) if types.allows_task(task)] for types in directions]
             self._rng.shuffle(candidates)
             task = pool.draw(candidates[0]) or pool.draw(candidates[1])
             if task is None:

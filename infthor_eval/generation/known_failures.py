@@ -11,7 +11,7 @@ from infthor_eval.thor.view import SimulatorView, ThorObject
 __all__ = ["KnownFailures"]
 
 _Size = tuple[float, ...]
-_LIFETIME = 40  # tasks after which a failure is forgotten: other objects have moved and may have cleared the way
+_LIFETIME = 24  # tasks after which a failure is forgotten: other objects have moved and may have cleared the way
 _NEAR = 0.02  # tolerance of positions and sizes, metres
 
 

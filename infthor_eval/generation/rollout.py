@@ -68,9 +68,10 @@ class Rollout:
 
     def _put(self, operator: Operator) -> None:
         item, receptacle = self._resolve(operator.item), self._resolve(operator.receptacle or "")
-        self._walker.go([receptacle])
+        outer = self._closed_around(receptacle)  # as a drawer with the pan
+        self._walker.go([outer or receptacle], inside=receptacle if outer else None)
         self._begin("PutObject", item, receptacle)
-        holder = receptacle if self._is_closed(receptacle) else None
+        holder = receptacle if self._is_closed(receptacle) else outer
         self._inside(holder, lambda: self._interact("PutObject", item, receptacle))
 
     def _toggle(self, operator: Operator) -> None:

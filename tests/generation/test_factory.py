@@ -1,5 +1,8 @@
 """Algorithm 1 on the embedded simulator: what holds between tasks and at the end."""
 
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import msgspec
@@ -8,14 +11,20 @@ import pytest
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
+from infthor_eval.generation import factory
 from infthor_eval.generation.factory import generate
 from infthor_eval.generation.final_task import violation
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.generation.trace import RolloutError
 from infthor_eval.household.tasks import TaskType
+from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.launch import embedded_launch
+from infthor_eval.thor.recorded import translate
+from infthor_eval.thor.recorder import object_log
+from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
@@ -81,11 +90,114 @@ def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
     assert made == [msgspec.to_builtins(step.object_log) for step in steps]
 
 
-def test_the_lengths_are_in_steps_and_tasks_and_failures_have_an_end(simulator):
-    made = generate(TrajectorySettings("living-room-2", 1, 1, 3), simulator)
+def test_the_lengths_are_in_steps_and_subgoals_with_put_downs(simulator):
+    made = generate(TrajectorySettings("living-room-2", 1, 1, 3, task_types=(TaskType.PLACE,)), simulator)
     assert len(made.trajectory.sub_tasks) == len(made.trajectory.sub_trajs) == 3
-    with pytest.raises(UsageError, match=r"and 2 failed tasks \(PutObject: .*or a higher --max-fail"):
-        generate(TrajectorySettings("living-room-2", 0, 100_000, 1, max_fail=2), simulator)
+    looks = generate(TrajectorySettings("bedroom-3", 0, 1, 4, task_types=(TaskType.EXAMINE,)), simulator)
+    assert len(looks.trajectory.sub_tasks) == 2  # each is followed by a put-down
+
+
+def test_a_thousand_steps_are_made_with_the_defaults(simulator):
+    made = generate(TrajectorySettings("bathroom-4", 4, 1000), simulator)
+    assert len(made.trajectory.plan.low_actions) >= 1000
+    assert made.statistics.accepted.total() >= 0.65 * made.statistics.tried.total()
+    assert _refused(made.trajectory, simulator) == []
+
+
+def _refused(trajectory, simulator):
+    """The actions that a replay of the trajectory refuses, and the first frame whose log differs."""
+    restore(simulator, trajectory.scene)
+    grounding = Grounding(simulator.view)
+    refused = []
+    for number, low in enumerate(trajectory.plan.low_actions, 1):
+        view = simulator.step(**translate(low, grounding, simulator.view))
+        log = {"step": number, **msgspec.to_builtins(object_log(view))}
+        if not view.success or log != trajectory.object_log[number]:
+            refused.append((number, view.error))
+    return refused
+
+
+class _Failing:
+    """Makes plans fail after their first action, as long as `while_` says so of the factory."""
+
+    def __init__(self, monkeypatch, while_):
+        execute = factory._Factory._execute
+
+        def fail(self, operators):
+            outcome = execute(self, operators)
+            if outcome.failure is None and while_(self):
+                return factory._Outcome(RolloutError("made to fail"), executed=True)
+            return outcome
+
+        monkeypatch.setattr(factory._Factory, "_execute", fail)
+
+
+def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
+    tries = iter(range(10_000))
+    started = []
+
+    def while_(made):
+        if made._draft.n_tasks >= 8:
+            started.append(True)
+        return bool(started) and next(tries) < 9
+
+    _Failing(monkeypatch, while_)
+    kinds = (TaskType.PLACE, TaskType.PLACE_TWO)  # which leave nothing in the hand
+    made = generate(TrajectorySettings("living-room-2", 5, 150, 9, task_types=kinds, max_fail=2), simulator)
+    assert [item.subgoals for item in made.statistics.roll_backs] == [1, 2, 4]
+    went_back = made.trajectory.gen_info["roll_backs"]
+    assert [item["from_step"] for item in went_back[1:]] == [item["to_step"] for item in went_back[:-1]]
+    assert len(made.trajectory.sub_tasks) == len(made.problems) >= 9
+    assert made.statistics.reasons["made to fail"] == 9
+    assert _refused(made.trajectory, simulator) == []
+
+
+def test_an_accepted_task_ends_the_row_of_failures(simulator, monkeypatch):
+    tries = iter(range(10_000))
+    _Failing(monkeypatch, lambda _: next(tries) % 3 != 2)
+    made = generate(TrajectorySettings("living-room-2", 5, 60, 3, max_fail=2), simulator)
+    assert made.statistics.roll_backs == [] and made.statistics.reasons["made to fail"] >= 6
+
+
+@pytest.mark.parametrize("floor", [0, 40, 10_000])
+def test_what_gives_up_is_kept_from_a_floor_on(simulator, monkeypatch, floor):
+    reached = []
+
+    def while_(made):
+        reached.append(made._draft.n_tasks)
+        return max(reached) >= 4
+
+    _Failing(monkeypatch, while_)
+    settings = TrajectorySettings("living-room-2", 5, 300, 3, True, max_fail=2, save_floor=floor)
+    if floor != 40:
+        with pytest.raises(UsageError, match=r"no further task works after .* failed tasks \(made to fail"):
+            generate(settings, simulator)
+        return
+    made = generate(settings, simulator)
+    assert len(made.trajectory.plan.low_actions) >= 40 and len(made.trajectory.sub_tasks) == 4
+    assert made.trajectory.gen_info["banked_on_giveup"] is True and made.trajectory.long_horizon_task is None
+    assert len(made.problems) == len(made.trajectory.sub_tasks)
+    assert _refused(made.trajectory, simulator) == []
+
+
+def test_a_pool_of_tasks_that_is_exhausted_begins_again(simulator):
+    settings = TrajectorySettings("bathroom-4", 2, 700, 1, task_types=(TaskType.CLEAN,))
+    made = generate(settings, simulator)
+    assert made.statistics.pool_restarts and made.trajectory.gen_info["pool_restarts"] == made.statistics.pool_restarts
+
+
+def test_the_same_bytes_come_out_after_a_kill_with_roll_backs(run, tmp_path):
+    words = ["generate", "--scene", "kitchen-5", "--seed", "5", "--min-steps", "150", "--min-subgoals", "1"]
+    words += ["--max-fail", "1"]
+    assert run(*words, "--out", tmp_path / "whole")[0] == 0
+    command = [sys.executable, "-c", "import sys; from infthor_eval.cli import main; sys.exit(main())", *words]
+    killed = subprocess.Popen([*command, "--out", str(tmp_path / "killed")])
+    time.sleep(6)
+    killed.kill()
+    killed.wait()
+    assert run(*words, "--out", tmp_path / "killed")[0] == 0
+    name = "kitchen-5-seed5.json"
+    assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "killed" / name).read_bytes()
 
 
 def test_a_task_type_that_the_room_offers_nothing_for_is_one_line(simulator):
