@@ -75,7 +75,18 @@ def main() -> int:
     unknown = set(options.groups) - known.keys()
     if unknown:
         parser.error(f"unknown group {', '.join(sorted(unknown))}; give some of {', '.join(known)}")
-    columns = ("made", "tries", "steps", "tried", "accepted", "share", "dead ends", "pool again", "CPU ms/step")
+    columns = (
+        "made",
+        "tries",
+        "steps",
+        "tried",
+        "accepted",
+        "share",
+        "unexecuted",
+        "dead ends",
+        "pool again",
+        "CPU ms/step",
+    )
     print(f"{'group':10}" + "".join(f"{column:>12}" for column in columns), flush=True)
     complete = True
     with tempfile.TemporaryDirectory() as scratch:
@@ -96,7 +107,8 @@ def run(name: str, group: Group, data: Path | None, out: Path, workers: int) -> 
     share = f"{accepted / tried:.1%}" if tried else "-"
     per_step = f"{1000 * (processor_seconds() - before) / summary.steps:.1f}" if not summary.resumed else "-"
     numbers = (len(made.paths), len(jobs), summary.steps, tried, accepted, share)
-    cells = (*numbers, len(summary.roll_backs), summary.pool_restarts, per_step)
+    n_not_executed = sum(summary.not_executed.values())
+    cells = (*numbers, n_not_executed, len(summary.roll_backs), summary.pool_restarts, per_step)
     print(f"{name:10}" + "".join(f"{cell!s:>12}" for cell in cells), flush=True)
     for failure in made.failures:
         print(f"  not made: {failure}", flush=True)

@@ -22,7 +22,7 @@ def tasks_table(summary: GenerationSummary) -> Table:
 
 
 def generation_notes(summary: GenerationSummary) -> list[str]:
-    """Return lines on what happened besides: tasks of which nothing was executed, dead ends, a pool that began again."""
+    """Return lines on the failures of a run, its dead ends, and the pools of tasks that began again."""
     n_not_executed = sum(summary.not_executed.values())
     notes = [
         (n_not_executed, f"{n_not_executed} sampled tasks not executed: {_most_frequent(summary.not_executed)}"),

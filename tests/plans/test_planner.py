@@ -36,7 +36,7 @@ def recorded_goal(plan, grid):
 
 
 # The kitchen has all kinds but switching a lamp on; the bedroom has that, stacks, and two of a thing.
-@pytest.mark.parametrize("name", ["kitchen-1-seed3", "bedroom-2-seed7"])
+@pytest.mark.parametrize("name", ["kitchen-1-seed5", "bedroom-2-seed7"])
 def test_every_plan_is_carried_out(simulator, name):
     trajectory = next(iter_trajectories(SET / "metadata" / name / "traj_data.json"))
     rules = reward_rules("default")

@@ -50,12 +50,12 @@ def test_the_three_commands_make_a_set(printed, work, run):
     assert {"iou", "seconds"} <= set(replayed)
 
     csv = work / "set/qa_set_mine.csv"
-    code, out, _ = run("questions", work / "set", "--out", csv, "--per-trajectory", 10)
+    code, out, _ = run("questions", work / "set", "--out", csv, "--per-trajectory", 5)
     assert code == 0
-    assert "10 questions on 1 trajectories" in out
-    assert len(read_questions(csv)) == 10
+    assert "5 questions on 1 trajectories" in out
+    assert len(read_questions(csv)) == 5
     first = csv.read_bytes()
-    run("questions", work / "set", "--out", csv, "--per-trajectory", 10)
+    run("questions", work / "set", "--out", csv, "--per-trajectory", 5)
     assert csv.read_bytes() == first
 
 
