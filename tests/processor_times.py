@@ -21,6 +21,7 @@ __all__ = ["LIMIT_S", "read_slow_tests"]
 LIMIT_S = 1.0
 # Slow ones that `make test` runs all the same: no other test goes the same whole way, or later ones need their results.
 KEPT = (
+    "tests/generation/test_factory.py::test_a_thousand_steps_are_made_with_the_defaults",
     "tests/nieh/test_suite.py::test_the_tiny_model_runs_through_and_shares_prefixes",
     "tests/model_adapters/hf/test_conversation.py::test_sharing_changes_no_reply",
     "tests/manipulation/test_episodes.py::test_the_planner_picks_up_all_and_puts_nearly_all",

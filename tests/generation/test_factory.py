@@ -104,6 +104,12 @@ def test_a_thousand_steps_are_made_with_the_defaults(simulator):
     assert _refused(made.trajectory, simulator) == []
 
 
+def test_five_thousand_steps_are_made_and_replayed(simulator):
+    made = generate(TrajectorySettings("living-room-1", 1, 5000), simulator)
+    assert len(made.trajectory.plan.low_actions) >= 5000
+    assert _refused(made.trajectory, simulator) == []
+
+
 def _refused(trajectory, simulator):
     """The actions that a replay of the trajectory refuses, and the first frame whose log differs."""
     restore(simulator, trajectory.scene)
