@@ -18,17 +18,12 @@ _N_VARIABLES = 4
 
 
 class TaskPool:
-    """Draws tasks, each at most once until the pool begins again.
-
-    Attributes:
-        restarts: how often the pool began again.
-    """
+    """Draws tasks, each at most once until the pool begins again."""
 
     def __init__(self, rng: random.Random) -> None:
         """Start with no task drawn; `rng` is the source of all random choices."""
         self._rng = rng
         self._drawn: set[Task] = set()
-        self.restarts = 0
 
     def draw(self, candidates: Iterable[Task]) -> Task | None:
         """Return one of some tasks that was not drawn before; None if all of them were."""
@@ -45,7 +40,6 @@ class TaskPool:
         if self._drawn.isdisjoint(candidates):
             return False
         self._drawn.clear()
-        self.restarts += 1
         return True
 
     def _narrow(self, tasks: Sequence[Task]) -> list[Task]:
