@@ -1,5 +1,6 @@
 """A trajectory while it is generated; the actions of a failed task can be removed again."""
 
+import copy
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
@@ -110,8 +111,10 @@ class Draft:
 
     def copy(self) -> "Draft":
         """Return a copy, which changes of this draft leave as it is."""
-        other = Draft.__new__(Draft)
-        other.__dict__ = {key: list(value) if isinstance(value, list) else value for key, value in vars(self).items()}
+        other = copy.copy(self)
+        for name, value in vars(self).items():
+            if isinstance(value, list):
+                setattr(other, name, list(value))
         return other
 
     def make_last_task_final(self) -> None:
