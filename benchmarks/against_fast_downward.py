@@ -13,13 +13,15 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 from infthor_eval.generation.sampling import TaskPool
 from infthor_eval.household.pddl import DOMAIN, problem
 from infthor_eval.household.planner import plan
+from infthor_eval.household.possible_tasks import tasks_of
 from infthor_eval.household.symbolic import SymbolicRoom, room_of
-from infthor_eval.household.tasks import Task, TaskType
+from infthor_eval.household.tasks import Task
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
@@ -51,12 +53,11 @@ def sample_tasks(number: int, seed: int) -> Iterator[tuple[Task, SymbolicRoom]]:
         for scene in _SCENES:
             view = simulator.reset(scene)
             types = {item.object_type for item in view.objects.values()}
-            rooms.append((room_of(view), types, TaskPool(TaskType, rng)))
+            room = room_of(view)
+            rooms.append((room, tasks_of(room, types), TaskPool(rng)))
     for index in range(number):
-        room, types, pool = rooms[index % len(rooms)]
-        task = next(task for task in pool.sample(room, types) if plan(task, room))
-        pool.note_use(task)
-        yield task, room
+        room, tasks, pool = rooms[index % len(rooms)]
+        yield next(task for task in iter(partial(pool.draw, tasks), None) if plan(task, room)), room
 
 
 def optimal_cost(script: Path, text: str) -> int | None:
