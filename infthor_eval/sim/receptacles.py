@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from infthor_eval.sim.footprints import Rect
 from infthor_eval.sim.geometry import Array, yaw_matrix
 from infthor_eval.sim.objects import DRAWER_SLIDE, WALL, SimObject
 from infthor_eval.sim.world import World
@@ -40,11 +41,10 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
     """Return the surfaces of a receptacle, lowest first."""
     if receptacle.type.levels:
         return _shelves(receptacle)
-    low, high = receptacle.bounds()
-    middle, half = (low + high) / 2, (receptacle.box_size[0] / 2, receptacle.box_size[2] / 2)
+    middle, half = _standing_area(receptacle)
     yaw, overhang = float(receptacle.rotation[1]), math.inf if receptacle.type.overhang else 0.03
     if receptacle.type.open_top:  # a vessel: its only surface is its bottom
-        base = float(low[1]) + receptacle.floors[0]
+        base = float(receptacle.bounds()[0][1]) + receptacle.floors[0]
         inner = [max(side * receptacle.type.open_top - WALL / 2, 0.015) for side in half]
         return [Surface(np.array([middle[0], base, middle[2]]), (inner[0], inner[1]), yaw, math.inf, overhang, True)]
     level = receptacle.surface_height()
@@ -55,6 +55,35 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
         at = receptacle.center + receptacle.matrix @ np.array([(x0 + x1) / 2, 0.0, (z0 + z1) / 2])
         tops.append(Surface(np.array([at[0], level, at[2]]), ((x1 - x0) / 2, (z1 - z0) / 2), yaw, math.inf, overhang))
     return tops
+
+
+def _standing_area(receptacle: SimObject) -> tuple[Array, tuple[float, float]]:
+    """Return the middle (3,) in the world of the part of a box on or in which things stand, and its half extents (2,).
+
+    Its height is that of the box's middle.
+    """
+    half_x, _, half_z = (float(side) / 2 for side in receptacle.box_size)
+    x0, z0, x1, z1 = receptacle.type.area or _body(receptacle)
+    offset = np.array([(x0 + x1) / 2 * half_x, 0.0, (z0 + z1) / 2 * half_z])
+    return receptacle.center + receptacle.matrix @ offset, ((x1 - x0) / 2 * half_x, (z1 - z0) / 2 * half_z)
+
+
+def _body(receptacle: SimObject) -> Rect:
+    """Return the part of a box that neither a handle nor the flaps of an open carton take up, as shares of its half."""
+    width, _, depth = (float(side) for side in receptacle.box_size)
+    if receptacle.type.handled:
+        return (-1.0, -1.0, min(1.0, 2 * depth / width - 1), min(1.0, 2 * width / depth - 1))
+    x, z = (_closed_share(receptacle, axis) for axis in (0, 2))
+    return (-x, -z, x, z)
+
+
+def _closed_share(receptacle: SimObject, axis: int) -> float:
+    """Return the extent of a box along an axis when it is closed, as a share of what it is now."""
+    size = float(receptacle.box_size[axis])
+    for change in receptacle.type.unfolds:
+        if change.axis == axis:
+            return change.extent(size, receptacle.state.openness, 0.0) / size
+    return 1.0
 
 
 def _shelves(receptacle: SimObject) -> list[Surface]:

@@ -12,7 +12,7 @@ TYPES = (
     portable("CellPhone", (0.08, 0.01, 0.16), shape="cell_phone", categories=("small", "lounge"), toggleable=True,
              breakable=True, mass=0.18, materials=("Plastic",)),
     _machine("CoffeeMachine", (0.44, 0.44, 0.44), shape="coffee_machine", receptacle=True, heat_source=True, mass=2.0,
-             takes=("Mug",), support=0.13, overhang=True, pours="coffee", capacity=None),
+             takes=("Mug",), support=0.13, area=(-0.7, 0.1, 0.7, 1.0), overhang=True, pours="coffee", capacity=None),
     _machine("DeskLamp", (0.28, 0.44, 0.29), shape="desk_lamp", light=0.9),
     _machine("Desktop", (0.88, 0.58, 0.27), shape="desktop", breakable=True),
     _machine("FloorLamp", (0.52, 1.88, 0.51), shape="floor_lamp", light=1.1),

@@ -6,7 +6,8 @@ from infthor_eval.sim.object_types.record import ObjectType, Unfolding
 
 __all__ = ["TYPES"]
 
-_rail = partial(ObjectType, receptacle=True, overhang=True)
+# What hangs on a rail hangs around it; the support is where the underside of a towel or a roll of the usual size is.
+_rail = partial(ObjectType, receptacle=True, overhang=True, area=(-1.0, 0.2, 1.0, 0.8))
 _picture = partial(ObjectType, faces_room=True, flat=True, centered=True)
 
 TYPES = (
@@ -21,7 +22,7 @@ TYPES = (
     ObjectType("Doorway", (1.00, 2.10, 0.15), shape="doorway"),
     ObjectType("Faucet", (0.27, 0.21, 0.24), shape="faucet", toggleable=True, runs_water=True),
     ObjectType("Floor", (4.98, 0.44, 5.09), shape="floor", receptacle=True, takes=(), beyond_room=True, capacity=None),
-    _rail("HandTowelHolder", (0.17, 0.21, 0.05), shape="rail", takes=("HandTowel",), support=-1.59),
+    _rail("HandTowelHolder", (0.17, 0.21, 0.05), shape="towel_hook", takes=("HandTowel",), support=-1.59),
     ObjectType("LightSwitch", (0.12, 0.15, 0.02), shape="light_switch", toggleable=True, centered=True),
     _picture("Mirror", (0.54, 0.85, 0.07), shape="mirror", breakable=True, dirtyable=True, materials=("Glass",)),
     _picture("Painting", (0.88, 0.81, 0.09), shape="painting"),
@@ -38,8 +39,8 @@ TYPES = (
                takes=("food", "dishes", "cutlery", "bottles", "washing", "Kettle"), support=0.01, open_top=1.0,
                basin=True, capacity=0),
     ObjectType("Toilet", (0.53, 1.04, 0.97), shape="toilet", receptacle=True, openable=True, materials=("Ceramic",),
-               takes=("toiletries",), overhang=True, capacity=2),
-    _rail("ToiletPaperHanger", (0.23, 0.08, 0.10), shape="paper_hanger", takes=("ToiletPaper",), support=-0.35),
-    _rail("TowelHolder", (0.66, 0.04, 0.11), shape="rail", takes=("Towel",), support=-13.0),
+               takes=("toiletries",), area=(-0.95, -1.0, 0.95, -0.44), capacity=2),  # its tank
+    _rail("ToiletPaperHanger", (0.23, 0.08, 0.10), shape="paper_hanger", takes=("ToiletPaper",), support=-0.25),
+    _rail("TowelHolder", (0.66, 0.04, 0.11), shape="rail", takes=("Towel",), support=-13.6),
     _picture("Window", (1.04, 1.55, 0.11), shape="window", breakable=True, materials=("Glass",), beyond_room=True),
 )  # fmt: skip

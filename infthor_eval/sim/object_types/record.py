@@ -49,6 +49,9 @@ class ObjectType:
         refuses: categories and types that may not be.
         encloses: it hides its contents while it is closed.
         support: share of its height at which things stand on it; None: its top.
+        area: part of its box, seen from above, on which things stand: x0, z0, x1, z1 as shares of its half extents, -1
+            to 1 in its own frame; None: all of it.
+        handled: a handle sticks out at one end of its longer side; the rest is as long as it is wide.
         space_below: boxes lower than this (metres) are the space above the surface, as recorded counters are.
         centered: its origin is in the middle of its box, not of its underside.
         open_top: share of its width that is open at the top; 0: nothing stands inside its box.
@@ -106,6 +109,8 @@ class ObjectType:
     refuses: tuple[str, ...] = ()
     encloses: bool = False
     support: float | None = None
+    area: tuple[float, float, float, float] | None = None
+    handled: bool = False
     space_below: float = 0.0
     centered: bool = False
     open_top: float = 0.0

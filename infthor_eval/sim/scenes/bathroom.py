@@ -19,14 +19,14 @@ def furnish_bathroom(plan: RoomPlan, loose: int = 16) -> None:
     _place_washstand(plan, round(room.x_min + 0.95, 2))
     at = round(room.x_max - 0.6, 2)
     plan.place_against("z+", "Toilet", at, size=(0.45, 0.85, 0.7), gap=0.02)
-    plan.place_against("z+", "ToiletPaperHanger", round(at - 0.55, 2), y=0.7, size=(0.18, 0.08, 0.1))
+    plan.place_against("z+", "ToiletPaperHanger", round(at - 0.55, 2), y=0.7, size=(0.23, 0.08, 0.1))
     tub_at = round(room.z_min + 0.95, 2)
     tub = plan.place_against("x+", "Bathtub", tub_at, size=(1.7, 0.5, 0.75), gap=0.02)
     basin = plan.place_against("x+", "BathtubBasin", tub_at, y=0.03, size=(1.55, 0.3, 0.6), gap=0.095)
     name_after(tub, basin)
     plan.place_against("x+", "Faucet", tub_at, y=0.52, size=(0.16, 0.2, 0.16), gap=0.02)
-    plan.place_against("z-", "TowelHolder", round(room.x_min + 0.7, 2), y=1.3, size=(0.6, 0.04, 0.1))
-    plan.place_against("x-", "HandTowelHolder", round(room.z_max - 1.2, 2), y=1.25, size=(0.2, 0.12, 0.06))
+    plan.place_against("z-", "TowelHolder", round(room.x_min + 0.7, 2), y=1.3, size=(0.66, 0.04, 0.11))
+    plan.place_against("x-", "HandTowelHolder", round(room.z_max - 1.2, 2), y=1.25, size=(0.17, 0.21, 0.05))
     for object_type, size in (
         ("GarbageCan", (0.28, 0.4, 0.28)),
         ("Cart", (0.5, 0.75, 0.35)),

@@ -29,7 +29,7 @@ def coffee_machine(b: Builder) -> None:
     color = pick((BLACK, STEEL, (0.5, 0.15, 0.14)), b.style)
     b.box((0, 0, -0.6), (0.9, 1, 0.4), color, Material.METAL)
     b.box((0, 0.72, 0.1), (0.9, 0.28, 0.85), shade_of(color, 1.15), Material.METAL)
-    b.box((0, -0.92, 0.1), (0.95, 0.08, 0.9), DARK)
+    b.span((-0.95, -1, -0.8), (0.95, b.support, 1), DARK)
     b.tube((0, 0.36, 0.25), (0.2, 0.1, 0.2), CHROME, Material.METAL, bottom=0.5)
     lamp: Color = (0.2, 1.0, 0.3) if b.state.toggled else (0.4, 0.1, 0.1)
     b.ball((0.6, 0.72, 0.95), (0.1, 0.08, 0.06), lamp, glow=0.9 if b.state.toggled else 0.2)

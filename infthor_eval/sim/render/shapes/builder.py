@@ -86,6 +86,11 @@ class Builder:
         return min(1.0, metres / max(float(self.half[1]), 1e-6) - 1)
 
     @property
+    def support(self) -> float:
+        """The height in fractions at which things stand on it."""
+        return 1.0 if self.item.support is None else self.level(self.item.support)
+
+    @property
     def floor(self) -> float:
         """The height in fractions at which contents stand on the lowest floor inside it."""
         return self.level(self.item.floors[0])

@@ -75,7 +75,7 @@ def bathtub(b: Builder) -> None:
 def toilet(b: Builder) -> None:
     """A bowl in front of a tank."""
     b.box((0, 0.45, -0.72), (0.95, 0.55, 0.28), _CERAMIC)
-    b.box((0, 0.93, -0.72), (1.0, 0.05, 0.28), shade_of(_CERAMIC, 0.96))
+    b.box((0, 0.95, -0.72), (1.0, 0.05, 0.28), shade_of(_CERAMIC, 0.96))
     b.tube((0, -0.55, 0.1), (0.55, 0.45, 0.6), _CERAMIC, bottom=0.75)
     b.tube((0, -0.2, 0.25), (0.85, 0.1, 0.75), shade_of(_CERAMIC, 0.98))
     lid = 0.02
@@ -218,9 +218,19 @@ def rail(b: Builder) -> None:
 
 
 @draws
+def towel_hook(b: Builder) -> None:
+    """A plate on the wall from which a short bar hangs."""
+    b.box((0, 0.55, -0.7), (0.35, 0.45, 0.3), CHROME, Material.METAL)
+    level = b.level(0.055)
+    b.rod((0, level, 0.5), 0.008, float(b.half[0]), 0, CHROME)
+    b.span((-0.06, level, 0.35), (0.06, 0.6, 0.65), CHROME, Material.METAL)
+    b.span((-0.06, 0.45, -0.5), (0.06, 0.6, 0.65), CHROME, Material.METAL)
+
+
+@draws
 def paper_hanger(b: Builder) -> None:
     """A holder for a roll of paper."""
-    b.rod((0, 0, 0.4), 0.012, float(b.half[0]), 0, CHROME)
+    b.rod((0, 0, 0.5), 0.012, float(b.half[0]), 0, CHROME)
     b.box((0, 0, -0.8), (0.9, 0.8, 0.2), CHROME, Material.METAL)
 
 

@@ -19,7 +19,7 @@ def chair(b: Builder) -> None:
     color = pick(WOODS, b.style)
     level = _seat_level(b, -0.05)
     x, y, z = b.thick(0.018, 0), b.thick(0.015, 1), b.thick(0.018, 2)
-    b.box((0, level - y, 0.05), (0.95, y, 0.92), color, Material.WOOD)
+    b.box((0, level - y, 0), (1, y, 1), color, Material.WOOD)
     for side in (-1, 1):
         b.box((side * (0.93 - x), (level - 1) / 2, 0.9 - z), (x, (level + 1) / 2, z), shade_of(color, 0.85))
         b.box((side * (0.93 - x), 0, -0.93), (x, 1, z), shade_of(color, 0.85))
