@@ -6,13 +6,21 @@ underscore ("Apple|...|AppleSliced_2").
 
 from enum import StrEnum
 
-__all__ = ["Words", "object_type_of"]
+__all__ = ["Words", "modern_type", "object_type_of"]
+
+# Types of AI2-THOR 2.1.0, as in ALFRED and the published trajectories, that 5.x calls otherwise.
+_RENAMED = {"Glassbottle": "Bottle", "PaperTowel": "PaperTowelRoll", "ToiletPaperRoll": "ToiletPaper"}
 
 
 def object_type_of(object_id: str) -> str:
     """Return the object type in an object id."""
     parts = object_id.split("|")
     return parts[4].split("_")[0] if len(parts) > 4 else parts[0]
+
+
+def modern_type(object_type: str) -> str:
+    """Return the name in AI2-THOR 5.x of a type that 2.1.0 may have called otherwise."""
+    return _RENAMED.get(object_type, object_type)
 
 
 class Words(StrEnum):

@@ -10,6 +10,8 @@ from typing import Any
 
 import yaml
 
+from infthor_eval.formats.object_ids import modern_type
+
 __all__ = [
     "CLEANABLE",
     "COOLABLE",
@@ -23,17 +25,10 @@ __all__ = [
     "SLICEABLE",
     "STOWABLE",
     "goes_into",
-    "modern_type",
     "preposition",
 ]
 
 _TABLES: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("affordances.yaml").read_text())
-_RENAMED = {"Glassbottle": "Bottle", "PaperTowel": "PaperTowelRoll", "ToiletPaperRoll": "ToiletPaper"}  # 2.1.0 to 5.x
-
-
-def modern_type(name: str) -> str:
-    """Return the AI2-THOR 5.x name of an object type of 2.1.0; names of 5.x are returned unchanged."""
-    return _RENAMED.get(name, name)
 
 
 def _types(names: Iterable[str]) -> frozenset[str]:

@@ -6,8 +6,9 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.object_ids import modern_type
 from infthor_eval.formats.trajectory import SubTask, TaskInfo
-from infthor_eval.household.affordances import modern_type, preposition
+from infthor_eval.household.affordances import preposition
 from infthor_eval.household.wording import noun, plural, with_article
 
 __all__ = ["Task", "TaskType", "sub_task", "task_of"]

@@ -141,7 +141,7 @@ def _solid_boxes(world: World, item: SimObject, receptacle: SimObject, surface: 
     for other in world.objects.values():
         apart = other is not receptacle and other.object_id not in around
         if apart and not other.type.pickupable and other.object_type != "Floor":
-            boxes += _outer_boxes(other, surface, low, high)
+            boxes += _outer_boxes(other, low, high)
     yield from (box for box in boxes if aabb_overlap(*box, low, high))
     yield from _room_walls(world, surface.center)
 
@@ -160,10 +160,10 @@ def _opened(receptacle: SimObject) -> SimObject:
     return as_open(receptacle, 1.0) if receptacle.type.encloses else receptacle
 
 
-def _outer_boxes(other: SimObject, surface: Surface, low: Array, high: Array) -> Iterator[Box]:
-    """Yield the boxes of another object, and of the space that its door needs; of its parts if they are apart.
+def _outer_boxes(other: SimObject, low: Array, high: Array) -> Iterator[Box]:
+    """Yield the boxes of another object's parts, of the whole of what hides its inside, and of the room for its door.
 
-    What stands on the surface keeps its whole box: things look lost under a lamp's shade.
+    So there is room around the foot of a lamp, as in AI2-THOR, whose colliders are parts too.
     """
     bounds = other.bounds()
     farthest = float(other.box_size.max()) if other.type.hinged or other.type.slides else 0.0
@@ -172,7 +172,7 @@ def _outer_boxes(other: SimObject, surface: Surface, low: Array, high: Array) ->
     to_open = opening_space(other)
     if to_open is not None:
         yield to_open
-    if (other.type.encloses and not other.hollow) or 0 <= float(bounds[0][1] - surface.center[1]) + _CLEARANCE < _ON_IT:
+    if other.type.encloses and not other.hollow:
         yield bounds
     elif aabb_overlap(*bounds, low, high):
         yield from part_boxes(other)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from infthor_eval.formats.object_ids import modern_type
 from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.free_places import find_place
 from infthor_eval.sim.geometry import Array, object_id
@@ -17,7 +18,6 @@ from infthor_eval.sim.world import World
 __all__ = ["NamedPose", "assign_parents", "set_poses", "spawn_randomly"]
 
 _SUNK = 0.2  # metres below a surface; what lies deeper is inside the furniture
-_RENAMED = {"Glassbottle": "Bottle"}  # as ALFRED's AI2-THOR 2.1.0 calls it
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,7 @@ class _Templates:
         if name in self._named:
             return self._named[name]
         if name not in self._chosen:
-            prefix = name.split("_", maxsplit=1)[0]
-            object_type = _RENAMED.get(prefix, prefix)
+            object_type = modern_type(name.split("_", maxsplit=1)[0])
             candidates = self._typed.get(object_type)
             if not candidates:
                 if not type_named(object_type).pickupable:

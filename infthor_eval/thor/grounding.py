@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from msgspec.structs import astuple
 
-from infthor_eval.formats.object_ids import object_type_of
+from infthor_eval.formats.object_ids import modern_type, object_type_of
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["Grounding", "id_position"]
@@ -42,7 +42,7 @@ class Grounding:
         if object_id in view.objects:
             self._chosen[object_id], self.distances[object_id] = object_id, 0.0
             return object_id
-        object_type = object_type_of(object_id)
+        object_type = modern_type(object_type_of(object_id))
         taken = set(self._chosen.values())
         candidates = [item for item in view.objects.values() if item.object_type == object_type]
         # Two recorded objects of a type are mapped to two objects, unless the scene has too few. Furniture is not

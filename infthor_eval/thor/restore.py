@@ -8,6 +8,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import Any
 
+from infthor_eval.formats.object_ids import modern_type
 from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.thor.axes import modern_rotation
 from infthor_eval.thor.simulator import Simulator
@@ -89,10 +90,7 @@ def _poses(recorded: list[ObjectPose], view: SimulatorView) -> tuple[list[dict[s
     return poses, dropped
 
 
-_RENAMED = {"Glassbottle": "Bottle"}  # 2.1.0 to 5.x
-
-
 def _type_of(name: str, types: dict[str, list[str]]) -> str:
     """Return the object type in a Unity object's name ("Mug_291e6e8a")."""
     head = name.partition("_")[0]
-    return head if head in types else _RENAMED.get(head, head)
+    return head if head in types else modern_type(head)

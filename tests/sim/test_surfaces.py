@@ -68,7 +68,7 @@ def hangs_on(rail: SimObject, hung: SimObject) -> bool:
     for row in rows(shape(rail), rail.position, rail.matrix, 0):
         at, axis = row[CENTER : CENTER + 3], row[AXES + 3 : AXES + 6]  # a cylinder's own axis is y
         if row[FORM] == Form.CYLINDER and abs(axis[0]) > 0.99:
-            inside = (low + [0, (high - low)[1] / 2, 0] <= at) & (at <= high)
+            inside = ((low + high) / 2 * [0, 1, 0] + low * [1, 0, 1] <= at) & (at <= high)
             return bool(inside[1:].all() and abs(at[0] - (low + high)[0] / 2) < row[HALF + 1])
     return False
 

@@ -25,6 +25,12 @@ def test_no_such_type():
     assert Grounding(world).ground("Fridge|+00.00|+00.00|+00.00", world) is None
 
 
+def test_a_type_that_was_renamed():
+    bottle = thing("Bottle|+00.10|+00.90|+00.00", pickupable=True)
+    world = view(bottle)
+    assert Grounding(world).ground("Glassbottle|+00.05|+00.90|+00.00", world) == bottle.object_id
+
+
 def test_two_recorded_things_are_two_things():
     world = view(ONE, OTHER)
     grounding = Grounding(world)
