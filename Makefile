@@ -14,7 +14,7 @@ COMPILE := $(BIN)/python -m pytest -q tests/sim/test_questions.py tests/sim/test
 VLLM := .venv-vllm
 REAL := tests/model_adapters/vllm/real
 
-.PHONY: demo shell test test-all test-times test-vllm lint docs clean
+.PHONY: demo shell test test-all test-times test-vllm vitals lint docs clean
 
 # A trajectory in a procedural kitchen, its frames and questions; then the bundled set, by the bounds and a small model,
 # which is also asked behind memories.
@@ -54,6 +54,11 @@ $(VLLM)/.installed: $(REAL)/install.sh pyproject.toml
 	rm -rf $(VLLM)
 	PYTHON=$(PYTHON) $(REAL)/install.sh $(VLLM)
 	touch $@
+
+# The figures that no change may move unseen (benchmarks/vitals.py); six minutes. DATA: recorded data, if there is any.
+DATA ?= ../shared/data
+vitals: $(INSTALLED)
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/vitals.py --data $(DATA)
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

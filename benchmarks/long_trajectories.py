@@ -1,18 +1,20 @@
 """Are long trajectories made? Generate many, and print how many were made, what was tried, and what a step costs.
 
-python benchmarks/long_trajectories.py [GROUP ...] [--data FOLDER] [--workers 2] [--out FOLDER]
+python benchmarks/long_trajectories.py [GROUP ...] [--data FOLDER] [--workers 2] [--out FOLDER] [--json]
 
 The groups are those of the table in benchmarks/README.md; without any, all are run (two hours of one core). The same
 command with the same --out resumes. Exit code 1 if a trajectory was not made.
 """
 
 import argparse
+import json
 import resource
 import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from infthor_eval.formats.floor_plans import floor_plan_names
 from infthor_eval.generation.generate_set import generate_with_workers
@@ -51,6 +53,7 @@ def groups(data: Path | None) -> dict[str, Group]:
         "1600": Group(tuple(f"kitchen-{number}" for number in range(3, 8)), 1600),
         "2300": Group(("kitchen-7",), 2300, 34, seed=11),
         "5000": Group(_scenes((12, 13)), 5000),
+        "vitals": Group(("kitchen-951", "living-room-952", "bedroom-953", "bathroom-954"), 1000),
     }
     if data is not None:
         names, _ = without_bathrooms(floor_plan_names(data))
@@ -70,33 +73,46 @@ def main() -> int:
     parser.add_argument("--data", type=Path, help="folder with recorded floor plans")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, help="folder of the trajectories; default: temporary")
+    parser.add_argument("--json", action="store_true", help="print the numbers as one JSON object")
     options = parser.parse_args()
     known = groups(options.data)
     unknown = set(options.groups) - known.keys()
     if unknown:
         parser.error(f"unknown group {', '.join(sorted(unknown))}; give some of {', '.join(known)}")
-    columns = (
-        "made",
-        "tries",
-        "steps",
-        "tried",
-        "accepted",
-        "share",
-        "unexecuted",
-        "dead ends",
-        "pool again",
-        "CPU ms/step",
-    )
-    print(f"{'group':10}" + "".join(f"{column:>12}" for column in columns), flush=True)
-    complete = True
+    rows = []
+    if not options.json:
+        print(f"{'group':10}" + "".join(f"{column:>12}" for column in Row.__annotations__), flush=True)
     with tempfile.TemporaryDirectory() as scratch:
         for name in options.groups or known:
-            complete &= run(name, known[name], options.data, (options.out or Path(scratch)) / name, options.workers)
-    return 0 if complete else 1
+            out = (options.out or Path(scratch)) / name
+            row, failures = run(known[name], options.data, out, options.workers)
+            rows.append(row)
+            if not options.json:
+                print(f"{name:10}" + "".join(f"{cell!s:>12}" for cell in row), flush=True)
+            for failure in failures:
+                print(f"  not made: {failure}", file=sys.stderr, flush=True)
+    if options.json:
+        print(json.dumps({name: row._asdict() for name, row in zip(options.groups or known, rows, strict=True)}))
+    return 0 if all(row.made == row.tries for row in rows) else 1
 
 
-def run(name: str, group: Group, data: Path | None, out: Path, workers: int) -> bool:
-    """Generate one group and print its line, and why trajectories were not made; returns True if all were."""
+class Row(NamedTuple):
+    """The numbers of one group: trajectories, their steps, what became of the tasks, and the cost of a step."""
+
+    made: int
+    tries: int
+    steps: int
+    tried: int
+    accepted: int
+    share: float | None
+    unexecuted: int
+    dead_ends: int
+    pool_again: int
+    cpu_ms_step: float | None
+
+
+def run(group: Group, data: Path | None, out: Path, workers: int) -> tuple[Row, list[str]]:
+    """Generate one group; return its numbers, and why trajectories were not made."""
     jobs = list(group.jobs())
     before = processor_seconds()
     launch = embedded_launch(data if group.is_test_set else None)
@@ -104,15 +120,20 @@ def run(name: str, group: Group, data: Path | None, out: Path, workers: int) -> 
     summary = made.summary()
     tried = sum(counts.tried for counts in summary.tasks.values())
     accepted = sum(counts.accepted for counts in summary.tasks.values())
-    share = f"{accepted / tried:.1%}" if tried else "-"
-    per_step = f"{1000 * (processor_seconds() - before) / summary.steps:.1f}" if not summary.resumed else "-"
-    numbers = (len(made.paths), len(jobs), summary.steps, tried, accepted, share)
-    n_not_executed = sum(summary.not_executed.values())
-    cells = (*numbers, n_not_executed, len(summary.roll_backs), summary.pool_restarts, per_step)
-    print(f"{name:10}" + "".join(f"{cell!s:>12}" for cell in cells), flush=True)
-    for failure in made.failures:
-        print(f"  not made: {failure}", flush=True)
-    return not made.failures
+    is_new = summary.steps > 0 and not summary.resumed
+    row = Row(
+        made=len(made.paths),
+        tries=len(jobs),
+        steps=summary.steps,
+        tried=tried,
+        accepted=accepted,
+        share=round(accepted / tried, 4) if tried else None,
+        unexecuted=sum(summary.not_executed.values()),
+        dead_ends=len(summary.roll_backs),
+        pool_again=summary.pool_restarts,
+        cpu_ms_step=round(1000 * (processor_seconds() - before) / summary.steps, 1) if is_new else None,
+    )
+    return row, [str(failure) for failure in made.failures]
 
 
 def processor_seconds() -> float:

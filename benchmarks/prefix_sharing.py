@@ -16,6 +16,7 @@ largest context that fits, for random weights of the real shape:
 """
 
 import argparse
+import json
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -65,6 +66,9 @@ def main() -> None:
                 clear_cache(sharing)
                 measured[name].append(_time(way))
         measured["plain"] = [_time(lambda: answer_one_by_one(not_sharing, *work))]
+        if options.json:
+            print(json.dumps(figures(measured)))
+            return
         report(measured, options)
         machine_report(sharing, frames, options)
 
@@ -83,6 +87,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--attention", default="sdpa", help="attn_implementation")
     parser.add_argument("--chunk-tokens", type=int, default=1024)
     parser.add_argument("--largest", action="store_true", help="find the largest context that fits")
+    parser.add_argument("--json", action="store_true", help="print seconds and factors as one JSON object")
     options = parser.parse_args()
     if options.largest and not options.device.startswith("cuda"):
         parser.error("--largest needs --device cuda, as a CPU swaps memory and has no clear limit")
@@ -173,15 +178,26 @@ def _largest(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
 
 def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> None:
     """Print the fastest time of each way, the factors, and whether all replies are equal."""
+    found = figures(measured)
+    print(f"{options.frames} frames, {options.questions} questions, {options.new_tokens} new tokens each")
+    for name in measured:
+        print(f"{name:8s}{found[name]:9.2f} s")
+    for name in ("plain / batched", "plain / shared", "shared / floor"):
+        print(f"{name:16s}{found[name]:7.2f}")
+    print(f"replies equal    {'yes' if found['replies equal'] else 'NO'}")
+
+
+def figures(measured: dict[str, list[Timed]]) -> dict[str, float | bool]:
+    """Return the fastest seconds of each way, the factors, and whether all replies are equal."""
     best = {name: min(seconds for seconds, _ in runs) for name, runs in measured.items()}
     replies = [reply for runs in measured.values() for _, reply in runs]
-    print(f"{options.frames} frames, {options.questions} questions, {options.new_tokens} new tokens each")
-    for name, seconds in best.items():
-        print(f"{name:8s}{seconds:9.2f} s")
-    print(f"plain / batched  {best['plain'] / best['batched']:6.2f}")
-    print(f"plain / shared   {best['plain'] / best['shared']:6.2f}")
-    print(f"shared / floor   {best['shared'] / best['floor']:6.2f}")
-    print(f"replies equal    {'yes' if all(reply == replies[0] for reply in replies) else 'NO'}")
+    return {
+        **best,
+        "plain / batched": best["plain"] / best["batched"],
+        "plain / shared": best["plain"] / best["shared"],
+        "shared / floor": best["shared"] / best["floor"],
+        "replies equal": all(reply == replies[0] for reply in replies),
+    }
 
 
 def answer_one_by_one(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:

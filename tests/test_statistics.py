@@ -1,6 +1,4 @@
-import importlib.util
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +7,8 @@ from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError
 from infthor_eval.statistics import bootstrap_interval, clustered_mean, mean_over_clusters, paired_difference
+
+from .benchmarks import load_benchmark
 
 scores = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.0]), st.integers(0, 6)), min_size=2, max_size=60)
 
@@ -121,10 +121,7 @@ def test_a_paired_difference_is_surer_than_two_separate_runs():
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says():
-    path = Path(__file__).parents[1] / "benchmarks" / "interval_coverage.py"
-    spec = importlib.util.spec_from_file_location("interval_coverage", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = load_benchmark("interval_coverage")
     clustered, independent = module.coverage(600, 60, 0.7)
     assert 0.92 <= clustered <= 0.98
     assert independent < 0.8

@@ -1,7 +1,6 @@
 """A wheel works away from the checkout: what it needs beside the code is in it."""
 
 import os
-import shutil
 import subprocess
 import sys
 import zipfile
@@ -9,28 +8,20 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
-SOURCES = ("infthor_eval", "model_adapters", "tasks", "results/published")
-FILES = ("results/README.md", "README.md", "LICENSE", "pyproject.toml", "setup.py")
-QUIETLY = ("--quiet", "--disable-pip-version-check", "--no-index", "--no-deps")
+from .benchmarks import load_benchmark
+
+BUILDING = load_benchmark("wheel_size")
 
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")  # setuptools writes into it
-    for name in SOURCES:
-        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in FILES:
-        shutil.copy(ROOT / name, source / name)
-    pip("wheel", "--no-build-isolation", "--wheel-dir", out, source)
-    (found,) = out.iterdir()
-    return found
+    return BUILDING.build_wheel(tmp_path_factory.mktemp("built"))
 
 
 @pytest.fixture(scope="module")
 def installed(wheel, tmp_path_factory):
     target = tmp_path_factory.mktemp("installed")
-    pip("install", "--target", target, wheel)
+    BUILDING.pip("install", "--target", target, wheel)
     return target
 
 
@@ -50,13 +41,11 @@ def command(installed, tmp_path):
     return command
 
 
-def pip(*words):
-    subprocess.run([sys.executable, "-m", "pip", words[0], *QUIETLY, *words[1:]], check=True)
-
-
 def test_all_data_of_the_packages_is_in_it(wheel):
     packed = set(zipfile.ZipFile(wheel).namelist())
-    ours = {str(path.relative_to(ROOT)) for name in SOURCES for path in (ROOT / name).rglob("*") if path.is_file()}
+    root = BUILDING.ROOT
+    files = [path for name in BUILDING.SOURCES for path in (root / name).rglob("*") if path.is_file()]
+    ours = {str(path.relative_to(root)) for path in files}
     moved = {f"infthor_eval/{path}" if path.startswith(("tasks/", "results/")) else path for path in ours}
     missing = {path for path in moved - packed if "__pycache__" not in path}
     assert missing == set()

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.plans.environment import Ended, PlanEnvironment
 from infthor_eval.plans.expert import ExpertRefusedError
@@ -16,9 +15,8 @@ from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
+from ..bundled import BUNDLED, bundled_name
 from .cut import LAMP, whole
-
-SET = packaged_folder("sets/nieh_mini")
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +25,8 @@ def simulator():
         yield simulator
 
 
-def trajectory(name: str = "kitchen-2-seed4") -> Trajectory:
-    return next(iter_trajectories(SET / "metadata" / name / "traj_data.json"))
+def trajectory(scene: str = "kitchen-2") -> Trajectory:
+    return next(iter_trajectories(BUNDLED / "metadata" / bundled_name(scene) / "traj_data.json"))
 
 
 def play(environment, plan):
@@ -122,7 +120,7 @@ def test_the_history_is_the_sequence_that_models_are_trained_on(simulator, tmp_p
     play(environment, last)
     past = environment.past(last)
     text = "".join(part if isinstance(part, str) else "<image>" for segment in past.all for part in segment.parts())
-    text_file = (SET / "metadata" / found.traj_id / "traj.txt").read_text().strip()
+    text_file = (BUNDLED / "metadata" / found.traj_id / "traj.txt").read_text().strip()
     assert text_file.startswith(text)
     assert text_file[len(text) :].startswith("<|act|>")
 
@@ -178,7 +176,7 @@ def test_an_expert_that_is_refused_here_is_named_and_the_plans_before_go_on(simu
 
 
 def test_a_task_without_a_goal_is_named(tmp_path):
-    document = json.loads((SET / "metadata" / "kitchen-2-seed4" / "traj_data.json").read_text())
+    document = json.loads((BUNDLED / "metadata" / bundled_name("kitchen-2") / "traj_data.json").read_text())
     document["sub_tasks"][0]["task_info"]["goal"] = ""
     path = tmp_path / "trajectory.json"
     path.write_text(json.dumps(document))
@@ -187,7 +185,7 @@ def test_a_task_without_a_goal_is_named(tmp_path):
 
 
 def test_preparing_a_plan_does_not_take_longer_the_later_it_is(simulator):
-    environment = PlanEnvironment(trajectory("living-room-2-seed4"), simulator)
+    environment = PlanEnvironment(trajectory("living-room-2"), simulator)
     last = len(environment.plans) - 1
     environment.reset(last)
     calls = []
@@ -204,7 +202,7 @@ def test_preparing_a_plan_does_not_take_longer_the_later_it_is(simulator):
 
 def test_a_simulator_that_keeps_no_copies_repeats_what_was_done(simulator, monkeypatch):
     """As Unity does."""
-    found = trajectory("bedroom-1-seed7")
+    found = trajectory("bedroom-1")
     expected = PlanEnvironment(found, simulator).reset(3)
     query = simulator.query
     unsaved = query("Pass")

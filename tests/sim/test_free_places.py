@@ -1,8 +1,5 @@
 """Things are put where there is room for them, by what is drawn: counted by points in solids, and by hand."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,21 +11,14 @@ from infthor_eval.sim.object_types import OBJECT_TYPES, allowed_in
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.solids import Wall, opening_space, part_boxes
 
+from ..benchmarks import load_benchmark
 from .harness import Bench
 
 ROOMS = ("kitchen", "living-room", "bedroom", "bathroom")
 LOOSE = sorted(name for name, declared in OBJECT_TYPES.items() if declared.pickupable)
 
 
-def benchmark():
-    path = Path(__file__).parents[2] / "benchmarks" / "interpenetrations.py"
-    spec = importlib.util.spec_from_file_location("interpenetrations", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-COUNTING = benchmark()
+COUNTING = load_benchmark("interpenetrations")
 
 
 @pytest.mark.parametrize("kind", ROOMS)

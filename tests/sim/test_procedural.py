@@ -6,6 +6,7 @@ import pytest
 from infthor_eval.sim.errors import ActionError
 from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.sim.scenes.procedural import SCENE_TYPES
+from infthor_eval.sim.solids import part_boxes
 
 from .harness import Bench
 
@@ -40,8 +41,10 @@ def test_nothing_stands_in_another_thing(scene):
             apart = other is item or other.object_id == item.parent or item.object_id == other.parent
             if apart or not (other.type.pickupable or other.object_type in STANDING):
                 continue
-            overlap = np.minimum(item.bounds()[1], other.bounds()[1]) - np.maximum(item.bounds()[0], other.bounds()[0])
-            assert overlap.min() < 0.004, f"{item.object_id} stands in {other.object_id}"
+            boxes = [other.bounds()] if other.type.pickupable else part_boxes(other)
+            for low, high in boxes:
+                overlap = np.minimum(item.bounds()[1], high) - np.maximum(item.bounds()[0], low)
+                assert overlap.min() < 0.004, f"{item.object_id} stands in {other.object_id}"
 
 
 @pytest.mark.parametrize("scene_type", SCENE_TYPES)

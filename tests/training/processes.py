@@ -102,8 +102,11 @@ def gradients_of(model: SequenceModel) -> dict[str, Tensor]:
 
 
 def train(checkpoint: LoadedCheckpoint, folder: Path, frames: list[FrameRef], ranks: Ranks) -> list[Progress]:
-    """Two steps of a loop, the first at learning rate 0: so the optimizer has the sum of gradients at equal weights."""
-    model = SequenceModel(checkpoint).requires_grad_(True)
+    """Two steps of a loop, the first at learning rate 0: so the optimizer has the sum of gradients at equal weights.
+
+    In double precision: what differs in how a processor adds up single ones is as large as a small fault would be.
+    """
+    model = SequenceModel(checkpoint).requires_grad_(True).double()
     model.zero_grad()
     sequences = [
         sequence(checkpoint, frames[: number + 1], answer, f"sequence {number}")
@@ -128,7 +131,7 @@ def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
         for n_context, ranks in grids.items():
             results[case, n_context] = _run(case, frames, ranks)
     results["left behind"] = [name for name in ALL_ATTENTION_FUNCTIONS if "context" in name]
-    results["loop"] = train(_loaded("qwen2.5-vl"), folder / "loop", frames, grids[2])
+    results["loop"] = train(loaded("qwen2.5-vl"), folder / "loop", frames, grids[2])
     results["refused"] = _refusals(frames, grids[2])
     results["out of shards"] = _out_of_shards()
     if rank == 0:

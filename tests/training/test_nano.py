@@ -26,6 +26,8 @@ from infthor_eval.training.nano.stages import train_small_model
 from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from model_adapters import check_adapter, load
 
+from ..bundled import bundled_name
+
 SMALL = NanoRecipe(
     title="small",
     hidden=64,
@@ -45,7 +47,7 @@ SMALL = NanoRecipe(
 @pytest.fixture(scope="module")
 def small_set(bundled_set, tmp_path_factory):
     """Two trajectories of the bundled set, and the questions on them."""
-    root, names = tmp_path_factory.mktemp("small"), ("bedroom-1-seed7", "kitchen-2-seed4")
+    root, names = tmp_path_factory.mktemp("small"), (bundled_name("bedroom-1"), bundled_name("kitchen-2"))
     for name in names:
         shutil.copytree(bundled_set / "metadata" / name, root / "metadata" / name)
     questions = [item for item in NiehSet(bundled_set).questions if item.traj_id in names]
@@ -201,7 +203,7 @@ def test_histories_are_windows_or_single_plans(small_set, blank):
 
 def test_what_cannot_be_read_is_skipped_and_reported(small_set, tmp_path):
     shutil.copytree(small_set, tmp_path / "set")
-    (tmp_path / "set/metadata/kitchen-2-seed4/traj_data.json").unlink()
+    (tmp_path / "set/metadata" / bundled_name("kitchen-2") / "traj_data.json").unlink()
     notes = []
     train_small_model(
         msgspec.structs.replace(SMALL, vision_steps=1, text_steps=1, joint_steps=1),

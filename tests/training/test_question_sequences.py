@@ -25,7 +25,7 @@ def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny,
     for loaded in (chat_tiny, plain_tiny):
         encoder = Encoder(loaded)
         sequences = build(encoder, bundled_set)
-        assert len(sequences) == len(samples.samples) == 136
+        assert len(sequences) == len(samples.samples) > 100
         for sequence, sample in zip(sequences, samples.samples, strict=True):
             context, text = samples.request(sample)
             asked = encoder._prompter.pieces([Turn("user", (*context, text))])

@@ -1,0 +1,10 @@
+"""The bundled set's trajectories by their scene: their seeds change when the set is made again."""
+
+from infthor_eval.formats.packaged import packaged_folder
+
+BUNDLED = packaged_folder("sets/nieh_mini")
+
+
+def bundled_name(scene: str) -> str:
+    (found,) = (BUNDLED / "metadata").glob(f"{scene}-seed*")
+    return found.name
