@@ -87,7 +87,7 @@ class Outcome(msgspec.Struct):
         figure = self.figure
         if self.now is None:
             return f"{figure.name:62} {self.problem or 'left out: needs --data'}"
-        verdict = "MOVED" if self.has_moved else ""
+        verdict = "new" if figure.value is None else "MOVED" if self.has_moved else ""
         return f"{figure.name:62} {_text(self.now):>9} {_text(figure.value):>9} {_text(figure.aim):>9}  {verdict}"
 
 

@@ -31,11 +31,17 @@ def vitals(tmp_path: Path, *words: str, command=("python", "-c", PRINTS), **fiel
 
 
 @pytest.mark.parametrize(
-    ("value", "moved"), [(4.5, False), (4.7, False), (4.3, False), (4.71, True), (4.2, True), (None, True)]
+    ("value", "moved"), [(4.5, False), (4.7, False), (4.3, False), (4.71, True), (4.2, True)]
 )
 def test_what_is_within_the_noise_has_not_moved(tmp_path, value, moved):
     code, shown, _ = vitals(tmp_path, value=value)
     assert (code, "MOVED" in shown) == ((1, True) if moved else (0, False))
+
+
+def test_what_was_never_measured_is_new_and_is_to_be_committed(tmp_path):
+    code, shown, _ = vitals(tmp_path, value=None)
+    assert code == 1
+    assert "new" in shown
 
 
 def test_a_move_is_committed_with_its_reason_and_has_then_not_moved(tmp_path):
