@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from infthor_eval.sim.default_objects import default_object
 from infthor_eval.sim.free_places import find_place
+from infthor_eval.sim.geometry import aabb_overlap
 from infthor_eval.sim.object_types import OBJECT_TYPES, allowed_in
 from infthor_eval.sim.objects import SimObject
 from infthor_eval.sim.receptacles import surfaces
@@ -24,6 +25,7 @@ STANDS = sorted(
 )  # fmt: skip
 NEAR = 0.012  # metres between a thing and what it stands on
 WALL = 0.012  # metres of the wall of a drawn vessel, which has none
+SLIDE = 0.5  # metres by which drawings may be out of their boxes, as open drawers are
 RISE = 0.03  # metres above its underside at which what it stands on is looked for
 
 
@@ -45,14 +47,24 @@ def in_solid(row: np.ndarray, points: np.ndarray) -> np.ndarray:
     return within & (bottom | ((radius - away) * wide < WALL))
 
 
+def parts_below(world: World, placed: SimObject, deep: float) -> np.ndarray:
+    """The drawn primitives of other things that reach into the space below a thing, `deep` metres down."""
+    low, high = placed.bounds()
+    around = np.array([SLIDE, deep, SLIDE])
+    near = []
+    for other in world.objects.values():
+        if other is placed or not aabb_overlap(*other.bounds(), low - around, high + around):
+            continue
+        near.append(rows(shape(other), other.position, other.matrix, 0))
+    return np.concatenate(near)
+
+
 def gap_below(world: World, placed: SimObject) -> float:
     """Metres from the underside of a thing down to the first drawn solid under one of 25 points of it."""
     low, high = placed.bounds()
     shares = np.linspace(0.05, 0.95, 5)
     depths = np.arange(-RISE, 0.3, 0.002)
-    parts = np.concatenate([
-        rows(shape(other), other.position, other.matrix, 0) for other in world.objects.values() if other is not placed
-    ])  # fmt: skip
+    parts = parts_below(world, placed, float(depths[-1]))
     gaps = []
     for x in low[0] + shares * (high - low)[0]:
         for z in low[2] + shares * (high - low)[2]:
