@@ -41,16 +41,16 @@ class _Obstacles:
     fixed: list[Box]
     walls: list[Wall]
 
-    def clear_of(self, points: Array, size: Array, ghost: SimObject, overlap: float) -> NDArray[np.bool_]:
+    def clear_of(self, points: Array, size: Array, around: Array, overlap: float) -> NDArray[np.bool_]:
         """Return at which of some points (n, 3) a thing of a size (3,) metres stands clear of all.
 
         Args:
-            ghost: the thing, turned as it will be.
+            around: points of its outline from above, turned as it will be, metres from its middle (m, 2).
             overlap: share of their size by which loose things may overlap.
         """
         free = _apart(points, size, self.fixed, 0.0) & _apart(points, size, self.loose, overlap)
         for wall in self.walls:
-            free &= wall.holds(points, outline(ghost))
+            free &= wall.holds(points, around)
         return free
 
 
@@ -97,14 +97,26 @@ def find_place(
             obstacles = _Obstacles([*boxes, *fixed], [], [])  # recorded boxes are too large to be taken for solid
         else:
             fixed = list(_solid_boxes(world, item, receptacle, surface))
-            obstacles = _Obstacles(boxes, fixed, _inner_walls(receptacle))
+            walls = [wall for outer in (receptacle, *world.ancestors(receptacle)) for wall in _inner_walls(outer)]
+            obstacles = _Obstacles(boxes, fixed, walls)
         for turn in (0.0, 90.0):
             ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
-            place = _free_point(world, ghost, surface, obstacles, overlap, random, point_filter)
+            around = _outline_with_contents(world, item, ghost) if obstacles.walls else np.zeros((0, 2))
+            place = _free_point(world, ghost, surface, obstacles, around, overlap, random, point_filter)
             if place is not None:
                 ghost.place_bottom(place)
                 return ghost
     return None
+
+
+def _outline_with_contents(world: World, item: SimObject, ghost: SimObject) -> Array:
+    """Return points of a thing's outline and of that of what it holds, turned as `ghost` is; see `outline`."""
+    turn = yaw_matrix(float(ghost.rotation[1] - item.rotation[1]))
+    parts = [outline(ghost)]
+    for content in world.descendants(item):
+        spread = outline(content) + (content.center - item.center)[[0, 2]]
+        parts.append(spread @ turn[np.ix_([0, 2], [0, 2])].T)
+    return np.concatenate(parts)
 
 
 def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterator[SimObject]:
@@ -137,7 +149,7 @@ def _solid_boxes(world: World, item: SimObject, receptacle: SimObject, surface: 
     low = surface.center - np.array([reach, -_SOFT, reach])
     high = surface.center + np.array([reach, item.box_size.max() * 2, reach])
     around = {outer.object_id for outer in world.ancestors(receptacle)}
-    boxes = _inner_boxes(receptacle)
+    boxes = [box for outer in (receptacle, *world.ancestors(receptacle)) for box in _inner_boxes(outer)]
     for other in world.objects.values():
         apart = other is not receptacle and other.object_id not in around
         if apart and not other.type.pickupable and other.object_type != "Floor":
@@ -217,6 +229,7 @@ def _free_point(
     ghost: SimObject,
     surface: Surface,
     obstacles: _Obstacles,
+    around: Array,
     overlap: float,
     random: np.random.Generator | None,
     point_filter: PointFilter | None,
@@ -233,7 +246,7 @@ def _free_point(
         return None
     if point_filter is not None:
         points = points[point_filter(points + np.array([0.0, height / 2, 0.0]))]
-    chosen = points[obstacles.clear_of(points, high - low, ghost, overlap)]
+    chosen = points[obstacles.clear_of(points, high - low, around, overlap)]
     if not len(chosen):
         return None
     return chosen[0] if random is None else chosen[int(random.integers(len(chosen)))]
