@@ -1,14 +1,18 @@
-"""The frames of each low-level action (`expert_log.json`): one each in our sets, possibly several in others."""
+"""The frames of each low-level action: one each in our sets, possibly several in others.
 
-from collections.abc import Mapping
+They are in `expert_log.json`, or in the step log of the layout that the branch `dev` reads.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.reading import read_json
+from infthor_eval.formats.step_log import Step
 
-__all__ = ["read_action_log"]
+__all__ = ["logged_action_frames", "read_action_log"]
 
 _HINT = "replay it again"
 
@@ -28,9 +32,24 @@ def read_action_log(path: Path, places: Mapping[str, int]) -> dict[int, tuple[in
     Raises:
         DataError: the file is missing, has another form, or names frames that are not in `places`.
     """
-    frames: dict[int, list[int]] = {}
     log = read_json(path, _HINT, _Log)
     with wrap_errors(f"{path}: not a log of actions and their frames", _HINT, catch=KeyError):
-        for image in log.images:
-            frames.setdefault(image.low_idx, []).append(places[Path(image.image_name).stem])
-    return {action: tuple(frames[action]) for action in sorted(frames)}
+        return _by_action((image.low_idx, places[Path(image.image_name).stem]) for image in log.images)
+
+
+def logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] | None:
+    """Return the frames, by their position, of each low-level action by the step log; None if it does not say.
+
+    As in the published loader, frames of action 0 are left out with those before the first action: both have 0 there.
+    """
+    if all(step.low_idx is None for step in steps):
+        return None
+    return _by_action((step.low_idx, place) for place, step in enumerate(steps) if step.low_idx)
+
+
+def _by_action(frames: Iterable[tuple[int, int]]) -> dict[int, tuple[int, ...]]:
+    """Return frames by their actions, in the order of these."""
+    found: dict[int, list[int]] = {}
+    for action, place in frames:
+        found.setdefault(action, []).append(place)
+    return {action: tuple(found[action]) for action in sorted(found)}

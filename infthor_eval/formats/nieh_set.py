@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.action_log import read_action_log
+from infthor_eval.formats.action_log import logged_action_frames, read_action_log
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.outline import Outline, find_outline, read_outline, read_states
 from infthor_eval.formats.qa_csv import read_questions
@@ -173,13 +173,23 @@ class NiehSet:
     def action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
         """Return the positions in time order of the frames of each low-level action that has any.
 
+        They come from `expert_log.json`, or else from a step log that names the action of each frame.
+
         Raises:
-            DataError: `expert_log.json` is missing, or names frames that the trajectory does not have.
+            DataError: neither says, or `expert_log.json` names frames that the trajectory does not have.
         """
         if traj_id not in self._action_frames:
-            places = {frame.path.stem: place for place, frame in enumerate(self.frames(traj_id))}
-            self._action_frames[traj_id] = read_action_log(self.folder(traj_id) / "expert_log.json", places)
+            self._action_frames[traj_id] = self._read_action_frames(traj_id)
         return self._action_frames[traj_id]
+
+    def _read_action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
+        path = self.folder(traj_id) / "expert_log.json"
+        if not path.exists():
+            logged = logged_action_frames(sorted(read_steps(self.folder(traj_id)), key=lambda step: step.img_idx))
+            if logged is not None:
+                return logged
+        places = {frame.path.stem: place for place, frame in enumerate(self.frames(traj_id))}
+        return read_action_log(path, places)
 
     def states(self, traj_id: str) -> dict[int, str]:
         """Return the states of a trajectory in words, by low-level action.

@@ -1,14 +1,16 @@
 """The log of a replayed trajectory: `metadata/<traj_id>/metadata.json`, one entry per frame.
 
-Published data have three layouts, and all are read: a list of entries, a single entry, and a dict of columns. Published
-entries have `img_idx`, `img_filename`, `step` and `object_log`. Ours add optional fields for the question rules and
-their checker, so that either kind of log can be read by either kind of reader.
+Published data have four layouts (`Layout`), and all are read. In the last one `img_idx` is a list of objects with
+`low_idx` and `img_filename`, as the loader of the branch `dev` reads it. Published entries have `img_idx`,
+`img_filename`, `step` and `object_log`. Ours add optional fields for the question rules and their checker, so that
+either kind of log can be read by either kind of reader.
 
 Frame 0 shows the scene before the first action, frame k + 1 the outcome of low-level action k. `step` is the index of
 that action. Frame 0 has step 0, as in the published logs, and no `action`.
 """
 
 from collections.abc import Iterator, Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +20,29 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.reading import read_json
 
 __all__ = [
+    "Layout",
     "LoggedPose",
     "ObjectInFrame",
     "ObjectLog",
     "ObjectState",
     "Step",
     "iter_object_states",
+    "layout_of",
     "read_steps",
     "write_steps",
 ]
 
 _FILE = "metadata.json"
 _HINT = "replay the trajectory again or restore the published file"
+
+
+class Layout(StrEnum):
+    """The layouts of published step logs."""
+
+    LIST = "a list of entries"
+    ENTRY = "one entry"
+    COLUMNS = "columns"
+    OBJECTS = "img_idx as objects"
 
 
 class ObjectLog(msgspec.Struct, omit_defaults=False):
@@ -113,6 +126,7 @@ class Step(msgspec.Struct, omit_defaults=True):
         img_idx: number of the frame.
         img_filename: name of the frame's file.
         step: index of the low-level action before the frame (see the module's docstring).
+        low_idx: the same in the layout of `dev`, where it is null or 0 before the first action; None in the others.
         object_log: the published fields.
         action: text of that action ("PickupObject Mug"); None at the first frame and in published logs.
         success: True if the simulator accepted the action.
@@ -128,6 +142,7 @@ class Step(msgspec.Struct, omit_defaults=True):
     img_idx: int
     img_filename: str
     step: int = 0
+    low_idx: int | None = None
     object_log: ObjectLog = msgspec.field(default_factory=ObjectLog)
     action: str | None = None
     success: bool = True
@@ -168,15 +183,41 @@ def iter_object_states(steps: Sequence[Step]) -> Iterator[dict[str, ObjectState]
         yield states
 
 
-def _entries(path: Path, document: object) -> list[dict[str, Any]]:
-    """Return the entries of any of the three layouts as a list of dicts."""
+def layout_of(folder: Path) -> Layout:
+    """Return the layout of the log of the trajectory in `metadata/<traj_id>`.
+
+    Raises:
+        DataError: the file is missing, not JSON, or has none of the known layouts.
+    """
+    path = Path(folder) / _FILE
+    return _layout(path, read_json(path, _HINT))
+
+
+def _layout(path: Path, document: Any) -> Layout:
     if isinstance(document, list):
-        return document
+        return Layout.LIST
     if not isinstance(document, dict) or "img_idx" not in document:
         raise DataError(f"{path}: neither a list of entries nor columns with 'img_idx'; {_HINT}")
-    if not isinstance(document["img_idx"], list):
-        return [document]
-    return _rows(path, document)
+    frames = document["img_idx"]
+    if not isinstance(frames, list):
+        return Layout.ENTRY
+    are_objects = bool(frames) and all(isinstance(frame, dict) for frame in frames)
+    return Layout.OBJECTS if are_objects else Layout.COLUMNS
+
+
+def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
+    """Return the entries of any layout as a list of dicts."""
+    match _layout(path, document):
+        case Layout.LIST:
+            return list(document)
+        case Layout.ENTRY:
+            return [document]
+        case Layout.COLUMNS:
+            return _rows(path, document)
+        case Layout.OBJECTS:
+            # A frame's number is its place, unless it has one.
+            listed = enumerate(document["img_idx"])
+            return [{"img_idx": place, "step": frame.get("low_idx") or 0, **frame} for place, frame in listed]
 
 
 def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:

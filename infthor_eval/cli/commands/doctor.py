@@ -12,19 +12,21 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Literal
 
 import click
 import msgspec
 from rich.text import Text
 
+from infthor_eval.cli.checks import Check
 from infthor_eval.cli.help import ExampleCommand
-from infthor_eval.errors import in_one_line
+from infthor_eval.cli.options.values import PATH
+from infthor_eval.cli.set_checks import set_checks
+from infthor_eval.errors import UsageError, in_one_line
 from infthor_eval.formats.hub_data import default_folder
 from infthor_eval.formats.user_cache import user_cache
 from infthor_eval.terminal import console, print_line, printable
 
-__all__ = ["Check", "checks", "command"]
+__all__ = ["checks", "command"]
 
 _STYLES = {"ok": "green", "optional": "yellow", "wrong": "red"}
 _HUB_TIMEOUT_S = 2.0
@@ -39,32 +41,22 @@ _EXTRAS = {
 }
 
 
-class Check(msgspec.Struct, frozen=True):
-    """The result of one check.
-
-    Attributes:
-        name: what is checked.
-        state: "ok"; "optional" if it is missing and only some uses need it; "wrong" if every use needs it.
-        detail: what is installed, or what is missing.
-        hint: how to fix it; empty if there is nothing to fix.
-    """
-
-    name: str
-    state: Literal["ok", "optional", "wrong"]
-    detail: str
-    hint: str = ""
-
-
-@click.command("doctor", cls=ExampleCommand, example="infthor-eval doctor")
+@click.command("doctor", cls=ExampleCommand, example="infthor-eval doctor --data SET")
+@click.option("--data", type=PATH, help="Read this NIEH set whole instead, and say what it has and what can be asked.")
+@click.option("--trajectories", type=PATH, help="Folder of the set's trajectories, if they are not in the set.")
 @click.option("--json", "as_json", is_flag=True, help="Print the checks as JSON.")
-def command(as_json: bool) -> int:
+def command(data: Path | None, trajectories: Path | None, as_json: bool) -> int:
     """Check the installation and suggest fixes: Python, torch, simulators, the hub, disk, data.
 
-    Exit code 1 if something is missing that every use needs.
+    With --data it checks an NIEH set: its questions, frames and logs, and what each task can ask of it.
+
+    Exit code 1 if something is missing that every use needs, or if nothing can be asked of the set.
     """
+    if trajectories is not None and data is None:
+        raise UsageError("--trajectories is of a set; give its folder with --data")
     results = []
     on = console()
-    for check in checks():
+    for check in checks() if data is None else set_checks(data, trajectories):
         results.append(check)
         if not as_json:
             state = (f"{check.state:9}", _STYLES[check.state])

@@ -5,7 +5,11 @@ import time
 
 import pytest
 
+from infthor_eval.cli.checks import Check
 from infthor_eval.cli.commands import doctor as checks
+from infthor_eval.formats.question import Question
+
+from ...bundled import BUNDLED
 
 TOKEN = "hf_of_nobody_0123456789"
 
@@ -42,7 +46,7 @@ def test_people_read_lines(run):
 
 
 def test_a_missing_requirement_sets_the_exit_code(run, monkeypatch):
-    monkeypatch.setattr(checks, "_torch", lambda: checks.Check("torch", "wrong", "none", "pip install torch"))
+    monkeypatch.setattr(checks, "_torch", lambda: Check("torch", "wrong", "none", "pip install torch"))
     code, out, _ = run("doctor")
     assert code == 1
     assert "wrong    torch: none\n         pip install torch" in out
@@ -52,3 +56,63 @@ def test_a_missing_requirement_sets_the_exit_code(run, monkeypatch):
 def test_a_hub_that_refuses_is_reported_at_once(url, monkeypatch):
     monkeypatch.undo()
     assert checks._connection_problem(url)
+
+
+def checks_of(run, *words):
+    code, out, err = run("doctor", *words, "--json")
+    assert err == ""
+    return code, {check["name"]: check for check in json.loads(out)}
+
+
+def test_a_set_is_read_whole_and_what_can_be_asked_is_said(run):
+    code, by_name = checks_of(run, "--data", str(BUNDLED))
+    assert code == 0
+    rows = (BUNDLED / "qa_set_nieh_mini.csv").read_text().count("\n") - 1
+    assert by_name["questions qa_set_nieh_mini"]["detail"].startswith(f"{rows}: object_presence")
+    assert by_name["trajectories"]["detail"].startswith("6 of 6 can be read")
+    assert by_name["pictures"]["detail"] == "in img; 300x300 pixels"
+    assert by_name["step logs"]["detail"] == "a list of entries"
+    assert by_name["task nieh_full"]["detail"] == f"{rows} of {rows} samples can be asked"
+    assert "the window reaches outside" in by_name["task nieh_haystack_1m"]["hint"]
+    assert "left out" not in by_name
+
+
+def test_what_a_set_lacks_is_counted_by_reason(run, make_nieh_set):
+    asked = Question("t", "Have you seen a mug?", (1,), ("yes",))
+    root = make_nieh_set([asked, Question("t", "q", (99,), ("a",)), Question("t", "q", (98,), ("a",))])
+    (root / "metadata" / "other").mkdir()
+    (root / "qa_set_x.csv").write_text("traj_id,question,gt_img_idx,answer\ngone,q,[1],['a']\nt,q,[1,['a']\n")
+    (root / "metadata" / "t" / "expert_log.json").unlink(missing_ok=True)
+    code, by_name = checks_of(run, "--data", str(root))
+    assert code == 0
+    assert by_name["rows"]["detail"].startswith("1 are no question: ")
+    assert "3 questions: " in by_name["left out"]["detail"]
+    assert "trajectory gone is not in metadata/ (1)" in by_name["left out"]["detail"]
+    assert by_name["trajectories"]["detail"].startswith("1 of 2 can be read")
+    assert by_name["trajectories"]["detail"].endswith("; 1 more without a question")
+    assert by_name["unreadable trajectories"]["detail"] == "1 cannot be read"
+    assert by_name["task nieh_gt"]["detail"] == "1 of 5 samples can be asked"
+
+
+def test_a_set_of_which_nothing_can_be_asked_sets_the_exit_code(run, make_nieh_set):
+    root = make_nieh_set([Question("t", "q", (99,), ("a",))])
+    code, by_name = checks_of(run, "--data", str(root))
+    assert code == 1
+    assert by_name["questions"]["detail"] == "none can be asked"
+
+
+def test_question_files_alone_have_no_frames(run, tmp_path):
+    (tmp_path / "qa_set_x.csv").write_text("traj_id,question,gt_img_idx,answer\nt,q,[1],['a']\n")
+    code, by_name = checks_of(run, "--data", str(tmp_path))
+    assert code == 0
+    assert "metadata.tar" in by_name["frames"]["hint"]
+    assert checks_of(run, "--data", str(tmp_path / "qa_set_x.csv")) == (code, by_name)
+
+
+def test_what_is_no_set_is_one_line(run, tmp_path):
+    code, _, err = run("doctor", "--data", str(tmp_path))
+    assert code == 2
+    assert err.count("\n") == 1 and "qa_set" in err
+    code, _, err = run("doctor", "--trajectories", str(tmp_path))
+    assert code == 2
+    assert "--data" in err

@@ -1,0 +1,122 @@
+"""What an NIEH set has, and what of it can be asked, counted over the whole set."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.formats.question_forms import type_of
+from infthor_eval.formats.step_log import Layout, layout_of
+from infthor_eval.nieh.samples import find_samples
+from infthor_eval.runs import Catalog
+
+__all__ = ["AskedTask", "SetContents", "read_asked_tasks", "read_contents"]
+
+# Contexts whose frames are chosen by a model; which questions they can be asked with is that of whole trajectories.
+_BY_MODEL = frozenset({"clip_retrieval", "memory"})
+_QWEN_FRAME = 121  # tokens of a frame of 300x300 in Qwen2.5-VL, for contexts that are measured in tokens
+
+
+@dataclass
+class SetContents:
+    """What a set has.
+
+    Attributes:
+        questions: numbers of questions by type, by question file; rows that are no question are not among them.
+        malformed: numbers of such rows by reason.
+        left_out: numbers of questions that cannot be asked whatever is shown, by reason.
+        n_trajectories: number of trajectories that the questions name.
+        n_unasked: number of folders of trajectories without a question.
+        frames: number of frames of each trajectory that can be read.
+        layouts: numbers of trajectories by the layout of their step log.
+        image_folders: numbers of trajectories by the name of their folder of frames.
+        image_sizes: numbers of trajectories by width and height of their first frame, pixels.
+        unreadable: reasons of the trajectories that cannot be read.
+    """
+
+    questions: dict[str, Counter[str]] = field(default_factory=dict)
+    malformed: Counter[str] = field(default_factory=Counter)
+    left_out: Counter[str] = field(default_factory=Counter)
+    n_trajectories: int = 0
+    n_unasked: int = 0
+    frames: list[int] = field(default_factory=list)
+    layouts: Counter[Layout] = field(default_factory=Counter)
+    image_folders: Counter[str] = field(default_factory=Counter)
+    image_sizes: Counter[tuple[int, int]] = field(default_factory=Counter)
+    unreadable: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class AskedTask:
+    """What of a set a task can ask.
+
+    Attributes:
+        name: of the task.
+        n_asked: number of samples.
+        skipped: numbers of samples that cannot be asked, by reason.
+    """
+
+    name: str
+    n_asked: int
+    skipped: Counter[str]
+
+
+def read_contents(root: Path) -> SetContents:
+    """Read a set whole; what cannot be read is counted by reason.
+
+    Raises:
+        DataError: the folder is no set.
+    """
+    data = NiehSet(root)
+    found = SetContents()
+    for name, rows in data.files.items():
+        asked = [row for row in rows if isinstance(row, Question)]
+        found.questions[name] = Counter(row.question_type or type_of(row.text) for row in asked)
+    found.malformed.update(row.reason for row in data.malformed)
+    found.left_out.update(data.reasons() - found.malformed)
+    named = {row.traj_id for rows in data.files.values() for row in rows if isinstance(row, Question)}
+    found.n_trajectories = len(named)
+    if data.has_frames:
+        folders = [path.name for path in data.folder("").iterdir() if path.is_dir()]
+        found.n_unasked = len(set(folders) - named)
+        for traj_id in sorted(named):
+            _read_trajectory(data, traj_id, found)
+    return found
+
+
+def _read_trajectory(data: NiehSet, traj_id: str, found: SetContents) -> None:
+    try:
+        frames = data.frames(traj_id)
+        layout = layout_of(data.folder(traj_id))
+    except DataError as error:
+        found.unreadable.append(str(error))
+        return
+    found.frames.append(len(frames))
+    found.layouts[layout] += 1
+    if frames:
+        found.image_folders[frames[0].path.parent.name] += 1
+        if frames[0].problem() is None:
+            with Image.open(frames[0].path) as image:
+                found.image_sizes[image.size] += 1
+
+
+def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[AskedTask]:
+    """Yield for each task of NIEH that the package has what of a set it can ask.
+
+    Contexts that are measured in tokens count a frame as Qwen2.5-VL does. Tasks whose context a model chooses, and
+    those of the bundled set, are left out.
+    """
+    for name, task in sorted(Catalog.find_packaged().tasks.items()):
+        settings: dict[str, Any] = task.settings.get("dataset_kwargs") or {}
+        context = settings.get("context")
+        if not name.startswith("nieh") or "bundled" in settings or context is None or context in _BY_MODEL:
+            continue
+        more = {} if trajectories is None else {"trajectories": str(trajectories)}
+        samples = find_samples({"data": str(root), "tokens_per_frame": _QWEN_FRAME, "seed": 0, **settings, **more})
+        yield AskedTask(name, len(samples.samples), Counter(item.reason for item in samples.skipped))
