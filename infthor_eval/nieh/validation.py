@@ -1,7 +1,8 @@
 """Cross-validation of questions (paper, A.1.3): a filter over the replies of several models to the clue frames.
 
-A question is kept if at least one model answers it correctly. One with several clues that no model answers may still be
-a good, hard question: a person inspects it and decides. All others are rejected.
+A question is kept if at least one model answers it correctly: with full marks by default, with any part of them in the
+published filter (of its 829 questions with one clue 20 have partial credit alone). One with several clues that no model
+answers may still be a good, hard question: a person inspects it and decides. All others are rejected.
 """
 
 import itertools
@@ -21,6 +22,7 @@ __all__ = [
     "Verdicts",
     "check_decisions",
     "judge_questions",
+    "judge_scores",
     "read_decisions",
     "write_inspection_list",
 ]
@@ -59,12 +61,23 @@ class Verdicts:
     rejected: list[JudgedQuestion] = field(default_factory=list)
     to_inspect: list[JudgedQuestion] = field(default_factory=list)
 
+    def add(self, judged: JudgedQuestion) -> None:
+        """Add a question to the list that it belongs to."""
+        if judged.right:
+            self.kept.append(judged)
+        elif len(judged.question.clues) == 1:
+            self.rejected.append(judged)
+        else:
+            {"keep": self.kept, "drop": self.rejected, None: self.to_inspect}[judged.decision].append(judged)
+
 
 def judge_questions(
     questions: Sequence[Question],
     replies: Mapping[str, Mapping[str, str | None]],
     decisions: Mapping[str, str],
     scorer: Scorer = "strict",
+    *,
+    partial_credit: bool = False,
 ) -> Verdicts:
     """Judge questions by the replies of models.
 
@@ -73,6 +86,7 @@ def judge_questions(
         replies: replies by model, then by question id; None where the model failed.
         decisions: "keep" or "drop", by question id.
         scorer: scorer whose full marks are a correct answer.
+        partial_credit: whether any part of them is one already, as in the published filter.
 
     Raises:
         DataError: a model was not asked one of the questions, or a decision is about a question of another set.
@@ -82,10 +96,15 @@ def judge_questions(
     for question in questions:
         by_model = {model: _reply(question, model, of_model) for model, of_model in replies.items()}
         scores = {m: score(last_line(t), question.answers, scorer) for m, t in by_model.items() if t is not None}
-        right = tuple(model for model, value in scores.items() if value >= 1.0)
+        right = judge_scores(scores, partial_credit=partial_credit)
         judged = JudgedQuestion(question, by_model, right, decisions.get(question.id))
-        _list_of(judged, verdicts).append(judged)
+        verdicts.add(judged)
     return verdicts
+
+
+def judge_scores(scores: Mapping[str, float], *, partial_credit: bool) -> tuple[str, ...]:
+    """Return the names of the models whose score of a question counts as a correct answer."""
+    return tuple(model for model, value in scores.items() if value >= 1.0 or (partial_credit and value > 0.0))
 
 
 def check_decisions(decisions: Mapping[str, str], questions: Iterable[Question]) -> None:
@@ -97,14 +116,6 @@ def check_decisions(decisions: Mapping[str, str], questions: Iterable[Question])
     unknown = sorted(set(decisions) - {question.id for question in questions})
     if unknown:
         raise DataError(f"the decisions are about {unknown[0]}, which is not in the set; take the list of this set")
-
-
-def _list_of(judged: JudgedQuestion, verdicts: Verdicts) -> list[JudgedQuestion]:
-    if judged.right:
-        return verdicts.kept
-    if len(judged.question.clues) == 1:
-        return verdicts.rejected
-    return {"keep": verdicts.kept, "drop": verdicts.rejected, None: verdicts.to_inspect}[judged.decision]
 
 
 def _reply(question: Question, model: str, replies: Mapping[str, str | None]) -> str | None:

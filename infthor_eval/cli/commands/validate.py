@@ -12,6 +12,7 @@ from infthor_eval.cli.options.values import PATH, ModelList, ModelSpec, WholeNum
 from infthor_eval.cli.options.workers import parse_worker_settings, worker_options
 from infthor_eval.cli.progress.notes import print_note
 from infthor_eval.cli.progress.runs import execute_with_progress
+from infthor_eval.errors import UsageError
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.nieh.scoring import Scorer
 from infthor_eval.nieh.tables import clues_table
@@ -36,7 +37,12 @@ __all__ = ["command", "validate"]
 )
 @click.option("--out", type=PATH, required=True, help="Folder of the validated set.")
 @click.option("--decisions", type=PATH, help="inspection.csv with keep or drop filled in.")
-@click.option("--scorer", type=click.Choice(["strict", "reference"]), default="strict", show_default=True)
+@click.option("--scorer", type=click.Choice(["strict", "reference"]), help="[default: strict]")
+@click.option(
+    "--published",
+    is_flag=True,
+    help="Keep what a model answers in part, by the reference scorer, as the published filter did.",
+)
 @click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random.")
 @worker_options
 def command(
@@ -44,7 +50,8 @@ def command(
     models: tuple[ModelSpec, ...],
     out: Path,
     decisions: Path | None,
-    scorer: Literal["strict", "reference"],
+    scorer: Literal["strict", "reference"] | None,
+    published: bool,
     seed: int,
     **workers: Any,
 ) -> int:
@@ -54,6 +61,8 @@ def command(
     answers are written to inspection.csv and inspection.html: decide on them, and pass the file as --decisions. If the
     command is stopped, run it again to continue.
     """
+    if published and scorer == "strict":
+        raise UsageError("--published has the reference scorer; leave out --scorer strict")
     options = RunOptions(
         models=models,
         tasks=("nieh_gt",),
@@ -62,11 +71,17 @@ def command(
         seed=seed,
         worker_settings=parse_worker_settings(**workers),
     )
-    return validate(options.requests(), out, decisions, scorer)
+    chosen: Scorer = scorer or ("reference" if published else "strict")
+    return validate(options.requests(), out, decisions, chosen, partial_credit=published)
 
 
 def validate(
-    requests: Sequence[tuple[RunRequest, Suite]], out: Path, decisions_file: Path | None, scorer: Scorer
+    requests: Sequence[tuple[RunRequest, Suite]],
+    out: Path,
+    decisions_file: Path | None,
+    scorer: Scorer,
+    *,
+    partial_credit: bool = False,
 ) -> int:
     """Run the models, judge the questions, write the validated set, and print Table 4 on it.
 
@@ -75,6 +90,7 @@ def validate(
         out: folder of the validated set, with the runs in it.
         decisions_file: inspection list with decisions; None for none.
         scorer: scorer that decides whether an answer is correct.
+        partial_credit: whether an answer that is right in part is correct.
 
     Returns:
         Exit code: 130 if a run was stopped, 1 if a model failed on a question, else 0.
@@ -92,7 +108,8 @@ def validate(
     answered = {record.id for record in outcomes[0].records}
     questions = [question for question in data.questions if question.id in answered]
     replies = [{record.id: record.payload.reply for record in outcome.records} for outcome in outcomes]
-    verdicts = judge_questions(questions, dict(zip(_model_names(outcomes), replies, strict=True)), decisions, scorer)
+    by_model = dict(zip(_model_names(outcomes), replies, strict=True))
+    verdicts = judge_questions(questions, by_model, decisions, scorer, partial_credit=partial_credit)
     earlier = write_validated_set(out, data, verdicts)
     if earlier is not None:
         print_note(f"{earlier}: the earlier list; it has decisions on questions that need no inspection now")

@@ -17,6 +17,7 @@ SKILLS = {
     "counter": lambda q: str(q.answers[0]).isdecimal(),
     "places": lambda q: q.question_type in {"location_tracing", "put_action"} and len(q.clues) < 3,
     "none": lambda q: False,
+    "half": lambda q: len(q.answers) == 2,
 }
 QUESTIONS = [
     Question("t", "Is there a mug?", (1,), ("yes",)),
@@ -46,6 +47,8 @@ class Scripted:
 
     def answer(self, sample):
         question = sample.question
+        if self.name == "half" and SKILLS["half"](question):
+            return str(question.answers[0])
         return ", ".join(question.answers) if SKILLS[self.name](question) else "<script>wrong</script>"
 
 
@@ -140,3 +143,15 @@ def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run, content, sai
     assert code == 2
     assert said in err
     assert not (tmp_path / "v" / "qa_set_validated.csv").exists()
+
+
+def test_the_published_filter_keeps_what_is_answered_in_part(data, tmp_path, run):
+    words = ("validate", str(data), "--models", "half", "--out")
+    code, out, _ = run(*words, str(tmp_path / "strict"))
+    assert (code, "0 kept" in out) == (0, True)
+    code, out, _ = run(*words, str(tmp_path / "published"), "--published")
+    assert (code, "1 kept" in out) == (0, True)
+    assert kept(tmp_path / "published") == ["Which two?"]
+    code, _, err = run(*words, str(tmp_path / "both"), "--published", "--scorer", "strict")
+    assert code == 2
+    assert "--scorer strict" in err
