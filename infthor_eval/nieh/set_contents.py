@@ -12,7 +12,7 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
-from infthor_eval.formats.step_log import Layout, layout_of
+from infthor_eval.formats.step_log import layout_of
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import Catalog
 
@@ -46,7 +46,7 @@ class SetContents:
     n_trajectories: int = 0
     n_unasked: int = 0
     frames: list[int] = field(default_factory=list)
-    layouts: Counter[Layout] = field(default_factory=Counter)
+    layouts: Counter[str] = field(default_factory=Counter)
     image_folders: Counter[str] = field(default_factory=Counter)
     image_sizes: Counter[tuple[int, int]] = field(default_factory=Counter)
     unreadable: list[str] = field(default_factory=list)
@@ -98,7 +98,7 @@ def _read_trajectory(data: NiehSet, traj_id: str, found: SetContents) -> None:
         found.unreadable.append(str(error))
         return
     found.frames.append(len(frames))
-    found.layouts[layout] += 1
+    found.layouts[layout.value] += 1
     if frames:
         found.image_folders[frames[0].path.parent.name] += 1
         if frames[0].problem() is None:
