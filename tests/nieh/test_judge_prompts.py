@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.cli.commands import rescore
-from infthor_eval.nieh.judge_prompts import JUDGE_PROMPTS
+from infthor_eval.nieh.judge_prompts import JUDGE_PROMPTS, YES_NO
 
 CASES = json.loads((Path(__file__).parents[1] / "goldens" / "prompts.json").read_text())["judge"]
 
@@ -43,5 +43,6 @@ def test_yes_and_no_are_scores(said, score):
     assert JUDGE_PROMPTS["yes-no"].read(said) == score
 
 
-def test_the_command_has_all_prompts_and_the_default_first():
-    assert tuple(JUDGE_PROMPTS) == rescore._JUDGE_PROMPTS
+def test_the_command_has_all_prompts():
+    assert list(JUDGE_PROMPTS) == list(rescore._JUDGE_TOKENS)
+    assert rescore._JUDGE_PROMPT == YES_NO

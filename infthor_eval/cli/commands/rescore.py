@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_JUDGE_TOKENS = 16
-_JUDGE_PROMPTS = ("yes-no", "published")  # those of `infthor_eval.nieh.judge_prompts`, which is slow to import
+# Most tokens of a verdict by prompt. Those are the names of `infthor_eval.nieh.judge_prompts`, which is slow to import.
+_JUDGE_TOKENS = {"yes-no": 16, "published": 64}
+_JUDGE_PROMPT = "yes-no"
 
 
 @click.command(
@@ -39,16 +40,14 @@ _JUDGE_PROMPTS = ("yes-no", "published")  # those of `infthor_eval.nieh.judge_pr
 @click.option("--judge-args", type=ModelArgs(), default="", metavar="K=V,...", help="Options of the judge.")
 @click.option(
     "--judge-prompt",
-    type=click.Choice(_JUDGE_PROMPTS),
+    type=click.Choice(tuple(_JUDGE_TOKENS)),
     help="How the judge is asked: for yes or no, the default, or for a score in the words of the published judge.",
 )
 @click.option(
     "--judge-tokens",
     type=WholeNumber(1),
-    default=_JUDGE_TOKENS,
-    show_default=True,
     metavar="N",
-    help="Most tokens of a verdict; a model that reasons first needs more.",
+    help="Most tokens of a verdict; default: 16, and 64 for a score. A model that reasons first needs more.",
 )
 @click.option(
     "--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of the sample that measures the judge."
@@ -60,7 +59,7 @@ def command(
     judge: tuple[ModelSpec, ...] | None,
     judge_args: Mapping[str, str],
     judge_prompt: str | None,
-    judge_tokens: int,
+    judge_tokens: int | None,
     seed: int,
     output: Path,
 ) -> int:
@@ -79,7 +78,8 @@ def command(
     if judge is not None and len(judge) > 1:
         raise click.UsageError(f"--judge names {len(judge)} models; give one")
     source, own = read_source(folder), find_scorer(scorer) if scorer is not None else None
-    asked = (judge_tokens, seed, judge_prompt or _JUDGE_PROMPTS[0])
+    prompt = judge_prompt or _JUDGE_PROMPT
+    asked = (judge_tokens or _JUDGE_TOKENS[prompt], seed, prompt)
     with _load_judge(judge[0], judge_args, *asked) if judge else nullcontext() as loaded:
         rescoring = score_again(source, own, loaded)
         rescored = _store(rescoring, output)
