@@ -104,8 +104,9 @@ def _read_score(answer: str) -> float | None:
         value = json.loads(found[0]).get("score") if found else None
     except ValueError:
         return None
-    is_share = isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value <= 1
-    return float(value) if is_share else None
+    if not isinstance(value, int | float) or isinstance(value, bool) or not 0 <= value <= 1:
+        return None
+    return float(value)
 
 
 JUDGE_PROMPTS: Mapping[str, JudgePrompt] = {
