@@ -25,9 +25,9 @@ from infthor_eval.report.figures.style import LEGEND, add_legend, looks_of, save
 
 DOCS = Path(__file__).parents[1] / "docs"
 MODES = {
-    "nieh_full": "full trajectory",
-    "nieh_truncate_head_32k": "last 32K",
-    "nieh_clip_retrieval": "CLIP, 20 frames",
+    "nieh_published_full": "full trajectory",
+    "nieh_published_last_32k": "last 32K",
+    "nieh_published_clip_20": "CLIP, 20 frames",
 }
 LOOKS = looks_of((*MODES, "guess", "printed"))
 
@@ -124,7 +124,7 @@ def draw_above_guessing(tasks: Mapping[str, TaskSummary]) -> Figure:
 
 def draw_evidence(tasks: Mapping[str, TaskSummary]) -> Figure:
     """Draw accuracy by the clue frames that were shown, of the runs that do not show all of them."""
-    hiding = {name: task for name, task in tasks.items() if name != "nieh_full"}
+    hiding = {name: task for name, task in tasks.items() if name != "nieh_published_full"}
     return _by_file(hiding, SHOWN_CLUES, lambda task, file: task.evidence[file].by_shown_clues, "of the clue frames")
 
 

@@ -28,6 +28,7 @@ class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         parameters: number of parameters of the checkpoint, in billions; None if it is not known.
         values: one number per column, in percent.
         source: origin of the row, if it is not that of the table.
+        task: task of ours, or group of tasks, that asks as the row was made; None if there is none.
         match: column of the published question files with the scores behind the row, if they have it.
         log: model in the name of the published plan log behind the row, if there is one.
         misprints: by column, the number that the row should have; only where the printed one is known to be wrong.
@@ -38,6 +39,7 @@ class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parameters: float | None
     values: tuple[float, ...]
     source: str | None = None
+    task: str | None = None
     match: str | None = None
     log: str | None = None
     misprints: Mapping[str, float] = {}

@@ -57,6 +57,8 @@ def score_above_guessing(payload: NiehAnswer, scorer: str) -> float | None:
     guess = payload.guess
     if guess is None or scorer not in guess.form_scores or guess.form_scores[scorer] > SOLVED:
         return None
+    if payload.scores and scorer not in payload.scores:  # the task has not this scorer
+        return None
     # 0 if the model failed
     return (payload.scores.get(scorer, 0.0) - guess.scores[scorer]) / (1 - guess.form_scores[scorer])
 

@@ -47,6 +47,7 @@ def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> D
         "recalled": json.dumps(sample.recalled) if sample.recalled is not None else "",
         "set": str(task_samples.data.root),
         "frame_ablation": asdict(task_samples.frame_ablation),
+        "prompt": task_samples.prompt,
         "trajectories": str(task_samples.data.trajectories or ""),
         "pixels": pixels,
     }
@@ -80,7 +81,8 @@ def samples_of(docs: Sequence[Doc]) -> TaskSamples:
     context = context_named(doc["context"])
     data = open_set(doc["set"], doc["trajectories"] or None)
     frame_ablation = FrameAblation(**doc["frame_ablation"])
-    return TaskSamples(data, doc["context"], context, [sample_of(doc) for doc in docs], [], {}, frame_ablation)
+    samples = [sample_of(doc) for doc in docs]
+    return TaskSamples(data, doc["context"], context, samples, [], {}, frame_ablation, doc["prompt"])
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:

@@ -12,6 +12,7 @@ from infthor_eval.nieh.answering_models import AnsweringModel, OpenAnswerer, ans
 from infthor_eval.nieh.baselines import Baseline
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
+from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.recalling import apply_recall
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples, open_set
@@ -65,6 +66,7 @@ class NiehEvaluation:
                 "k_tokens": self._options.k_tokens,
                 "tokens_per_frame": tokens,
                 "frames": self._options.frames,
+                **({"prompt": prompt} if (prompt := self._options.prompt) not in (None, PUBLISHED_MAIN) else {}),
                 **self._memory(),
                 **({"repeats": self._options.repeats} if self._options.repeats > 1 else {}),
             },
@@ -101,6 +103,11 @@ class NiehEvaluation:
                     f"--{name.replace('_', '-')} {value}: no task of {asked} leaves its memory open; "
                     "leave it out, or ask nieh_memory"
                 )
+        if self._options.prompt is not None and not any(task.takes_prompt for task in self._tasks):
+            raise UsageError(
+                f"--prompt {self._options.prompt}: no task of {asked} leaves its words open; "
+                "leave it out, or ask nieh_full"
+            )
         if (self._options.retriever or self._options.retriever_revision) and not self._depends_on("retriever"):
             raise UsageError(
                 f"--retriever: no context of {asked} retrieves frames; "

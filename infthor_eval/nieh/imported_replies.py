@@ -11,17 +11,19 @@ from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
+from infthor_eval.nieh.asked_prompt import asked_prompt
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
 from infthor_eval.nieh.scoring import SCORERS, scores
-from infthor_eval.runs import RunHeader, Session, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.runs import Catalog, RunHeader, Session, Tokens, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.run_config import run_config
 
 __all__ = ["ImportedRun", "Refusal", "import_logs"]
 
 _PUBLISHED_NAME = re.compile(r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$")
-_RATE = re.compile(r"(?P<fps>\d+) ?_?fps", re.IGNORECASE)
+_RATE = re.compile(r"_fps(?P<fps>\d+)")
+_PUBLISHED_TASK = "nieh_published_"  # begins the names of tasks that ask as published logs were asked
 # Published modes: the task of ours, and its context.
 _MODES = {
     None: ("nieh_full", "trajectory"),
@@ -50,7 +52,8 @@ class ImportedRun:
     Attributes:
         model: name of the model.
         task: name of the task of ours that the mode is; "imported" if the log names none.
-        settings: settings of the task's context, as `dataset_kwargs` of a task file has them.
+        settings: settings of the task's context, as `dataset_kwargs` of a task file has them; of published logs with
+            the prompt that they were asked with, None if their counts of tokens do not tell.
         logs: the logs.
         records: a record per imported reply.
         refused: the rows that are not imported.
@@ -114,6 +117,9 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
         if model is None and name is None:
             raise UsageError(f"{log}: its name has no model; give one with --model")
         of_model, (task, settings) = model or (name and name["model"]) or "", _mode_of(replies_of[log], log)
+        if task != _OTHER[0]:
+            settings["prompt"] = asked_prompt(replies_of[log])
+            task = _published_task(settings) or task
         run = runs.setdefault((of_model, task, repr(settings)), ImportedRun(of_model, task, settings))
         guesses = find_guesses(data, visible_knowledge(settings["context"]))
         _add_log(run, log, rows_of[log], _questions_of(data, name), _Known(guesses, n_frames))
@@ -151,6 +157,12 @@ def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, 
     if context == "clip_retrieval" and first.n_frames:
         return task, {"context": context, "top_k": max(reply.n_frames or 0 for reply in replies)}
     return task, {"context": context}
+
+
+def _published_task(settings: Mapping[str, Any]) -> str | None:
+    """Return the task of ours that asks as a published row was made; None if there is none with these settings."""
+    tasks = [task for name, task in Catalog.find_packaged().tasks.items() if name.startswith(_PUBLISHED_TASK)]
+    return next((task.name for task in tasks if task.settings["dataset_kwargs"] == settings), None)
 
 
 def _questions_of(data: NiehSet, name: re.Match[str] | None) -> Sequence[Question | SkippedQuestion]:

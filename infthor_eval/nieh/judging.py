@@ -1,7 +1,8 @@
 """A judge: a model that is asked whether a reply is right where the rules are unsure, and how far it can be trusted.
 
-The metric `judged` is the strict score, but 1 where the rules are unsure (`infthor_eval.nieh.unsure`) and the judge
-says yes. A no leaves what the rules found: 0, or the share of several gold answers. So does a judge that says neither.
+The metric `judged` is the strict score, or the judge's where the rules are unsure (`infthor_eval.nieh.unsure`) and it
+gives more: 1 for a yes. A no leaves what the rules found: 0, or the share of several gold answers. So does a judge that
+gives no verdict.
 
 The judge is measured on replies of which the rules are sure: it should find the right ones right and the wrong ones
 wrong.
@@ -16,9 +17,9 @@ import msgspec
 
 from infthor_eval.errors import DataError, ModelError, UsageError, unknown_name
 from infthor_eval.formats.digests import fingerprint
-from infthor_eval.nieh.prompts import last_line, verdict_text
+from infthor_eval.nieh.judge_prompts import JUDGE_PROMPTS, YES_NO
+from infthor_eval.nieh.prompts import last_line
 from infthor_eval.nieh.records import NiehAnswer, NiehVerdict
-from infthor_eval.nieh.scoring import says_yes_or_no
 from infthor_eval.nieh.summary import is_open_ended
 from infthor_eval.nieh.unsure import KnownAnswers
 from infthor_eval.runs import Session, Unit, UnitKey, UnitRecord, Usage
@@ -48,10 +49,11 @@ Track = Callable[[Sequence[Record]], Iterable[Record]]
 
 
 class Verdicts(msgspec.Struct, frozen=True, kw_only=True):
-    """A judge's verdicts on n replies: right, wrong, neither of the two words, or not asked as the request failed."""
+    """A judge's verdicts on n replies: right, partly right, wrong, neither, or not asked as the request failed."""
 
     n: int
     n_right: int
+    n_partly: int
     n_wrong: int
     n_neither: int
     n_not_asked: int
@@ -98,20 +100,27 @@ class Judge:
     Attributes:
         name: its name, with the checkpoint if there is one.
         seed: seed of the sample on which it is measured.
+        prompt: name of the form in which it is asked (`infthor_eval.nieh.judge_prompts`).
     """
 
-    def __init__(self, model: Model, name: str, code: Mapping[str, Any], max_new_tokens: int, seed: int) -> None:
+    def __init__(
+        self, model: Model, name: str, code: Mapping[str, Any], max_new_tokens: int, seed: int, prompt: str = YES_NO
+    ) -> None:
         """Take a model, its name for people, the identity of its adapter's code, and the limit of a verdict."""
         self.name = name
         self.seed = seed
+        self.prompt = prompt
+        self._form = JUDGE_PROMPTS[prompt]
         self._model = model
         self._decoding = Decoding(max_new_tokens=max_new_tokens)
         self._identity = as_json_values({"name": model.name, **model.identity(), "adapter": code})
         self._conversation = model.conversation()
+        if self._form.system:
+            self._conversation.append(self._form.system, role="system")
         self._start = self._conversation.mark()
 
     @classmethod
-    def load(cls, name: str, options: Mapping[str, str], max_new_tokens: int, seed: int) -> Self:
+    def load(cls, name: str, options: Mapping[str, str], max_new_tokens: int, seed: int, prompt: str = YES_NO) -> Self:
         """Load the judge of a model's name.
 
         Raises:
@@ -126,25 +135,27 @@ class Judge:
         if not isinstance(model, Model):
             model.close()
             raise UsageError(f"--judge {name}: cannot be asked, as it does not answer in words; give another model")
-        return cls(model, label(name, options), code, max_new_tokens, seed)
+        return cls(model, label(name, options), code, max_new_tokens, seed, prompt)
 
     def config(self) -> dict[str, Any]:
         """Return everything that verdicts and sample depend on, as JSON values."""
-        return {"label": self.name, **self._identity, "decoding": self._decoding.document(), "sample_seed": self.seed}
+        asked = {"decoding": self._decoding.document(), "prompt": self.prompt, "sample_seed": self.seed}
+        return {"label": self.name, **self._identity, **asked}
 
-    def verdict(self, record: Record, session: Session[NiehAnswer]) -> str | None:
-        """Return yes, no, or None for neither; the judge is asked unless the session has its verdict.
+    def verdict(self, record: Record, session: Session[NiehAnswer]) -> float | None:
+        """Return the judge's score, 0 to 1, or None if it gives none; it is asked unless the session has its verdict.
 
         Raises:
             ModelError: the judge cannot be asked.
         """
         payload = record.payload
         said = last_line(payload.reply or "")
-        text = verdict_text(payload.question, payload.answers, said)
-        inputs = fingerprint({"judge": self._identity, "text": text, "decoding": self._decoding.document()})
+        text = self._form.text(payload.question, payload.answers, said)
+        asked = {"system": self._form.system, "text": text, "decoding": self._decoding.document()}
+        inputs = fingerprint({"judge": self._identity, **asked})
         known = session.find_artifact(inputs, NiehVerdict)
         if known is not None:
-            return known.verdict
+            return known.score
         start = time.perf_counter()
         with wrap_request_errors(self.name):
             self._conversation.rewind(self._start)
@@ -155,12 +166,12 @@ class Judge:
             answers=payload.answers,
             reply=said,
             said=reply.text,
-            verdict=says_yes_or_no(answer_of(reply).answer),
+            score=self._form.read(answer_of(reply).answer),
             judge=self._identity,
             seconds=round(time.perf_counter() - start, 4),
         )
         session.cache_artifact(inputs, verdict, Usage.of([reply]))
-        return verdict.verdict
+        return verdict.score
 
     def close(self) -> None:
         """Free the model."""
@@ -181,7 +192,7 @@ def judge_replies(
     known, scored = KnownAnswers(records), [record for record in records if record.payload.scores]
     unsure = [record for record in scored if known.is_unsure(record)]
     right, wrong = _sample(scored, {record.key for record in unsure}, judge.seed)
-    verdicts: dict[UnitKey, str | None] = {}
+    verdicts: dict[UnitKey, float | None] = {}
     failures = []
     for record in track([*unsure, *right, *wrong]):
         try:
@@ -189,8 +200,8 @@ def judge_replies(
         except (DataError, ModelError) as error:
             failures.append(session.describe_failure(Unit(record.key, record.cluster, record.payload), error))
     agreement = Agreement(unsure=_count(unsure, verdicts), right=_count(right, verdicts), wrong=_count(wrong, verdicts))
-    found_right = {record.key for record in unsure if verdicts.get(record.key) == "yes"}
-    scores = {r.key: 1.0 if r.key in found_right else r.payload.scores["strict"] for r in scored}
+    found = {record.key: verdicts.get(record.key) or 0.0 for record in unsure}
+    scores = {r.key: max(found.get(r.key, 0.0), r.payload.scores["strict"]) for r in scored}
     return Judgement(scores, agreement, failures)
 
 
@@ -202,7 +213,8 @@ def _sample(scored: Sequence[Record], unsure: set[UnitKey], seed: int) -> tuple[
     return right, wrong
 
 
-def _count(records: Sequence[Record], verdicts: Mapping[UnitKey, str | None]) -> Verdicts:
+def _count(records: Sequence[Record], verdicts: Mapping[UnitKey, float | None]) -> Verdicts:
     said = [verdicts[record.key] for record in records if record.key in verdicts]
-    counts = {"n_right": said.count("yes"), "n_wrong": said.count("no"), "n_neither": said.count(None)}
-    return Verdicts(n=len(records), n_not_asked=len(records) - len(said), **counts)
+    n_partly = sum(score is not None and 0 < score < 1 for score in said)
+    counts = {"n_right": said.count(1.0), "n_wrong": said.count(0.0), "n_neither": said.count(None)}
+    return Verdicts(n=len(records), n_partly=n_partly, n_not_asked=len(records) - len(said), **counts)

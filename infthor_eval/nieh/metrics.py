@@ -1,14 +1,15 @@
-"""The metrics of a task's replies: both scorers, or the task's own function.
+"""The metrics of a task's replies: our scorers, or the task's own function.
 
-A task file may name its own function under `process_results`, with its metrics under `metric_list`, as in lm-eval.
+A task file lists under `metric_list` which of our scorers it has. It may name its own function under `process_results`,
+with its metrics under `metric_list`, as in lm-eval.
 """
 
 import importlib
 import importlib.util
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -36,7 +37,7 @@ class Metrics:
     """The metrics of a task by name, in the order of tables.
 
     Attributes:
-        process: the task's own function; None for both scorers.
+        process: the task's own function; None for our scorers.
         code: what tells these metrics from others of their names: the version of the strict scorer's rules, or name and
             digest of the function's source.
     """
@@ -52,7 +53,8 @@ class Metrics:
             MetricError: the task's own function raises an exception, or its result lacks a metric.
         """
         if self.process is None:
-            return scores(reply, sample.question.answers)
+            found = scores(reply, sample.question.answers)
+            return {name: found[name] for name in self.names}
         with wrap_metric_errors(f"process_results fails on {sample.question.id}"):
             results = self.process(doc_of(task_samples, sample), [reply])
             return {name: finite(name, results[name]) for name in self.names}
@@ -93,19 +95,28 @@ def metrics_of(task: TaskFile) -> Metrics:
     """Return the metrics of a task file.
 
     Raises:
-        DataError: its function cannot be imported, or a metric is not averaged or is better when lower.
+        DataError: its function cannot be imported, or a metric is not averaged, is better when lower, or is none of our
+            scorers where these score.
     """
     name = task.settings["process_results"]
-    if name == _OURS:
-        return PUBLISHED
     listed = task.settings.get("metric_list") or []
     for item in listed:
         _check(item, f"{task.path}: metric_list: ")
+    if name == _OURS:
+        return _our_metrics([item["metric"] for item in listed], f"{task.path}: metric_list: ")
     if not listed:
         raise DataError(f"{task.path}: a task with its own process_results names its metrics under metric_list")
     module, attribute = _import_function(task.path, name)
     source = {"process_results": name, "source": digest_of_file(Path(str(module.__file__)))}
     return Metrics(tuple(item["metric"] for item in listed), getattr(module, attribute), source)
+
+
+def _our_metrics(listed: Sequence[str], place: str) -> Metrics:
+    for name in listed:
+        if name not in SCORERS:
+            raise DataError(f"{place}{name} is none of our scorers, {', '.join(SCORERS)}; name its process_results too")
+    names = tuple(name for name in SCORERS if name in (listed or SCORERS))
+    return replace(PUBLISHED, names=names, code={key: rules for key, rules in PUBLISHED.code.items() if key in names})
 
 
 def _check(item: object, place: str) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from infthor_eval.errors import UsageError
 from infthor_eval.memory.budgets import read_budget
+from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN
 
 __all__ = ["FRAMES", "SHOWN", "NiehOptions", "check_frames"]
 
@@ -22,6 +23,7 @@ class NiehOptions:
         retriever_revision: branch, tag or commit of it on the hub; None for the default branch.
         trajectories: folder of the set's trajectories (`--traj_dir` of the published scripts); None for the set's own.
         frames: the frames that are shown: the true ones, or a frame ablation.
+        prompt: words of the question, one of `infthor_eval.nieh.prompts`; None for the task's own, else published-main.
         memory: memory that recalls what is shown, a name or FILE.py:CLASS; for tasks that leave it open.
         memory_args: its options, "k=v,k=v".
         budget: most tokens of what it recalls ("4k" is 4,000); None for the memory's own limit.
@@ -69,6 +71,13 @@ class NiehOptions:
         },
     )
 
+    prompt: str | None = field(
+        default=None,
+        metadata={
+            "choices": PROMPTS,
+            "help": f"Words of the question, for tasks that leave them open; default: {PUBLISHED_MAIN}.",
+        },
+    )
     memory: str | None = field(
         default=None,
         metadata={

@@ -23,7 +23,8 @@ from infthor_eval.runs import RunHeader, UnitRecord
 __all__ = ["RebuiltRequest", "RequestRebuilder"]
 
 _RETRIEVED = "clip_retrieval"
-_OF_RUN = ("k_tokens", "tokens_per_frame", "frames", "seed")  # settings of contexts that a run gives to all its tasks
+# Settings of contexts that a run gives to all its tasks.
+_OF_RUN = ("k_tokens", "tokens_per_frame", "frames", "prompt", "seed")
 
 
 class RebuiltRequest(NamedTuple):
@@ -55,7 +56,9 @@ class RequestRebuilder:
         self._settings = ContextSettings.read(given | dataset)
         self._context = context_named(dataset["context"])
         ablation = FrameAblation(self._settings.frames, self._settings.seed)
-        self._samples = TaskSamples(data, dataset["context"], self._context, (), (), {}, ablation)
+        self._samples = TaskSamples(
+            data, dataset["context"], self._context, (), (), {}, ablation, self._settings.prompt
+        )
         self._decoding: Mapping[str, Any] = about["decoding"]
         self._shows_images = about.get("film") == "images"
 

@@ -135,7 +135,7 @@ class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", t
         answers: the gold answers.
         reply: the part of the reply that counts.
         said: the judge's own words.
-        verdict: what they say: yes, no, or None for neither.
+        score: what they say, 0 to 1: 1 for a yes, 0 for a no, None for neither.
         judge: the judge's identity as JSON values.
         seconds: duration of the request.
     """
@@ -144,7 +144,7 @@ class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", t
     answers: tuple[str | int | float, ...]
     reply: str
     said: str
-    verdict: str | None
+    score: float | None
     judge: dict[str, Any]
     seconds: float
 

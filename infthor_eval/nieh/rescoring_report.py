@@ -132,11 +132,12 @@ def agreement_table(agreement: Agreement, judge: str) -> Table:
         _verdicts_row("are right by the rules (sample)", agreement.right),
         _verdicts_row("are wrong by the rules (sample)", agreement.wrong),
     )
-    columns = (Column("open-ended replies that", False), *map(Column, ("n", "right", "wrong", "neither", "not asked")))
+    numbers = ("n", "right", "partly", "wrong", "neither", "not asked")
+    columns = (Column("open-ended replies that", False), *map(Column, numbers))
     note = f"Judge and rules agree on {_percent(agreement.share)} % of the sample."
     return Table(f"Verdicts of {judge}", columns, rows, (note,))
 
 
 def _verdicts_row(name: str, counts: Verdicts) -> Row:
-    numbers = (counts.n, counts.n_right, counts.n_wrong, counts.n_neither, counts.n_not_asked)
+    numbers = (counts.n, counts.n_right, counts.n_partly, counts.n_wrong, counts.n_neither, counts.n_not_asked)
     return Row((name, *map(str, numbers)))

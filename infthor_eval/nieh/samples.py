@@ -13,8 +13,9 @@ from infthor_eval.formats.hub_data import default_folder
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts import Context, ContextPart, ContextSettings, Sample, context_named
+from infthor_eval.nieh.contexts import Context, ContextPart, ContextSettings, Sample, check_prompt, context_named
 from infthor_eval.nieh.frame_ablations import FrameAblation
+from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.runs.limiting import spread
 
 __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
@@ -29,6 +30,7 @@ class TaskSamples:
     Attributes:
         skipped: questions that cannot be asked, with the reason.
         sources: whatever the frames depend on besides the set and the settings (`Context.sources`).
+        prompt: the words of the question (`infthor_eval.nieh.prompts`).
     """
 
     data: NiehSet
@@ -38,6 +40,7 @@ class TaskSamples:
     skipped: Sequence[SkippedQuestion]
     sources: Mapping[str, Any]
     frame_ablation: FrameAblation = field(default_factory=FrameAblation)
+    prompt: str = PUBLISHED_MAIN
 
     @property
     def shows_films(self) -> bool:
@@ -66,7 +69,7 @@ class TaskSamples:
 
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows it."""
-        parts, text = self.context.request(self.data, sample)
+        parts, text = self.context.request(self.data, sample, self.prompt)
         return self.frame_ablation.apply(parts, self.data, self.context, sample), text
 
 
@@ -108,18 +111,19 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
         limit: number of questions, chosen evenly from all trajectories by the seed; None for all.
 
     Raises:
-        UsageError: there is no set, the context is unknown or lacks a setting, or the set does not allow the ablation.
+        UsageError: there is no set, the context is unknown, lacks a setting or is asked in other words, or the set does
+            not allow the ablation.
         DataError: the set cannot be read.
     """
     context, settings, data = context_named(config["context"]), ContextSettings.read(config), find_set(**config)
+    check_prompt(config["context"], settings.prompt)
     frame_ablation = FrameAblation(settings.frames, settings.seed)
     frame_ablation.check(data)
     items = [item for of_question in _by_question(data, context, settings, limit) for item in of_question]
     samples = [item for item in items if isinstance(item, Sample)]
     skipped = [item for item in items if isinstance(item, SkippedQuestion)]
-    return TaskSamples(
-        data, config["context"], context, samples, skipped, context.sources(data, settings), frame_ablation
-    )
+    sources = context.sources(data, settings)
+    return TaskSamples(data, config["context"], context, samples, skipped, sources, frame_ablation, settings.prompt)
 
 
 _Items = list[Sample | SkippedQuestion]  # of one question

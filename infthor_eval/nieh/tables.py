@@ -209,7 +209,7 @@ def _difference(cell: Cell, value: float | None, metric: str) -> str:
 def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
     """Return the published rows, and the runs that asked in the same context and have one of the columns."""
     rows = [
-        Row((row.name, row.source or table.context, table.metric, *map("{:.2f}".format, row.values)), is_published=True)
+        Row((row.name, _made_by(row, table), table.metric, *map("{:.2f}".format, row.values)), is_published=True)
         for row in table.rows
     ]
     for run, name, task in _tasks([run for run in runs if frames_of(run) == SHOWN]):
@@ -222,6 +222,10 @@ def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
             rows.append(Row((run, name, table.metric, *means)))
     columns = (*_NAMES, _METRIC, *map(Column, table.columns))
     return Table(f"{table.title}: {table.source}", columns, tuple(rows), (*table.notes, *_notes(runs)))
+
+
+def _made_by(row: PublishedRow, table: PublishedTable) -> str:
+    return ", ".join(filter(None, (row.task, row.source))) or table.context
 
 
 # -- gain by frames

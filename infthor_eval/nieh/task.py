@@ -10,7 +10,7 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.memory import parse_options, read_budget
-from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, ContextSettings, Sample
+from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, ContextSettings, Sample, check_prompt
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
@@ -51,6 +51,7 @@ class NiehTask:
         settings: contents of its file.
         needs_size: True if the samples depend on the model's tokens per frame.
         takes_memory: True if its memory is one of the run's options.
+        takes_prompt: True if its prompt is.
         task_samples: the samples; None if they depend on the model.
     """
 
@@ -75,6 +76,7 @@ class NiehTask:
         # A budget of a memory is in tokens, too.
         self.needs_size = CONTEXTS[self._config["context"]].needs_model or self._config.get("budget") is not None
         self.takes_memory = self._config["context"] == MEMORY and "memory" not in file.settings["dataset_kwargs"]
+        self.takes_prompt = "prompt" not in file.settings["dataset_kwargs"]
         self.task_samples: TaskSamples | None = None if self.needs_size else find_samples(self._config, self._limit)
 
     @cached_property
@@ -150,6 +152,10 @@ def check_task_file(file: TaskFile) -> None:
     if context is None:
         raise UsageError(f"{place}: context is {given['context']!r:.60}; it is one of {', '.join(CONTEXTS)}")
     settings = ContextSettings.read(given, place)
+    try:
+        check_prompt(given["context"], settings.prompt)
+    except UsageError as error:
+        raise UsageError(f"{place}: {error}") from error
     if context.needs_model and settings.ctx_size is None:
         raise UsageError(f"{place}: ctx_size is missing; {given['context']} needs it, a number of kilo-tokens above 0")
     if "bundled" in given:

@@ -71,7 +71,7 @@ def _compare_task(
 ) -> Iterator[Comparison]:
     scores = [(list(map(suite.scores, ours)), list(map(suite.scores, theirs))) for ours, theirs in pairs]
     clusters = [ours[0].cluster for ours, _ in pairs]
-    for metric in dict.fromkeys(name for pair in scores for of_run in pair for one in of_run for name in one):
+    for metric in _shared_metrics(scores):
         # A unit without results has no scores, and counts as 0.
         both = [(_values(ours, metric), _values(theirs, metric)) for ours, theirs in scores]
         yield _compare_metric(presenter, task, metric, both, clusters, n_unshared)
@@ -79,11 +79,20 @@ def _compare_task(
         (list(map(presenter.further_scores, ours)), list(map(presenter.further_scores, theirs)))
         for ours, theirs in pairs
     ]
-    for metric in dict.fromkeys(name for ours, theirs in further for name in ours[0] if name in theirs[0]):
+    scored = [pair for pair, (ours, theirs) in zip(further, scores, strict=True) if ours[0] and theirs[0]]
+    for metric in dict.fromkeys(name for ours, theirs in scored or further for name in ours[0] if name in theirs[0]):
         # Whether a unit has such a score depends on the unit, not on the reply.
         chosen = [place for place, (ours, theirs) in enumerate(further) if metric in ours[0] and metric in theirs[0]]
         both = [(_values(further[place][0], metric), _values(further[place][1], metric)) for place in chosen]
         yield _compare_metric(presenter, task, metric, both, [clusters[place] for place in chosen], n_unshared)
+
+
+def _shared_metrics(scores: Sequence[tuple[Sequence[Mapping[str, float]], Sequence[Mapping[str, float]]]]) -> list[str]:
+    """Return the metrics that both runs have; all of the other run's if one has no unit with a result."""
+    first, second = (
+        dict.fromkeys(name for of_run in runs for one in of_run for name in one) for runs in zip(*scores, strict=True)
+    )
+    return [name for name in first | second if (not first or name in first) and (not second or name in second)]
 
 
 def _by_unit(records: Iterable[Record]) -> dict[UnitKey, list[Record]]:

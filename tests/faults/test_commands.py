@@ -10,6 +10,8 @@ import pytest
 from .told import said_in_one_line
 
 RUN = ["--model", "oracle", "--tasks", "nieh_gt", "--data", "SET"]
+VIDEO = ["--model", "oracle", "--tasks", "nieh_video", "--data", "SET", "--output", "OUT"]
+PUBLISHED = ["--model", "oracle", "--tasks", "nieh_published_full", "--data", "SET", "--output", "OUT"]
 TINY = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", "SET", "--output", "OUT", "--model-args"]
 GENERATE = ["generate", "--scene", "kitchen-1", "--min-steps", 1]
 MANIFEST = {"name": "x", "trajectories": [{"scene": "kitchen-1", "seed": 0, "min_steps": 1}]}
@@ -137,6 +139,19 @@ TYPED = [
         "has no qa_set*.csv, as an NIEH set has beside metadata/; give the folder of an NIEH set, or download",
     ),
     ([*RUN[:-1], "nowhere", "--output", "OUT"], "nowhere: no such folder; give the folder of an NIEH set, or download"),
+    ([*RUN, "--output", "OUT", "--prompt", "mine"], "'mine' is not one of 'published-main', 'published-logs'"),
+    (
+        [*VIDEO, "--prompt", "published-logs"],
+        "prompt published-logs: the context video is asked in words of its own; it is for clues, trajectory",
+    ),
+    (
+        [*PUBLISHED, "--prompt", "published-main"],
+        "no task of nieh_published_full leaves its words open; leave it out, or ask nieh_full",
+    ),
+    (
+        ["rescore", "OUT", "--judge-prompt", "published"],
+        "--judge-prompt is how a judge is asked; give one with --judge",
+    ),
 ]
 
 

@@ -30,6 +30,12 @@ FILES = [
     (CLUES + ", k_tokens: 1023}", f"{SETTING} k_tokens is 1023; it is 1000 or 1024"),
     (CLUES + ", seed: x}", f"{SETTING} seed is 'x'; it is a whole number"),
     (CLUES + ", frames: grey}", f"{SETTING} frames is 'grey'; it is one of shown, blank, shuffled, other"),
+    (CLUES + ", prompt: mine}", f"{SETTING} prompt is 'mine'; it is one of published-main, published-logs"),
+    (
+        HEAD + "dataset_kwargs: {context: video, prompt: published-logs}",
+        f"{SETTING} prompt published-logs: the context video is asked in words of its own; it is for clues, trajectory",
+    ),
+    (CLUES + "}\nmetric_list: [{metric: exact}]", "metric_list: exact is none of our scorers, reference, strict"),
     (CLUES + ", retriever: 5}", f"{SETTING} retriever is 5; it is a text"),
     (CLUES + ", bundled: 5}", f"{SETTING} bundled is 5; it is a name"),
     (CLUES + ", bundled: no}", f"{SETTING} bundled is False; it is a name"),

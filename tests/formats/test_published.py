@@ -35,7 +35,7 @@ def test_every_table_has_a_source_and_a_title_of_its_own(suite):
 @pytest.mark.parametrize(
     ("title", "row", "mode"),
     [
-        ("NIEH on full trajectories", 2, ""),
+        ("NIEH on full trajectories", 4, ""),
         ("NIEH on the end of trajectories", 0, "_truncate_head_32K"),
         ("NIEH on retrieved frames", 1, "_clip_retrieval_top20"),
     ],

@@ -107,14 +107,43 @@ def test_neutral_rows_show_the_frames_that_they_name(tmp_path):
 @pytest.mark.parametrize(
     ("name", "task", "settings"),
     [
-        ("full_traj_video_1fps", "nieh_video", {"context": "video", "fps": 1.0}),
-        ("full_traj_video_2_FPS", "nieh_video_2fps", {"context": "video", "fps": 2.0}),
+        ("full_traj_video_fps1", "nieh_video", {"context": "video", "fps": 1.0}),
+        ("full_traj_video_fps2", "nieh_video_2fps", {"context": "video", "fps": 2.0}),
         ("full_traj_video", "nieh_video", {"context": "video"}),
     ],
 )
 def test_the_name_of_a_log_of_videos_tells_their_rate(imported, name, task, settings):
     (run,) = imported(**{name: [row(0, eval_mode="video")]})
-    assert (run.task, run.settings) == (task, settings)
+    assert (run.task, run.settings) == (task, {**settings, "prompt": None})
+
+
+# 123 tokens a frame, 144 a pair of frames of a film; the prompt's own words, and a word of the question each.
+WORDS = {"published-logs": 60 + 5, "published-main": 52 + 5}
+FILM = 54 + 5
+END = {"eval_mode": "truncate_head", "ctx_size_k": 32, "n_imgs": 270}
+
+
+@pytest.mark.parametrize(
+    ("name", "row_of", "task", "prompt"),
+    [
+        ("full_traj", {"n_imgs": 10, "ctx_n_tokens": 1230 + WORDS["published-logs"]}, "full", "published-logs"),
+        ("full_traj_x", {**END, "ctx_n_tokens": 270 * 123 + WORDS["published-logs"]}, "last_32k", "published-logs"),
+        (
+            "full_traj_video_fps2",
+            {"eval_mode": "video", "ctx_n_tokens": 290 + FILM},
+            "video_2fps",
+            "published-main",
+        ),
+    ],
+)
+def test_a_log_that_tells_its_prompt_is_the_task_of_its_published_row(imported, name, row_of, task, prompt):
+    (run,) = imported(**{name: [row(0, **row_of)]})
+    assert (run.task, run.settings["prompt"]) == (f"nieh_published_{task}", prompt)
+
+
+def test_frames_asked_about_in_the_words_of_main_are_no_published_row(imported):
+    (run,) = imported(full_traj=[row(0, n_imgs=10, ctx_n_tokens=1230 + WORDS["published-main"])])
+    assert (run.task, run.settings) == ("nieh_full", {"context": "trajectory", "prompt": "published-main"})
 
 
 def test_records_have_the_guesses_that_suit_the_mode(imported, monkeypatch):

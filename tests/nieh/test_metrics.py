@@ -140,8 +140,17 @@ def test_a_file_whose_metrics_cannot_be_had_is_refused_in_one_line(prepared, own
 def test_a_function_that_is_installed_is_found_on_the_path(own):
     own(task=OWN.replace("own.measure", "infthor_eval.nieh.scoring.scores"))
     assert metrics_of(task()).names == ("letters", "plain")
-    own(task=OWN.replace("own.measure", "infthor_eval.harness.nieh_task.process_results"))
-    assert metrics_of(task()) is PUBLISHED
+
+
+def test_of_our_scorers_a_task_has_those_that_it_lists(own):
+    ours = OWN.replace("own.measure", "infthor_eval.harness.nieh_task.process_results")
+    own(task=ours.replace(LIST, "metric_list: [{metric: strict}, {metric: reference}]\n"))
+    assert metrics_of(task()) == PUBLISHED
+    own(task=ours.replace(LIST, "metric_list: [{metric: reference}]\n"))
+    assert (metrics_of(task()).names, metrics_of(task()).code) == (("reference",), {})
+    own(task=ours)
+    with pytest.raises(DataError, match="letters is none of our scorers, reference, strict; name its process_results"):
+        metrics_of(task())
 
 
 def test_baselines_are_measured_by_the_files_function_too(prepared, own):

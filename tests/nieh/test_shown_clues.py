@@ -51,10 +51,10 @@ def test_the_haystack_shows_its_needle_at_every_depth(shown):
     assert shown("haystack", (12,), **settings) == [clues(1, 1, 17)] * 5
 
 
-def test_clues_that_follow_each_other_can_be_longer_than_the_haystack(shown):
-    # A window of three frames starts at the first of five clues.
-    settings = {"ctx_size": 3, "tokens_per_frame": 1000, "depths": [0.0]}
-    assert shown("haystack", (4, 5, 6, 7, 8), **settings) == [clues(3, 5, 1)]
+def test_clues_that_follow_each_other_can_reach_out_of_the_haystack(shown):
+    # Three and more lie at the last depth: a window of five frames starts four before the first of five clues.
+    settings = {"ctx_size": 5, "tokens_per_frame": 1000, "depths": [0.0]}
+    assert shown("haystack", (4, 5, 6, 7, 8), **settings) == [clues(1, 5, 1)]
 
 
 def test_retrieved_frames_show_the_clues_among_them(make_nieh_set):

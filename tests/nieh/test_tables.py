@@ -134,10 +134,13 @@ def test_published_rows_by_file_are_a_table_of_their_own_beside_runs_in_their_co
     ]
     assert all(row.is_published for row in table.rows)  # no column of ours is a file
     assert [(row.cells[0], *row.cells[3:]) for row in table.rows] == [
+        ("LLaVA-OneVision 7B", "0.00", "0.00"),
+        ("Deepseek-VL 7B", "0.00", "0.00"),
         ("Qwen2.5-VL 7B", "47.35", "36.60"),
         ("Gemini 2.0 Flash", "67.36", "30.94"),
         ("Qwen2.5-VL 7B", "55.86", "42.72"),
     ]
+    assert table.rows[-1].cells[1] == "nieh_published_full, logs eval_qa_set_*_full_traj.log, branch nieh_dev"
     assert "Both stand" in table.notes[0]
     assert beside(run_of(identity(), [record(0, "mug")])) == []
     (simulated,) = beside(run_of(identity(context="trajectory", simulator="embedded"), [record(0, "mug")]))

@@ -1,6 +1,7 @@
 """Two runs on the same questions, also in scores that not every question has."""
 
 import pytest
+from msgspec.structs import replace
 
 from infthor_eval.errors import DataError
 from infthor_eval.nieh.records import Guess
@@ -60,6 +61,15 @@ def test_a_question_that_only_one_run_has_it_for_is_not_compared_in_it():
     assert (found[ABOVE].first, found[ABOVE].second) == (1.0, -1.0)
     assert ABOVE not in compared(first[:2], [record(0, "mug"), record(1, "mug")])
     assert ABOVE not in compared(first, second, PlainPresenter())
+
+
+def test_a_metric_that_one_run_has_not_is_not_compared():
+    """A task may have the reference scorer alone; to a run without any result, every metric is 0."""
+    alone = [asked(0, "mug"), asked(1, None)]
+    alone[0] = replace(alone[0], payload=replace(alone[0].payload, scores={"reference": 1.0}))
+    both = [asked(0, "mug"), asked(1, "mug")]
+    assert list(compared(alone, both)) == list(compared(both, alone)) == ["reference"]
+    assert list(compared([asked(0, None)], both)) == ["reference", "strict", ABOVE]
 
 
 def test_units_that_one_run_alone_has_are_counted_and_without_a_shared_one_there_is_an_error():

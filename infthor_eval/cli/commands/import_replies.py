@@ -66,6 +66,9 @@ def _import_replies(
         name = f"{run.model}, {run.task}"
         counts = f"{run.n_missing} of {len(run.question_ids)} questions without one"
         print_note(f"{name}: {len(run.records)} replies imported, {counts}")
+        if "prompt" in run.settings:
+            unknown = "not told by its counts of tokens, which fit no published prompt as Qwen2.5-VL counts"
+            print_note(f"{name}: the prompt it was asked with: {run.settings['prompt'] or unknown}")
         for what, rows in (("not imported", run.refused), ("scored otherwise than logged", run.rescored)):
             print_refused(name, what, [(row.log, row.line, row.reason) for row in rows])
         yield RunResults(stored.folder, suite, stored.summary, stored.usage, run.n_missing), len(run.refused)

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_JUDGE_TOKENS = 16
+# Most tokens of a verdict by prompt. Those are the names of `infthor_eval.nieh.judge_prompts`, which is slow to import.
+_JUDGE_TOKENS = {"yes-no": 16, "published": 64}
+_JUDGE_PROMPT = "yes-no"
 
 
 @click.command(
@@ -37,12 +39,15 @@ _JUDGE_TOKENS = 16
 )
 @click.option("--judge-args", type=ModelArgs(), default="", metavar="K=V,...", help="Options of the judge.")
 @click.option(
+    "--judge-prompt",
+    type=click.Choice(tuple(_JUDGE_TOKENS)),
+    help="How the judge is asked: for yes or no, the default, or for a score in the words of the published judge.",
+)
+@click.option(
     "--judge-tokens",
     type=WholeNumber(1),
-    default=_JUDGE_TOKENS,
-    show_default=True,
     metavar="N",
-    help="Most tokens of a verdict; a model that reasons first needs more.",
+    help="Most tokens of a verdict; default: 16, and 64 for a score. A model that reasons first needs more.",
 )
 @click.option(
     "--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of the sample that measures the judge."
@@ -53,7 +58,8 @@ def command(
     scorer: str | None,
     judge: tuple[ModelSpec, ...] | None,
     judge_args: Mapping[str, str],
-    judge_tokens: int,
+    judge_prompt: str | None,
+    judge_tokens: int | None,
     seed: int,
     output: Path,
 ) -> int:
@@ -67,10 +73,14 @@ def command(
 
     if judge is None and judge_args:
         raise click.UsageError("--judge-args are options of a judge; give one with --judge")
+    if judge is None and judge_prompt is not None:
+        raise click.UsageError("--judge-prompt is how a judge is asked; give one with --judge")
     if judge is not None and len(judge) > 1:
         raise click.UsageError(f"--judge names {len(judge)} models; give one")
     source, own = read_source(folder), find_scorer(scorer) if scorer is not None else None
-    with _load_judge(judge[0], judge_args, judge_tokens, seed) if judge else nullcontext() as loaded:
+    prompt = judge_prompt or _JUDGE_PROMPT
+    asked = (judge_tokens or _JUDGE_TOKENS[prompt], seed, prompt)
+    with _load_judge(judge[0], judge_args, *asked) if judge else nullcontext() as loaded:
         rescoring = score_again(source, own, loaded)
         rescored = _store(rescoring, output)
     _print(rescoring, rescored)
@@ -78,13 +88,13 @@ def command(
 
 
 def _load_judge(
-    judge: ModelSpec, more: Mapping[str, str], max_new_tokens: int, seed: int
+    judge: ModelSpec, more: Mapping[str, str], max_new_tokens: int, seed: int, prompt: str
 ) -> AbstractContextManager[Judge]:
     from infthor_eval.cli.progress.notes import print_note
     from infthor_eval.nieh.judging import Judge
     from model_adapters import model_note
 
-    loaded = Judge.load(judge.name, {**more, **judge.options}, max_new_tokens, seed)
+    loaded = Judge.load(judge.name, {**more, **judge.options}, max_new_tokens, seed, prompt)
     if note := model_note(judge.name):
         print_note(f"{judge.name}: {note}", "yellow")
     return closing(loaded)

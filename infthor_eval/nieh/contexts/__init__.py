@@ -4,17 +4,27 @@ from infthor_eval.errors import UsageError
 from infthor_eval.nieh.contexts import interleaved, memory, plans, retrieval, text_state, video, views
 from infthor_eval.nieh.contexts.base import Context, ContextPart, ContextSettings, Sample, trajectories_identity
 from infthor_eval.nieh.contexts.haystack import haystack
+from infthor_eval.nieh.prompts import PROMPTS
 
-__all__ = ["CONTEXTS", "MEMORY", "Context", "ContextPart", "ContextSettings", "Sample", "context_named"]
+__all__ = [
+    "CONTEXTS",
+    "MEMORY",
+    "Context",
+    "ContextPart",
+    "ContextSettings",
+    "Sample",
+    "check_prompt",
+    "context_named",
+]
 
 MEMORY = "memory"  # the context that a memory recalls
 _INTERLEAVED = "Answer the question given the state and action sequence of the embodied agent."
 
 CONTEXTS = {
-    "clues": Context(views.clues),
-    "trajectory": Context(views.trajectory),
-    "truncate_head": Context(views.truncate_head, needs_model=True),
-    "haystack": Context(haystack, needs_model=True),
+    "clues": Context(views.clues, prompts=PROMPTS),
+    "trajectory": Context(views.trajectory, prompts=PROMPTS),
+    "truncate_head": Context(views.truncate_head, needs_model=True, prompts=PROMPTS),
+    "haystack": Context(haystack, needs_model=True, prompts=PROMPTS),
     "interleaved": Context(
         interleaved.interleaved, intro=_INTERLEAVED, parts=interleaved.interleaved_parts, sources=trajectories_identity
     ),
@@ -25,7 +35,7 @@ CONTEXTS = {
         parts=text_state.state_parts,
         sources=trajectories_identity,
     ),
-    "clip_retrieval": Context(retrieval.clip_retrieval, sources=retrieval.retriever_identity),
+    "clip_retrieval": Context(retrieval.clip_retrieval, prompts=PROMPTS, sources=retrieval.retriever_identity),
     "video": Context(
         video.video,
         intro="Answer the question given the video showing the agent's trajectory over time.",
@@ -47,3 +57,14 @@ def context_named(name: str) -> Context:
     if name not in CONTEXTS:
         raise UsageError(f"unknown context {name!r}; a task's dataset_kwargs takes {', '.join(CONTEXTS)}")
     return CONTEXTS[name]
+
+
+def check_prompt(name: str, prompt: str) -> None:
+    """Check that a context can be asked in the words of a prompt.
+
+    Raises:
+        UsageError: it has words of its own.
+    """
+    if prompt not in context_named(name).prompts:
+        takers = ", ".join(other for other, context in CONTEXTS.items() if prompt in context.prompts)
+        raise UsageError(f"prompt {prompt}: the context {name} is asked in words of its own; it is for {takers}")

@@ -13,7 +13,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.video import FILM_FPS, Video
 from infthor_eval.nieh.options import FRAMES
-from infthor_eval.nieh.prompts import question_text
+from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN, question_text
 from infthor_eval.nieh.recall_settings import RecallSettings
 
 __all__ = ["Context", "ContextPart", "ContextSettings", "Sample", "clue_positions", "trajectories_identity"]
@@ -46,6 +46,7 @@ _VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
     "retriever": (None, "a text"),
     "retriever_revision": (None, "a text"),
     "frames": (lambda value: value in FRAMES, f"one of {', '.join(FRAMES)}"),
+    "prompt": (lambda value: value in PROMPTS, f"one of {', '.join(PROMPTS)}"),
 }
 
 
@@ -95,6 +96,7 @@ class ContextSettings:
         fps: frames per second that are sampled from a trajectory's film.
         seed: seed of everything sampled.
         frames: the frames that are shown (`infthor_eval.nieh.frame_ablations`).
+        prompt: the words of the question, `published-main` or `published-logs`.
     """
 
     ctx_size: float | None = None
@@ -110,6 +112,7 @@ class ContextSettings:
     fps: float = 1.0
     seed: int = 0
     frames: str = "shown"
+    prompt: str = PUBLISHED_MAIN
 
     @classmethod
     def read(cls, given: Mapping[str, Any], place: str = "dataset_kwargs") -> "ContextSettings":
@@ -171,6 +174,7 @@ class Context:
         needs_model: True if the frames depend on the model's tokens per frame.
         intro: the sentence that says what the model sees; the published one where the context is published.
         text_intro: the sentence where texts were recalled.
+        prompts: the prompts in which it can be asked.
         parts: returns what the model sees before that sentence, given the frames of a sample.
         frames: returns the frames of a trajectory that the positions of a sample refer to, given its `fps`.
         positions: returns where in the trajectory's time order the frames of a sample are.
@@ -184,6 +188,7 @@ class Context:
         "Answer the question given what was recalled of the agent's views, in time order, and its last view (the last "
         "image)."
     )
+    prompts: tuple[str, ...] = (PUBLISHED_MAIN,)
     parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(default=_only_frames)
     frames: Callable[[NiehSet, str, float | None], Sequence[FrameRef]] = field(default=_all_frames)
     positions: Callable[[NiehSet, Sample], Sequence[int]] = field(default=_frames_of)
@@ -196,11 +201,11 @@ class Context:
         frames = self.frames(data, sample.question.traj_id, sample.fps)
         return [frames[position] for position in sample.frames]
 
-    def request(self, data: NiehSet, sample: Sample) -> tuple[list[ContextPart], str]:
+    def request(self, data: NiehSet, sample: Sample, prompt: str = PUBLISHED_MAIN) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows it."""
         parts = self.parts(data, sample, self.select_frames(data, sample))
         has_texts = any(isinstance(item, str) for item in sample.recalled or ())
-        return parts, question_text(self.text_intro if has_texts else self.intro, sample.question)
+        return parts, question_text(self.text_intro if has_texts else self.intro, sample.question, prompt)
 
 
 def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:

@@ -4,7 +4,8 @@ Every question is asked once per depth, and reported there. One needle lies at d
 the window starts d_index * (n // 5) frames before it, d_index being the depth's place in the published grid 0, .2, .4,
 .6, .8. So do two that follow each other, a put. Needles that are apart have no depth: each time, other frames between
 and around them are drawn, from the run's seed (the published code has none). Three and more that follow each other
-lie at the last depth every time.
+lie at the last depth every time. As published, a window around several that follow each other may end one frame past
+the trajectory, and then has one frame less.
 
 A question without a needle (an absence) has no depth either: it is asked once, on a window drawn from the trajectory.
 """
@@ -46,12 +47,13 @@ def _window(clues: tuple[int, ...], n_all: int, n: int, d_index: int, draw: rand
         return "no frame fits the window"
     if len(clues) == 1:
         return _around(clues[0], n_all, n, d_index, n_all)
-    if clues[-1] - clues[0] == len(clues) - 1:  # they follow each other
-        # Of a put the published code lets the window end one frame too late, and shows it one frame shorter.
-        return _around(clues[0], n_all, n, *((d_index, n_all + 1) if len(clues) == 2 else (_STEPS - 1, n_all)))
-    pool, missing = sampling_pool(clues, n_all, n), n - len(clues)
+    missing = n - len(clues)
     if missing < 0:
         return "the clues do not fit the window"
+    if clues[-1] - clues[0] == len(clues) - 1:  # they follow each other
+        # As published, the window of several clues may end one frame too late, and is then one frame shorter.
+        return _around(clues[0], n_all, n, d_index if len(clues) == 2 else _STEPS - 1, n_all + 1)
+    pool = sampling_pool(clues, n_all, n)
     if missing > len(pool):
         return "there are not enough frames between and around the clues"
     return tuple(sorted({*clues, *draw.sample(pool, missing)}))

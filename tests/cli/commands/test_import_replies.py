@@ -230,6 +230,7 @@ def test_every_published_reply_has_its_logged_score(tmp_path, run):
     logs = sorted((PUBLISHED / "replies").glob("*.log.gz"))
     code, _, err = run("import-replies", *logs, "--data", PUBLISHED, "--output", tmp_path)
     assert (code, "not imported" in err, "scored otherwise" in err) == (0, False, False)
+    assert err.count("the prompt it was asked with: published-logs\n") == 3
     means = {}
     for folder in (tmp_path / "Qwen2.5-VL-7B-Instruct").iterdir():
         ((task, summary),) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].items()
@@ -237,7 +238,7 @@ def test_every_published_reply_has_its_logged_score(tmp_path, run):
         means[task] = [(cell["n"], round(100 * cell["scores"]["reference"]["mean"], 2)) for cell in cells]
     # The first of each is the mean of the single-clue log, as counted by hand.
     assert means == {
-        "nieh_full": [(829, 55.86), (1303, 51.08)],
-        "nieh_truncate_head_32k": [(829, 56.71), (1303, 54.77)],
-        "nieh_clip_retrieval": [(829, 54.4), (1303, 50.65)],
+        "nieh_published_full": [(829, 55.86), (1303, 51.08)],
+        "nieh_published_last_32k": [(829, 56.71), (1303, 54.77)],
+        "nieh_published_clip_20": [(829, 54.4), (1303, 50.65)],
     }

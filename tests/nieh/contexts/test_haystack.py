@@ -122,6 +122,25 @@ def test_several_clues_are_drawn_from_the_seed_at_each_depth_anew():
     assert draw(1) != draw(2)
 
 
+# Windows of clues in a row, by the published function: frames, clues, frames of a window, the window at each depth.
+IN_A_ROW = [
+    (100, (95, 96, 97), 30, [range(71, 100)] * 5),  # ends one frame past the trajectory: 29 frames
+    (100, (94, 95, 96), 30, [range(70, 100)] * 5),
+    (100, (96, 97, 98), 30, [None] * 5),
+    (100, (50, 51, 52), 3, [range(50, 53)] * 5),
+    (100, (50, 51, 52), 2, [None] * 5),
+    (100, (50, 51), 1, [None] * 5),
+    (100, (76, 77), 25, [range(76, 100), *(range(76 - 5 * d, 101 - 5 * d) for d in range(1, 5))]),
+]
+
+
+@pytest.mark.parametrize(("n_frames", "clues", "n", "expected"), IN_A_ROW)
+def test_clues_in_a_row_have_the_published_windows(n_frames, clues, n, expected):
+    found = windows(n_frames, clues, ctx_size=n, tokens_per_frame=1000)
+    shown = [sample.frames if isinstance(sample, Sample) else None for sample in found]
+    assert shown == [window and tuple(window) for window in expected]
+
+
 def test_two_adjacent_clues_are_one_needle():
     samples = windows(100, [50, 51], ctx_size=10, tokens_per_frame=1000)
     assert [sample.variant for sample in samples] == [f"depth={depth:g}" for depth in DEPTHS]
