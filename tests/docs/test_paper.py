@@ -24,7 +24,8 @@ SECTIONS = ("A.1.1", "A.1.2", "A.1.3", "A.2", "B.1", "C.1", "C.2", "D")
 
 
 def rows() -> list[list[str]]:
-    return [[cell.strip() for cell in line.split(" | ")] for line in TABLE_ROW.findall(PAGE)]
+    claims, _, _ = PAGE.partition("## What is left")
+    return [[cell.strip() for cell in line.split(" | ")] for line in TABLE_ROW.findall(claims)]
 
 
 @cache
