@@ -30,9 +30,7 @@ def vitals(tmp_path: Path, *words: str, command=("python", "-c", PRINTS), **fiel
     return done.returncode, done.stdout, json.loads(file.read_text())[0]["figures"][0]
 
 
-@pytest.mark.parametrize(
-    ("value", "moved"), [(4.5, False), (4.7, False), (4.3, False), (4.71, True), (4.2, True)]
-)
+@pytest.mark.parametrize(("value", "moved"), [(4.5, False), (4.7, False), (4.3, False), (4.71, True), (4.2, True)])
 def test_what_is_within_the_noise_has_not_moved(tmp_path, value, moved):
     code, shown, _ = vitals(tmp_path, value=value)
     assert (code, "MOVED" in shown) == ((1, True) if moved else (0, False))

@@ -5,8 +5,9 @@ world that it has made. It is told the goal alone, in one of three forms:
 
 - interleaved (`--history full`): the whole history as a user's turn. After the first plan, done or failed, the script
   ends; the other plans are never tried, and count as not done.
-- memory as text (`--history text`) and as frames (`--history frames:K`): each action is asked for anew, with the memory
-  and the present frame. After a failure the next plan follows.
+- memory as text (`--history text`) and as frames (`--history retrieved:K`, the frames that the trajectory's file names,
+  or `frames:K`, those nearest to the present one): each action is asked for anew, with the memory and the present
+  frame. After a failure the next plan follows.
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,7 @@ from infthor_eval.household.sequence_text import ACT, action_part, goal_part
 from infthor_eval.plans.history import StateInWords
 from infthor_eval.plans.past import CountTokens, History, Past
 from infthor_eval.plans.recalled_history import RecalledHistory
+from infthor_eval.plans.retrieved_frames import RetrievedFrames
 from infthor_eval.plans.segments import Part
 from model_adapters import Decoding
 
@@ -84,9 +86,9 @@ class _TextMemory:
 
 @dataclass(frozen=True)
 class _FrameMemory:
-    """The task, and the frames that are nearest to the present one."""
+    """The task, and frames of what came before."""
 
-    frames: RecalledHistory
+    frames: RecalledHistory | RetrievedFrames
     needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
@@ -106,10 +108,10 @@ def final_form(history: History, name: str) -> FinalForm:
     if isinstance(history, StateInWords):
         system = prompts["memory"].format(given=prompts["given_text"])
         return FinalForm(system, _TextMemory(), asks_anew=True, goes_on=True)
-    if name.startswith("frames:") and isinstance(history, RecalledHistory):
+    if isinstance(history, RetrievedFrames) or (name.startswith("frames:") and isinstance(history, RecalledHistory)):
         system = prompts["memory"].format(given=prompts["given_frames"])
         return FinalForm(system, _FrameMemory(history), asks_anew=True, goes_on=True)
-    raise UsageError(f"--protocol published has the histories full, text and frames:K, not {name}")
+    raise UsageError(f"--protocol published has the histories full, text, retrieved:K and frames:K, not {name}")
 
 
 def with_recorded_state(past: Past, trajectory: Trajectory, first: int) -> Past:

@@ -30,7 +30,7 @@ class PlansOptions(SimulatorOptions):
     history: str | None = field(
         default=None,
         metadata={
-            "help": "What a model is given of the past: full, published, last:TOKENS, text, frames:K, memory.",
+            "help": "What a model gets of the past: full, published, last:TOKENS, text, retrieved:K, frames:K, memory.",
             "metavar": "HOW",
         },
     )
