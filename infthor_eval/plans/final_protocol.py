@@ -12,23 +12,21 @@ world that it has made. It is told the goal alone, in one of three forms:
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import ClassVar
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.household.sequence_text import ACT, action_part, goal_part
 from infthor_eval.plans.history import StateInWords
 from infthor_eval.plans.past import CountTokens, History, Past
 from infthor_eval.plans.recalled_history import RecalledHistory
 from infthor_eval.plans.retrieved_frames import RetrievedFrames
 from infthor_eval.plans.segments import Part
+from infthor_eval.plans.system_prompts import system_prompt
 from model_adapters import Decoding
 
 __all__ = ["MAX_STEPS", "FinalForm", "GoalHistory", "final_form", "present_parts", "with_recorded_state"]
 
-_PROMPTS = Path(__file__).with_name("prompts.yaml")
 _MAX_TOKENS = 32
 MAX_STEPS = 201  # of one plan
 
@@ -102,15 +100,12 @@ def final_form(history: History, name: str) -> FinalForm:
     Raises:
         UsageError: the published scripts have no such form.
     """
-    prompts = read_yaml(_PROMPTS, "install the package again")
     if name in ("full", "published"):
-        return FinalForm(prompts["interleaved"], GoalHistory(), ends=(ACT,))
+        return FinalForm(system_prompt("goals"), GoalHistory(), ends=(ACT,))
     if isinstance(history, StateInWords):
-        system = prompts["memory"].format(given=prompts["given_text"])
-        return FinalForm(system, _TextMemory(), asks_anew=True, goes_on=True)
+        return FinalForm(system_prompt("text"), _TextMemory(), asks_anew=True, goes_on=True)
     if isinstance(history, RetrievedFrames) or (name.startswith("frames:") and isinstance(history, RecalledHistory)):
-        system = prompts["memory"].format(given=prompts["given_frames"])
-        return FinalForm(system, _FrameMemory(history), asks_anew=True, goes_on=True)
+        return FinalForm(system_prompt("frames"), _FrameMemory(history), asks_anew=True, goes_on=True)
     raise UsageError(f"--protocol published has the histories full, text, retrieved:K and frames:K, not {name}")
 
 

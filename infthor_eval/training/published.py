@@ -1,7 +1,7 @@
 """Import of the published trainer's checkpoints: torch's distributed checkpoints of a model from the hub.
 
-The published trainer cannot export them. Their weights are put into the model that training started from, which is then
-written like any other checkpoint.
+Of the published code, branch `dev` alone exports them, and Qwen2.5-VL alone. Here their weights are put into the model
+that training started from, which is then written like any other checkpoint.
 """
 
 from collections import Counter
