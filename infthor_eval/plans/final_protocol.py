@@ -16,7 +16,8 @@ from typing import ClassVar
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.household.sequence_text import ACT, action_part, goal_part
+from infthor_eval.household.sequence_text import ACT
+from infthor_eval.plans.chat_histories import GoalHistory
 from infthor_eval.plans.history import StateInWords
 from infthor_eval.plans.past import CountTokens, History, Past
 from infthor_eval.plans.recalled_history import RecalledHistory
@@ -25,7 +26,7 @@ from infthor_eval.plans.segments import Part
 from infthor_eval.plans.system_prompts import system_prompt
 from model_adapters import Decoding
 
-__all__ = ["MAX_STEPS", "FinalForm", "GoalHistory", "final_form", "present_parts", "with_recorded_state"]
+__all__ = ["MAX_STEPS", "FinalForm", "final_form", "present_parts", "with_recorded_state"]
 
 _MAX_TOKENS = 32
 MAX_STEPS = 201  # of one plan
@@ -52,23 +53,6 @@ class FinalForm:
     def decoding(self, seed: int) -> Decoding:
         """Return the decoding: as Qwen2.5-VL's own settings have it, greedy with the checkpoint's penalty."""
         return Decoding(max_new_tokens=_MAX_TOKENS, seed=seed, stop=self.ends)
-
-
-class GoalHistory:
-    """The whole history with goals and actions, in which each plan begins with a mark and no text."""
-
-    needs_state: ClassVar[bool] = False
-
-    def recall(self, past: Past, count: CountTokens) -> list[Part]:
-        """See `History`."""
-        parts: list[Part] = []
-        for segment in past.all:
-            if segment.goal is not None:
-                parts += goal_part(segment.goal), past.all[0].before
-            if segment.steps and segment.in_task:
-                parts.append(ACT)
-                parts += (part for action, frame in segment.steps for part in (action_part(action), frame))
-        return parts
 
 
 @dataclass(frozen=True)

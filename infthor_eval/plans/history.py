@@ -5,6 +5,7 @@ from typing import ClassVar
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.household.sequence_text import ACT, action_part, goal_part, plan_part
+from infthor_eval.plans.chat_histories import GoalHistory, PlanHistory
 from infthor_eval.plans.past import CountTokens, History, Past
 from infthor_eval.plans.recalled_history import MemoryChoice
 from infthor_eval.plans.retrieved_frames import RetrievedFrames
@@ -100,7 +101,8 @@ def history_named(text: str, memory: MemoryChoice) -> History:
     """Return the history of a value of `--history`.
 
     Args:
-        text: "full", "published", "last:N" (N tokens), "text", "retrieved:K" or "frames:K" (K frames), or "memory".
+        text: "full", "published", "goals", "plans", "last:N" (N tokens), "text", "retrieved:K" or "frames:K" (K
+            frames), or "memory".
         memory: the options of memories.
 
     Raises:
@@ -119,13 +121,14 @@ def history_named(text: str, memory: MemoryChoice) -> History:
         return _SIZED[kind](size)
     if text in _WHOLE:
         return _WHOLE[text]()
-    raise UsageError(
-        f"--history {text}: there are full, published, last:TOKENS, text, retrieved:K, frames:K and memory"
-    )
+    raise UsageError(f"--history {text}: there are {_ALL}")
 
 
+_ALL = "full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans"
 _WHOLE: Mapping[str, Callable[[], History]] = {
     "full": FullHistory,
+    "goals": GoalHistory,
+    "plans": PlanHistory,
     "published": PublishedHistory,
     "text": StateInWords,
 }

@@ -8,7 +8,8 @@ from infthor_eval.formats.yaml_files import read_yaml
 
 __all__ = ["PromptForm", "system_prompt"]
 
-PromptForm = Literal["goals", "text", "frames"]  # the whole history, a memory in words, a memory of frames
+# The whole history without plans, a memory in words, one of frames, the plans before.
+PromptForm = Literal["goals", "text", "frames", "plans"]
 _FILE = Path(__file__).with_name("prompts.yaml")
 
 
@@ -18,4 +19,6 @@ def system_prompt(form: PromptForm) -> str:
     prompts = read_yaml(_FILE, "install the package again")
     if form == "goals":
         return str(prompts["interleaved"])
+    if form == "plans":
+        return str(prompts["plans"])
     return str(prompts["memory"].format(given=prompts[f"given_{form}"]))

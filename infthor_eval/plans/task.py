@@ -9,6 +9,7 @@ from infthor_eval.episodes.task_settings import task_settings
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.plans.chat_forms import chat_form
 from infthor_eval.plans.environment import MAX_STEPS
 from infthor_eval.plans.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
 from infthor_eval.plans.final_protocol import FinalForm, final_form
@@ -99,7 +100,10 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             kwargs = {**kwargs, "do_sample": False, "temperature": 0.0}
         self.decoding = decoding_of(kwargs, request.seed, file.name)
         self.history = history_named(settings.history, self._memory_choice())
-        self.final_form = self._final_form(settings, request.seed)
+        self.final_form = self._final_form(settings)
+        self._form = self.final_form or chat_form(self.history)
+        if self._form is not None:
+            self.history, self.decoding = self._form.history, self._form.decoding(request.seed)
         super().__init__(file, request, settings, partial(read_plan_trajectory, words=self.words))
         having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
         self.evaluated_trajectories = limit_items(having_plans, lambda item: item.traj_id, request.seed, request.limit)
@@ -111,15 +115,13 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         blank = options.frames == "blank"
         return MemoryChoice(options.memory, options.memory_args, options.budget, options.retriever, blank)
 
-    def _final_form(self, settings: PlanTaskSettings, seed: int) -> FinalForm | None:
-        """Return the published form of final tasks, and take its history and decoding; None without it."""
+    def _final_form(self, settings: PlanTaskSettings) -> FinalForm | None:
+        """Return the published form of final tasks; None without it."""
         if settings.protocol == "default":
             return None
         if settings.plans != "final":
             raise UsageError("--protocol published is for final tasks; take --tasks infthor_final")
-        form = final_form(self.history, settings.history)
-        self.history, self.decoding = form.history, form.decoding(seed)
-        return form
+        return final_form(self.history, settings.history)
 
     def plans(self, trajectory: PlanTrajectory) -> list[Plan]:
         """Return the plans of a trajectory that are evaluated."""
@@ -137,7 +139,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             decoding=self.decoding,
             history=self.history,
             words=self.words,
-            form=self.final_form,
+            form=self._form,
             preamble=self.settings.preamble,
             constrained=self._options.constrained,
             blank=self._options.frames == "blank",
