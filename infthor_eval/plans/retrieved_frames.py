@@ -5,7 +5,7 @@ looked up in `images`, which has the action that each frame was taken at; what i
 that action, so that past and present come from one simulator.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -19,7 +19,7 @@ from infthor_eval.household.sequence_text import goal_part, plan_part
 from infthor_eval.plans.past import CountTokens, Past
 from infthor_eval.plans.segments import Part
 
-__all__ = ["RetrievedFrames", "retrieved_steps"]
+__all__ = ["RetrievedFrames", "require_retrieved", "retrieved_steps"]
 
 _SIDE = 336  # pixels, of remembered frames in the published script; the present one keeps its size
 _FIRST = "000000000"  # the frame before the first action, which `images` does not list
@@ -55,6 +55,17 @@ class RetrievedFrames:
             raise DataError("the trajectory's file is not known, which --history retrieved:K reads")
         steps = retrieved_steps(past.trajectory, len(frames) - 1, self._k)
         return [_resized(frames[step]) for step in steps]
+
+
+def require_retrieved(trajectories: Iterable[Trajectory], task: str) -> None:
+    """Check before the work that some trajectory names retrieved frames; `task` is named in the message.
+
+    Raises:
+        DataError: none does.
+    """
+    if not any(trajectory.retrieved_image for trajectory in trajectories):
+        missing = "no trajectory there has retrieved_image, which --history retrieved:K shows"
+        raise DataError(f"{task}: {missing}; take --history frames:K, or the published test files")
 
 
 def retrieved_steps(trajectory: Trajectory, action: int, k: int) -> Sequence[int]:

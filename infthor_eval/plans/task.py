@@ -18,6 +18,7 @@ from infthor_eval.plans.model_actor import AgentConfig
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
 from infthor_eval.plans.recalled_history import MemoryChoice, RecalledHistory
+from infthor_eval.plans.retrieved_frames import require_retrieved
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -109,6 +110,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         self.evaluated_trajectories = limit_items(having_plans, lambda item: item.traj_id, request.seed, request.limit)
         if not self.evaluated_trajectories:
             raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
+        if settings.history.startswith("retrieved:"):
+            require_retrieved((item.data for item in self.evaluated_trajectories), self.name)
 
     def _memory_choice(self) -> MemoryChoice:
         options = self._options

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import iter_trajectories
@@ -130,12 +130,19 @@ def test_frames_that_the_file_names_are_remembered_in_the_published_size(acting,
     assert [told.count("previous states (history)") for told in model.told] == [1]
 
 
-def test_a_file_that_names_no_frames_is_told(acting):
+def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(acting, final):
+    path = final / f"{FORK}.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"retrieved_image": {"0": {"top20": []}}}))
     _, model, outcome = acting([], history="retrieved:20")
     assert model.asked == []
     for record in outcome.records:
         assert record.failure.startswith(f'trajectory {FORK}: retrieved_image["')
         assert record.failure.endswith("(nothing was retrieved before this action); take --history frames:20")
+
+
+def test_files_that_name_no_frames_are_refused_before_the_work(acting):
+    with pytest.raises(DataError, match="infthor_final: no trajectory there has retrieved_image"):
+        acting([], history="retrieved:20")
 
 
 @pytest.mark.parametrize(
