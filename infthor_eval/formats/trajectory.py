@@ -199,6 +199,7 @@ class Trajectory(_Fields):
     object_log: list[Any] = msgspec.field(default_factory=list)
     images: list[Any] = msgspec.field(default_factory=list)
     state_summary: dict[str, str] | None = None
+    retrieved_image: dict[str, Any] | None = None
     turk_annotations: dict[str, Any] | None = None
     gen_info: dict[str, Any] | None = None
 

@@ -23,6 +23,7 @@ __all__ = [
     "plan_part",
     "plan_text",
     "sequence_text",
+    "task_goal_part",
 ]
 
 _Item = TypeVar("_Item")
@@ -141,6 +142,11 @@ def goal_text(trajectory: Trajectory, task: SubTask | None) -> str:
 def goal_part(goal: str) -> str:
     """Return a goal as part of the sequence; the frame at its start follows."""
     return f"{_GOAL}Your main goal: {goal}{_GOAL}"
+
+
+def task_goal_part(goal: str) -> str:
+    """Return a goal in the words of the published Qwen2.5-VL trainer, which differ from those of evaluation."""
+    return f"{_GOAL}Your task goal: {goal}{_GOAL}"
 
 
 def plan_part(plan: str) -> str:

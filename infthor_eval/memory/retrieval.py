@@ -6,8 +6,9 @@ The retriever is imported where it is needed: that takes seconds, which other me
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
+from infthor_eval.errors import DataError
 from infthor_eval.memory.frames import PUBLISHED_K, FrameMemory
 from infthor_eval.memory.protocol import Query
 
@@ -58,15 +59,42 @@ class _Nearest(FrameMemory):
 
 
 class Clip(_Nearest):
-    """The frames nearest to the question's text (the published retrieval, k = 10)."""
+    """The frames nearest to a text: the question (the published retrieval of NIEH, k = 10), or the goal.
+
+    `query=goal` with k = 20 and `openai/clip-vit-base-patch32` is the one retrieval for agents in the published code
+    (`run_interactive_eval_clip.py`).
+    """
+
+    def __init__(
+        self,
+        k: int = PUBLISHED_K,
+        retriever: str = PUBLISHED_RETRIEVER,
+        retriever_revision: str | None = None,
+        query: Literal["question", "goal"] = "question",
+    ) -> None:
+        """See `_Nearest`; `query` is the text that frames are compared with: an agent's question is goal and plan."""
+        super().__init__(k, retriever, retriever_revision)
+        self._query = query
 
     def vector(self, query: Query) -> Any:
-        """See `_Nearest`."""
-        return self.retriever.text(query.text)
+        """See `_Nearest`.
+
+        Raises:
+            DataError: the goal is to be compared, and is not known.
+        """
+        if self._query == "question":
+            return self.retriever.text(query.text)
+        if not query.present.goal:
+            raise DataError("the goal at this step is not known; take query=question (--memory-args)")
+        return self.retriever.text(query.present.goal)
 
 
 class ClipView(_Nearest):
-    """The frames nearest to the current view (the paper's image memory for long-horizon tasks, k = 20)."""
+    """The frames nearest to the current view: ours, where a trajectory does not name the frames of an image memory.
+
+    The paper's image memory (k = 20) came from `retrieved_image` of the trajectories' files; what chose it is not in
+    the published code.
+    """
 
     def vector(self, query: Query) -> Any:
         """See `_Nearest`."""

@@ -134,6 +134,7 @@ class Expert:
             self._state(first) if self._log else "",
             self._object_logs[: first + 1],
             clue_step(self._object_logs, self._trajectory, present, first - 1),
+            self._trajectory,
         )
 
     def _open_segment(self, plan: int) -> PlanSegment:

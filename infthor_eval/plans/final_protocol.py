@@ -5,28 +5,29 @@ world that it has made. It is told the goal alone, in one of three forms:
 
 - interleaved (`--history full`): the whole history as a user's turn. After the first plan, done or failed, the script
   ends; the other plans are never tried, and count as not done.
-- memory as text (`--history text`) and as frames (`--history frames:K`): each action is asked for anew, with the memory
-  and the present frame. After a failure the next plan follows.
+- memory as text (`--history text`) and as frames (`--history retrieved:K`, the frames that the trajectory's file names,
+  or `frames:K`, those nearest to the present one): each action is asked for anew, with the memory and the present
+  frame. After a failure the next plan follows.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import ClassVar
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.household.sequence_text import ACT, action_part, goal_part
+from infthor_eval.household.sequence_text import ACT
+from infthor_eval.plans.chat_histories import GoalHistory
 from infthor_eval.plans.history import StateInWords
 from infthor_eval.plans.past import CountTokens, History, Past
 from infthor_eval.plans.recalled_history import RecalledHistory
+from infthor_eval.plans.retrieved_frames import RetrievedFrames
 from infthor_eval.plans.segments import Part
+from infthor_eval.plans.system_prompts import system_prompt
 from model_adapters import Decoding
 
-__all__ = ["MAX_STEPS", "FinalForm", "GoalHistory", "final_form", "present_parts", "with_recorded_state"]
+__all__ = ["MAX_STEPS", "FinalForm", "final_form", "present_parts", "with_recorded_state"]
 
-_PROMPTS = Path(__file__).with_name("prompts.yaml")
 _MAX_TOKENS = 32
 MAX_STEPS = 201  # of one plan
 
@@ -54,23 +55,6 @@ class FinalForm:
         return Decoding(max_new_tokens=_MAX_TOKENS, seed=seed, stop=self.ends)
 
 
-class GoalHistory:
-    """The whole history with goals and actions, in which each plan begins with a mark and no text."""
-
-    needs_state: ClassVar[bool] = False
-
-    def recall(self, past: Past, count: CountTokens) -> list[Part]:
-        """See `History`."""
-        parts: list[Part] = []
-        for segment in past.all:
-            if segment.goal is not None:
-                parts += goal_part(segment.goal), past.all[0].before
-            if segment.steps and segment.in_task:
-                parts.append(ACT)
-                parts += (part for action, frame in segment.steps for part in (action_part(action), frame))
-        return parts
-
-
 @dataclass(frozen=True)
 class _TextMemory:
     """The task, and the state of the room in words."""
@@ -84,9 +68,9 @@ class _TextMemory:
 
 @dataclass(frozen=True)
 class _FrameMemory:
-    """The task, and the frames that are nearest to the present one."""
+    """The task, and frames of what came before."""
 
-    frames: RecalledHistory
+    frames: RecalledHistory | RetrievedFrames
     needs_state: ClassVar[bool] = False
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
@@ -100,16 +84,13 @@ def final_form(history: History, name: str) -> FinalForm:
     Raises:
         UsageError: the published scripts have no such form.
     """
-    prompts = read_yaml(_PROMPTS, "install the package again")
     if name in ("full", "published"):
-        return FinalForm(prompts["interleaved"], GoalHistory(), ends=(ACT,))
+        return FinalForm(system_prompt("goals"), GoalHistory(), ends=(ACT,))
     if isinstance(history, StateInWords):
-        system = prompts["memory"].format(given=prompts["given_text"])
-        return FinalForm(system, _TextMemory(), asks_anew=True, goes_on=True)
-    if name.startswith("frames:") and isinstance(history, RecalledHistory):
-        system = prompts["memory"].format(given=prompts["given_frames"])
-        return FinalForm(system, _FrameMemory(history), asks_anew=True, goes_on=True)
-    raise UsageError(f"--protocol published has the histories full, text and frames:K, not {name}")
+        return FinalForm(system_prompt("text"), _TextMemory(), asks_anew=True, goes_on=True)
+    if isinstance(history, RetrievedFrames) or (name.startswith("frames:") and isinstance(history, RecalledHistory)):
+        return FinalForm(system_prompt("frames"), _FrameMemory(history), asks_anew=True, goes_on=True)
+    raise UsageError(f"--protocol published has the histories full, text, retrieved:K and frames:K, not {name}")
 
 
 def with_recorded_state(past: Past, trajectory: Trajectory, first: int) -> Past:

@@ -1,12 +1,14 @@
 """How much of the true history a model is given before it acts."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.household.sequence_text import ACT, action_part, goal_part, plan_part
+from infthor_eval.plans.chat_histories import GoalHistory, PlanHistory
 from infthor_eval.plans.past import CountTokens, History, Past
 from infthor_eval.plans.recalled_history import MemoryChoice
+from infthor_eval.plans.retrieved_frames import RetrievedFrames
 from infthor_eval.plans.segments import Part, PlanSegment, restart_at, segment_parts
 
 __all__ = ["FullHistory", "LastTokens", "PublishedHistory", "StateInWords", "history_named"]
@@ -99,7 +101,8 @@ def history_named(text: str, memory: MemoryChoice) -> History:
     """Return the history of a value of `--history`.
 
     Args:
-        text: "full", "published", "last:N" (N tokens), "text", "frames:K" (K frames), or "memory".
+        text: "full", "published", "goals", "plans", "last:N" (N tokens), "text", "retrieved:K" or "frames:K" (K
+            frames), or "memory".
         memory: the options of memories.
 
     Raises:
@@ -110,16 +113,23 @@ def history_named(text: str, memory: MemoryChoice) -> History:
     if text == "memory":
         return memory.open()
     memory.refuse(text)
-    if kind == "frames" and size:  # the paper's image memory (20 frames)
+    if kind == "frames" and size:  # where the trajectories have no frames of their own for `retrieved:K`
         return MemoryChoice("clip-view", f"k={size}", None, memory.retriever, memory.blank).open()
     if memory.retriever is not None:
         raise UsageError(f"--retriever: --history {text} retrieves no frames; leave it out, or use --history frames:K")
-    if text == "full":
-        return FullHistory()
-    if text == "published":
-        return PublishedHistory()
-    if text == "text":
-        return StateInWords()
-    if kind == "last" and size:
-        return LastTokens(size)
-    raise UsageError(f"--history {text}: there are full, published, last:TOKENS, text, frames:K and memory")
+    if kind in _SIZED and size:
+        return _SIZED[kind](size)
+    if text in _WHOLE:
+        return _WHOLE[text]()
+    raise UsageError(f"--history {text}: there are {_ALL}")
+
+
+_ALL = "full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans"
+_WHOLE: Mapping[str, Callable[[], History]] = {
+    "full": FullHistory,
+    "goals": GoalHistory,
+    "plans": PlanHistory,
+    "published": PublishedHistory,
+    "text": StateInWords,
+}
+_SIZED: Mapping[str, Callable[[int], History]] = {"last": LastTokens, "retrieved": RetrievedFrames}

@@ -29,7 +29,7 @@ class AgentConfig:
     Attributes:
         history: the part of the history that it is given.
         words: words of actions.
-        form: the published form of final tasks; None elsewhere.
+        form: the published form of final tasks, or of a chat; None elsewhere.
         preamble: text before everything else; empty as published.
         constrained: whether its replies are restricted to the actions that are possible in view.
         blank: whether it is shown grey frames instead of the actual ones.

@@ -30,7 +30,7 @@ class PlansOptions(SimulatorOptions):
     history: str | None = field(
         default=None,
         metadata={
-            "help": "What a model is given of the past: full, published, last:TOKENS, text, frames:K, memory.",
+            "help": "Past of a model: full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals, plans.",
             "metavar": "HOW",
         },
     )

@@ -7,6 +7,7 @@ from typing import ClassVar, Protocol
 from infthor_eval.formats.blank import blank_like
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.step_log import ObjectLog
+from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.memory import Observation
 from infthor_eval.plans.segments import Part, PlanSegment, goal_of_last
 
@@ -25,6 +26,7 @@ class Past:
         state: the state of room and agent in words, as far as it was seen; empty if no history needs it.
         logs: what each frame up to the present one shows, for memories that are given it; empty if it is not known.
         clue: number of the last frame with what the plan needs in view (`clue_steps`); None if there is none.
+        trajectory: the trajectory's own file, for what it has retrieved (`retrieved_frames`); None if it is not known.
     """
 
     segments: Sequence[PlanSegment]
@@ -32,6 +34,7 @@ class Past:
     state: str = ""
     logs: Sequence[ObjectLog] = ()
     clue: int | None = None
+    trajectory: Trajectory | None = None
 
     @property
     def all(self) -> list[PlanSegment]:

@@ -9,6 +9,7 @@ from infthor_eval.episodes.task_settings import task_settings
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.plans.chat_forms import chat_form
 from infthor_eval.plans.environment import MAX_STEPS
 from infthor_eval.plans.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
 from infthor_eval.plans.final_protocol import FinalForm, final_form
@@ -17,6 +18,7 @@ from infthor_eval.plans.model_actor import AgentConfig
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
 from infthor_eval.plans.recalled_history import MemoryChoice, RecalledHistory
+from infthor_eval.plans.retrieved_frames import require_retrieved
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -99,27 +101,30 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             kwargs = {**kwargs, "do_sample": False, "temperature": 0.0}
         self.decoding = decoding_of(kwargs, request.seed, file.name)
         self.history = history_named(settings.history, self._memory_choice())
-        self.final_form = self._final_form(settings, request.seed)
+        self.final_form = self._final_form(settings)
+        self._form = self.final_form or chat_form(self.history)
+        if self._form is not None:
+            self.history, self.decoding = self._form.history, self._form.decoding(request.seed)
         super().__init__(file, request, settings, partial(read_plan_trajectory, words=self.words))
         having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
         self.evaluated_trajectories = limit_items(having_plans, lambda item: item.traj_id, request.seed, request.limit)
         if not self.evaluated_trajectories:
             raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
+        if settings.history.startswith("retrieved:"):
+            require_retrieved((item.data for item in self.evaluated_trajectories), self.name)
 
     def _memory_choice(self) -> MemoryChoice:
         options = self._options
         blank = options.frames == "blank"
         return MemoryChoice(options.memory, options.memory_args, options.budget, options.retriever, blank)
 
-    def _final_form(self, settings: PlanTaskSettings, seed: int) -> FinalForm | None:
-        """Return the published form of final tasks, and take its history and decoding; None without it."""
+    def _final_form(self, settings: PlanTaskSettings) -> FinalForm | None:
+        """Return the published form of final tasks; None without it."""
         if settings.protocol == "default":
             return None
         if settings.plans != "final":
             raise UsageError("--protocol published is for final tasks; take --tasks infthor_final")
-        form = final_form(self.history, settings.history)
-        self.history, self.decoding = form.history, form.decoding(seed)
-        return form
+        return final_form(self.history, settings.history)
 
     def plans(self, trajectory: PlanTrajectory) -> list[Plan]:
         """Return the plans of a trajectory that are evaluated."""
@@ -137,7 +142,7 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             decoding=self.decoding,
             history=self.history,
             words=self.words,
-            form=self.final_form,
+            form=self._form,
             preamble=self.settings.preamble,
             constrained=self._options.constrained,
             blank=self._options.frames == "blank",

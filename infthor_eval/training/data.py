@@ -15,8 +15,10 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.plans.segments import PlanSegment
 from infthor_eval.training.action_sequences import recorded_segments, windows
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.goal_sequences import goal_windows
+from infthor_eval.training.memory_sequences import memory_sequences
 from infthor_eval.training.question_sequences import question_sequences
-from infthor_eval.training.recipe import Recipe
+from infthor_eval.training.recipe import ActionData, Recipe
 
 __all__ = ["TrainingData", "action_sequences", "read_history", "read_training_data", "trajectory_names"]
 
@@ -73,7 +75,7 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
 def _read_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[TrainingSequence | SkippedItem]:
     if recipe.actions is not None:
         yield from _sample_share(
-            action_sequences(NiehSet(folder, needs_questions=False), encoder, recipe.max_tokens, recipe.words),
+            _action_items(recipe, recipe.actions, encoder, NiehSet(folder, needs_questions=False)),
             recipe.actions.share,
             recipe.seed,
         )
@@ -83,6 +85,23 @@ def _read_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[Traini
             samples = find_samples({**settings, "context": context})
             items = question_sequences(encoder, samples, recipe.max_tokens)
             yield from _sample_share(items, recipe.questions.share, recipe.seed)
+
+
+def _action_items(
+    recipe: Recipe, actions: ActionData, encoder: Encoder, data: NiehSet
+) -> Iterator[TrainingSequence | SkippedItem]:
+    if actions.form == "plans":
+        yield from action_sequences(data, encoder, recipe.max_tokens, recipe.words)
+        return
+    for name in trajectory_names(data):
+        try:
+            trajectory, segments = read_history(data, name, recipe.words)
+            if actions.form == "goals":
+                yield from goal_windows(encoder, name, segments, recipe.max_tokens)
+            else:
+                yield from memory_sequences(encoder, data, trajectory, segments, actions.form, recipe.max_tokens)
+        except DataError as error:
+            yield SkippedItem(name, str(error))
 
 
 def action_sequences(

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from infthor_eval.errors import DataError
+from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import ACT, action_part, plan_part
 from infthor_eval.plans.segments import PlanSegment, segment_parts
 from model_adapters import Part, Turn
 from model_adapters.hf.loaded import LoadedCheckpoint
 from model_adapters.hf.prompt import Frame, Piece, Prompter, n_tokens
 
-__all__ = ["Encoder", "SkippedItem", "TrainingSequence"]
+__all__ = ["Encoder", "SkippedItem", "TrainingSequence", "within"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,11 @@ class SkippedItem:
     reason: str
 
 
+def within(sequence: TrainingSequence, limit: int) -> TrainingSequence | SkippedItem:
+    """Return the sequence, or a skipped item if it has more tokens than the limit, frames expanded."""
+    return SkippedItem(sequence.name, f"longer than {limit} tokens") if sequence.n_tokens > limit else sequence
+
+
 class Encoder:
     """Builds sequences for one checkpoint; its template also renders prompts in evaluation."""
 
@@ -70,14 +76,15 @@ class Encoder:
         ends = loaded.generation.end_ids
         self._end: int = loaded.tokenizer.eos_token_id if loaded.tokenizer.eos_token_id in ends else min(ends)
 
-    def pieces(self, parts: Sequence[Part]) -> list[Piece]:
-        """Return the prompt of a user turn with these parts.
+    def pieces(self, parts: Sequence[Part], system: str | None = None) -> list[Piece]:
+        """Return the prompt of a user turn with these parts, after a system's turn if there is one.
 
         Raises:
             DataError: a frame cannot be read.
             ModelError: the template refuses the parts.
         """
-        return self._prompter.pieces([Turn("user", tuple(parts))])
+        told = () if system is None else (Turn("system", (system,)),)
+        return self._prompter.pieces([*told, Turn("user", tuple(parts))])
 
     def actions(self, name: str, segments: Sequence[PlanSegment]) -> TrainingSequence:
         """Encode a history, with loss on its actions and the marks around them (appendix B).
@@ -87,6 +94,24 @@ class Encoder:
             ModelError: the template refuses the history.
         """
         return self._encode_actions(name, segment_parts(segments), sum(len(segment.steps) for segment in segments))
+
+    def chat_actions(self, name: str, system: str, parts: Sequence[Part]) -> TrainingSequence:
+        """Encode a user's turn of goals, actions and frames after a system prompt, with loss as in a history.
+
+        Raises:
+            DataError: a frame cannot be read, or a text but the actions contains a mark.
+            ModelError: the template refuses the turns.
+        """
+        n_actions = sum(isinstance(part, str) and part.startswith(ACT) for part in parts)
+        return self._with_loss(name, self.pieces(parts, system), n_actions)
+
+    def frame_tokens(self, frame: FrameRef) -> int:
+        """Return the tokens of a frame, without those that the template writes around it.
+
+        Raises:
+            DataError: the frame cannot be read.
+        """
+        return len(self._prompter.frame(frame).ids)
 
     def text_plan(self, name: str, plan: str, actions: Sequence[str]) -> TrainingSequence:
         """Encode a plan and its actions without frames, with loss as in a history.
@@ -98,19 +123,21 @@ class Encoder:
         return self._encode_actions(name, [plan_part(plan), *map(action_part, actions)], len(actions))
 
     def _encode_actions(self, name: str, parts: Sequence[Part], n_actions: int) -> TrainingSequence:
-        pieces = self.pieces(parts)
+        return self._with_loss(name, self.pieces(parts), n_actions)
+
+    def _with_loss(self, name: str, pieces: Sequence[Piece], n_actions: int) -> TrainingSequence:
         if pieces.count(self._mark) != 2 * n_actions:
             raise DataError(f"{name}: a goal, a plan or an action contains {ACT}; leave the trajectory out")
         return TrainingSequence(name, tuple(pieces), tuple(self._is_between_marks(pieces)))
 
-    def answer(self, name: str, parts: Sequence[Part], answer: str) -> TrainingSequence:
+    def answer(self, name: str, parts: Sequence[Part], answer: str, system: str | None = None) -> TrainingSequence:
         """Encode a question and its answer, with loss on the answer and the token that ends the turn.
 
         Raises:
             DataError: a frame cannot be read.
             ModelError: the template refuses the question.
         """
-        prompt = self.pieces(parts)
+        prompt = self.pieces(parts, system)
         reply: list[int] = [*self._tokenizer(answer, add_special_tokens=False)["input_ids"], self._end]
         return TrainingSequence(name, (*prompt, *reply), (False,) * len(prompt) + (True,) * len(reply))
 

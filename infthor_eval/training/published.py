@@ -1,7 +1,7 @@
 """Import of the published trainer's checkpoints: torch's distributed checkpoints of a model from the hub.
 
-The published trainer cannot export them. Their weights are put into the model that training started from, which is then
-written like any other checkpoint.
+Of the published code, branch `dev` alone exports them, and Qwen2.5-VL alone. Here their weights are put into the model
+that training started from, which is then written like any other checkpoint.
 """
 
 from collections import Counter
@@ -13,9 +13,11 @@ from typing import Any
 import torch
 import torch.distributed.checkpoint as dcp
 from torch.distributed.checkpoint.metadata import TensorStorageMetadata
+from transformers.core_model_loading import revert_weight_conversion
 
 from infthor_eval.errors import DataError, wrap_errors
 from model_adapters.hf.loaded import LoadedCheckpoint
+from model_adapters.hf.tower_names import published_name
 
 __all__ = ["ImportedWeights", "import_weights"]
 
@@ -40,7 +42,8 @@ class ImportedWeights:
 def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     """Load the weights of a distributed checkpoint into a model.
 
-    The keys of all weights may have one common prefix ("model.", "app.model.").
+    The keys of all weights may have one common prefix ("model.", "app.model."), and the names that weights have in the
+    hub's files, as in transformers 4.49.
 
     Args:
         loaded: the model that training started from, with the marks of sequences as tokens.
@@ -54,33 +57,54 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
         stored: Mapping[str, Any] = reader.read_metadata().state_dict_metadata
         sizes = {name: item.size for name, item in stored.items() if isinstance(item, TensorStorageMetadata)}
     weights = loaded.model.state_dict()
-    prefix = _key_prefix(sizes, weights, folder)
-    imported = {name.removeprefix(prefix): size for name, size in sizes.items() if name.startswith(prefix)}
-    imported = {name: size for name, size in imported.items() if name in weights}
-    for name, size in imported.items():
-        if size != weights[name].shape:
+    stored_names = _stored_names(sizes, loaded.model, folder)
+    for name, key in stored_names.items():
+        if sizes[key] != weights[name].shape:
             raise DataError(
-                f"{folder}: {name} is {tuple(size)}, the model's {tuple(weights[name].shape)}; training started from "
-                "another checkpoint, or with other tokens"
+                f"{folder}: {key} is {tuple(sizes[key])}, the model's {tuple(weights[name].shape)}; training started "
+                "from another checkpoint, or with other tokens"
             )
-    tensors = {f"{prefix}{name}": torch.empty_like(weights[name]) for name in imported}
+    tensors = {key: torch.empty_like(weights[name]) for name, key in stored_names.items()}
     with wrap_errors(f"{folder}: cannot be read", "restore its files", catch=Exception):
         dcp.load(tensors, storage_reader=reader, no_dist=True)
-    loaded.model.load_state_dict({name.removeprefix(prefix): tensor for name, tensor in tensors.items()}, strict=False)
-    return ImportedWeights(len(imported), len(weights) - len(imported), len(sizes) - len(imported))
+    loaded.model.load_state_dict({name: tensors[key] for name, key in stored_names.items()}, strict=False)
+    n_imported = len(stored_names)
+    return ImportedWeights(n_imported, len(weights) - n_imported, len(sizes) - n_imported)
 
 
-def _key_prefix(sizes: Mapping[str, Any], weights: Mapping[str, Any], folder: Path) -> str:
-    """Return the prefix of the weights' keys in the folder: the one that most keys agree with."""
+def _stored_names(sizes: Mapping[str, Any], model: Any, folder: Path) -> Mapping[str, str]:
+    """Return the keys in the folder of the model's weights, by the weights' names.
+
+    The published trainer had transformers 4.49, in which models name their weights as the hub's files do; later ones
+    name them otherwise. The names that more keys have are taken.
+    """
+    weights = model.state_dict()
+    of_hub = {
+        id(tensor): published_name(name) for name, tensor in revert_weight_conversion(model, dict(weights)).items()
+    }
+    tables = [
+        {name: name for name in weights},
+        {of_hub[id(item)]: name for name, item in weights.items() if id(item) in of_hub},
+    ]
+    found = max((_with_prefix(sizes, table) for table in tables), key=len)
+    if not found:
+        raise DataError(f"{folder}: has no weight of this model; {_HINT}")
+    return found
+
+
+def _with_prefix(sizes: Mapping[str, Any], names: Mapping[str, str]) -> Mapping[str, str]:
+    """Return the keys of weights that have the prefix that most keys agree with; `names` are those that it precedes."""
     counts: Counter[str] = Counter()
-    for name in sizes:
-        parts = name.split(".")
+    for key in sizes:
+        parts = key.split(".")
         for at in range(len(parts)):
-            if ".".join(parts[at:]) in weights:
+            if ".".join(parts[at:]) in names:
                 counts["".join(f"{part}." for part in parts[:at])] += 1
                 break
     # An optimizer's moments have the weights' names, too, with another prefix.
     prefixes = [prefix for prefix in counts if not prefix.startswith(("optim", "state"))]
     if not prefixes:
-        raise DataError(f"{folder}: has no weight of this model; {_HINT}")
-    return max(prefixes, key=lambda prefix: (counts[prefix], -len(prefix)))
+        return {}
+    prefix = max(prefixes, key=lambda prefix: (counts[prefix], -len(prefix)))
+    keys = {key.removeprefix(prefix): key for key in sizes if key.startswith(prefix)}
+    return {name: keys[stored] for stored, name in names.items() if stored in keys}

@@ -7,7 +7,7 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import TaskSamples
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence, within
 
 __all__ = ["question_sequences"]
 
@@ -33,8 +33,7 @@ def question_sequences(encoder: Encoder, task: TaskSamples, limit: int) -> Itera
         except DataError as error:
             yield SkippedItem(name, str(error))
             continue
-        too_long = sequence.n_tokens > limit
-        yield SkippedItem(name, f"longer than {limit} tokens") if too_long else sequence
+        yield within(sequence, limit)
 
 
 def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) -> TrainingSequence:

@@ -21,9 +21,12 @@ class ActionData(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Sequences of trajectories.
 
     Attributes:
+        form: "plans" for histories of whole plans (appendix B); of the published models for final tasks, "goals" for
+            histories without the text of a plan, "text" and "frames" for single actions behind a memory.
         share: share of the sequences that is used.
     """
 
+    form: Literal["plans", "goals", "text", "frames"] = "plans"
     share: float = 1.0
 
 
@@ -96,7 +99,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         model: name of the model's adapter.
         model_args: options of the adapter (`pretrained`, `dtype`, ...).
         prompt: "plain" for bare sequences of texts and frames, "chat" for the checkpoint's template; sequences of
-            actions are always plain.
+            plans are plain, other forms of actions are chats.
         max_tokens: most tokens of a sequence.
         actions: sequences of trajectories, or None.
         words: words of their plans and actions.
@@ -141,8 +144,8 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         """
         if self.actions is None and self.questions is None:
             raise ValueError("neither actions nor questions: there is nothing to train on")
-        if self.actions is not None and self.prompt != "plain":
-            raise ValueError("sequences of actions have no turns; set prompt to plain")
+        if self.actions is not None:
+            self._check_actions(self.actions)
         positive = {
             "max_tokens": self.max_tokens,
             "epochs": self.epochs,
@@ -158,6 +161,14 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             raise ValueError(f"{wrong} is {positive[wrong]}; use a number above 0")
         if self.parallel.context > 1 and self.parallel.shard:
             raise ValueError("parallel.shard and parallel.context cannot be combined; leave one of them out")
+
+    def _check_actions(self, actions: ActionData) -> None:
+        if actions.form == "plans" and self.prompt != "plain":
+            raise ValueError("sequences of plans have no turns; set prompt to plain")
+        if actions.form != "plans" and self.prompt != "chat":
+            raise ValueError(f"actions of the form {actions.form} follow a system prompt; set prompt to chat")
+        if actions.form != "plans" and self.words is not Words.PUBLISHED:
+            raise ValueError(f"actions of the form {actions.form} are in the published words; leave words out")
 
 
 def recipe_names() -> tuple[str, ...]:

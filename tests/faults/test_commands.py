@@ -128,6 +128,10 @@ TYPED = [
         ["train", "--recipe", "questions", "--data", "SET", "--out", "OUT", "--workers", 2],
         "share the generation of data, which only the recipe tiny without --data does",
     ),
+    (
+        ["train", "--recipe", "final_text", "--data", "SET", "--out", "OUT", "--set", "prompt=plain"],
+        "final_text.yaml: not a recipe (actions of the form text follow a system prompt; set prompt to chat); fix the",
+    ),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
     (
         ["validate", "nowhere", "--models", "oracle", "--out", "OUT"],

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import iter_trajectories
@@ -112,10 +112,46 @@ def test_frames_are_remembered_by_clip(acting, make_clip):
     assert shown.endswith(".\nPrevious states: <image><image><image>Current state: <image> Next action: ")
 
 
+def test_frames_that_the_file_names_are_remembered_in_the_published_size(acting, final):
+    path = final / f"{FORK}.json"
+    document = json.loads(path.read_text())
+    first = document["sub_trajs"][-1]["low_pddl_idx"][0]
+    images = [{"low_idx": number, "image_name": f"{number + 1:09d}.png"} for number in range(first)]
+    retrieved = {str(first): {"top20": ["000000000.png", "000000002.png", "000000005.png"]}}
+    path.write_text(json.dumps(document | {"images": images, "retrieved_image": retrieved}))
+    _, model, _ = acting(["fly", "fly"], history="retrieved:20")
+    parts = model.asked[0][0]
+    assert text(parts).endswith(".\nPrevious states: <image><image><image>Current state: <image> Next action: ")
+    assert [part.path.stem for part in parts if isinstance(part, FrameRef)][:3] == [
+        "000000000-336",
+        "000000002-336",
+        "000000005-336",
+    ]
+    assert [told.count("previous states (history)") for told in model.told] == [1]
+
+
+def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(acting, final):
+    path = final / f"{FORK}.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"retrieved_image": {"0": {"top20": []}}}))
+    _, model, outcome = acting([], history="retrieved:20")
+    assert model.asked == []
+    for record in outcome.records:
+        assert record.failure.startswith(f'trajectory {FORK}: retrieved_image["')
+        assert record.failure.endswith("(nothing was retrieved before this action); take --history frames:20")
+
+
+def test_files_that_name_no_frames_are_refused_before_the_work(acting):
+    with pytest.raises(DataError, match="infthor_final: no trajectory there has retrieved_image"):
+        acting([], history="retrieved:20")
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"history": "last:100"}, "--protocol published has the histories full, text and frames:K, not last:100"),
+        (
+            {"history": "last:100"},
+            "--protocol published has the histories full, text, retrieved:K and frames:K, not last:100",
+        ),
         ({"tasks": ("infthor_plans",)}, "--protocol published is for final tasks; take --tasks infthor_final"),
     ],
 )

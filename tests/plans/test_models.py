@@ -296,15 +296,15 @@ def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(acting, d
 
 
 HISTORIES = {
-    "last:0": "there are full, published, last:TOKENS, text, frames:K and memory",
-    "last:": "there are full, published, last:TOKENS, text, frames:K and memory",
-    "last:-5": "there are full, published, last:TOKENS, text, frames:K and memory",
-    "last:many": "there are full, published, last:TOKENS, text, frames:K and memory",
-    "last:²": "there are full, published, last:TOKENS, text, frames:K and memory",
-    "frames:0": "there are full, published, last:TOKENS, text, frames:K and memory",
-    "all": "there are full, published, last:TOKENS, text, frames:K and memory",
-    "full:3": "there are full, published, last:TOKENS, text, frames:K and memory",
-    "text:3": "there are full, published, last:TOKENS, text, frames:K and memory",
+    "last:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "last:": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "last:-5": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "last:many": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "last:²": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "frames:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "all": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "full:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "text:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
 }
 
 

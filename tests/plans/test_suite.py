@@ -377,7 +377,10 @@ SETTINGS = [
     ("preamble: 7", "dataset_kwargs: preamble is 7; it is a text"),
     ("bundled:", "dataset_kwargs: bundled is None; it is a text"),
     ("rewards: generous", "unknown reward rules 'generous'; there are default, published"),
-    ("history: all", "history all: there are full, published, last:TOKENS, text, frames:K and memory"),
+    (
+        "history: all",
+        "history all: there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    ),
     ("bundled: nothing", "the installation lacks its data folder 'sets/nothing'"),
 ]
 

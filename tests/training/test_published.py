@@ -34,6 +34,50 @@ def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, pre
         assert tensor.equal(wanted[name]), name
 
 
+@pytest.mark.parametrize(
+    ("model", "renamed"),
+    [
+        (
+            "qwen2.5-vl-tiny",
+            [("model.visual.", "visual."), ("model.language_model.", "model.")],
+        ),
+        (
+            "llava-onevision-tiny",
+            [
+                ("model.vision_tower.", "vision_tower.vision_model."),
+                ("model.language_model.", "language_model.model."),
+                ("lm_head.", "language_model.lm_head."),
+                ("model.", ""),
+            ],
+        ),
+    ],
+)
+def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_published_trainer(tmp_path, model, renamed):
+    """As the hub's files name them: `visual.`, `model.layers.`; `language_model.model.layers.`, `vision_tower.`."""
+    trained, other = (load_starting_model(model, {}, "plain", seed) for seed in (1, 0))
+
+    def old(name):
+        new, before = next((pair for pair in renamed if name.startswith(pair[0])), ("", ""))
+        return before + name.removeprefix(new)
+
+    state = {f"model.{old(name)}": tensor for name, tensor in trained.model.state_dict().items()}
+    dcp.save(state, checkpoint_id=tmp_path / "dcp", no_dist=True)
+    imported = import_weights(other, tmp_path / "dcp")
+    assert (imported.n_kept, imported.n_ignored) == (0, 0)
+    wanted = trained.model.state_dict()
+    assert all(tensor.equal(wanted[name]) for name, tensor in other.model.state_dict().items())
+
+
+def test_a_chat_keeps_the_chat_template(tmp_path, run):
+    tiny_qwen = load_starting_model("qwen2.5-vl-tiny", {}, "chat", 0)
+    folder = saved(tiny_qwen, tmp_path / "dcp", "model.")
+    words = ("import-checkpoint", folder, "--model", "qwen2.5-vl-tiny", "--prompt", "chat", "--out", tmp_path / "out")
+    code, _, err = run(*words)
+    assert code == 0, err
+    loaded = load("qwen2.5-vl", {"pretrained": str(tmp_path / "out"), "dtype": "float32"}, seed=0).loaded
+    assert loaded.template == tiny_qwen.template
+
+
 def test_the_command_writes_what_the_adapter_loads(tmp_path, run):
     folder = saved(tiny(0), tmp_path / "dcp", "model.")
     words = ["import-checkpoint", folder, "--model", "llava-onevision-tiny", "--out", tmp_path / "out"]

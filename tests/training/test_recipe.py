@@ -13,7 +13,8 @@ from infthor_eval.training.recipe import read_recipe, recipe_names
 
 def test_the_papers_recipes_are_table_5():
     (table,) = published_tables("training")
-    assert {"infthor_32k", "infthor_64k", "infthor_130k", "questions", "tiny"} == set(recipe_names())
+    final = {"final_goals", "final_text", "final_frames"}
+    assert {"infthor_32k", "infthor_64k", "infthor_130k", "questions", "tiny"} | final == set(recipe_names())
     for row in table.rows:
         recipe, settings = read_recipe(row.name), dict(zip(table.columns, row.values, strict=True))
         assert recipe.max_tokens == settings["context tokens"]
@@ -45,7 +46,7 @@ def test_model_options_of_a_recipe_apply_to_its_own_model_alone(name):
     assert same == {**read_recipe(name).model_args, "dtype": "float32"}
 
 
-@pytest.mark.parametrize("name", ["infthor_32k", "questions"])
+@pytest.mark.parametrize("name", ["infthor_32k", "questions", "final_text"])
 def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path, run):
     data = tmp_path / "set"
     shutil.copytree(bundled_set / "metadata/bedroom-1-seed7", data / "metadata/bedroom-1-seed7")

@@ -16,8 +16,15 @@ __all__ = ["command"]
 @click.argument("folder", type=PATH)
 @click.option("--model", default="llava-onevision", show_default=True, help="Model that the training started from.")
 @click.option("--model-args", default="", metavar="K=V,...", help="Its options (pretrained, dtype, ...).")
+@click.option(
+    "--prompt",
+    type=click.Choice(("plain", "chat")),
+    default="plain",
+    show_default=True,
+    help="Its prompts: the bare sequence, or for the Qwen2.5-VL of branch dev the base model's chat template.",
+)
 @click.option("--out", required=True, type=PATH, help="Folder of the new checkpoint.")
-def command(folder: Path, model: str, model_args: str, out: Path) -> int:
+def command(folder: Path, model: str, model_args: str, prompt: str, out: Path) -> int:
     """Convert FOLDER, a distributed checkpoint of the published trainer, into one that models load.
 
     The new checkpoint has safetensors, tokenizer and processor. Weights that FOLDER lacks, because they were frozen,
@@ -31,7 +38,7 @@ def command(folder: Path, model: str, model_args: str, out: Path) -> int:
     from infthor_eval.training.starting_model import load_starting_model
 
     prepare_folder(out)
-    loaded = load_starting_model(model, parse_model_args(model_args), "plain", seed=0)
+    loaded = load_starting_model(model, parse_model_args(model_args), prompt, seed=0)
     weights = import_weights(loaded, folder)
     export(loaded, out, title=f"{model}, weights of {folder.name}", words=Words.PUBLISHED)
     counts = f"{weights.n_imported} weights imported, {weights.n_kept} kept, {weights.n_ignored} other tensors ignored"

@@ -1,4 +1,5 @@
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,10 +7,11 @@ import torch
 from PIL import Image
 from transformers import AutoImageProcessor, AutoTokenizer, CLIPModel
 
-from infthor_eval.errors import UsageError
+from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
+from infthor_eval.memory import Observation, Query, TrajectoryFacts, open_memory
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.recalling import recall_all
 from infthor_eval.nieh.samples import find_samples
@@ -84,6 +86,23 @@ def test_a_memory_recalls_those_nearest_to_the_question_or_to_the_last_view_whic
     to_texts, between = similarities(clip, root)
     assert recalled(root, 10, clip, memory="clip") == [*largest(to_texts[0, :-1], 10), 39]
     assert recalled(root, 20, clip) == [*largest(between[-1, :-1], 20), 39]
+
+
+def test_a_memory_may_be_asked_with_the_goal(noise, clip):
+    root = noise(40)
+    to_texts, _ = similarities(clip, root)
+    memory = open_memory("clip", (("k", 5), ("query", "goal"), ("retriever", str(clip))))
+    frames = NiehSet(root).frames("t")
+    steps = [Observation(number=number, frame=frame, goal=TEXTS[2]) for number, frame in enumerate(frames)]
+    memory.begin(TrajectoryFacts(name="t"))
+    for step in steps[:-1]:
+        memory.observe(step)
+    found = memory.recall(Query(text=TEXTS[0], present=steps[-1]), None)
+    assert [step.number for step in found] == largest(to_texts[2, :-1], 5)
+    with pytest.raises(DataError, match="the goal at this step is not known; take query=question"):
+        memory.recall(Query(text=TEXTS[0], present=replace(steps[-1], goal=None)), None)
+    with pytest.raises(UsageError, match="the memory clip: query is 'view'"):
+        open_memory("clip", (("query", "view"),))
 
 
 def test_a_short_trajectory_is_shown_whole(noise, clip):

@@ -1,0 +1,147 @@
+"""Sequences of one action behind a memory: what the published memories for final tasks were trained on.
+
+They are those of `infini_dataset_history.py` and `infini_dataset_clip.py` (branch `dev`): the goal, the state in words
+or the retrieved frames that the trajectory's file has for the action, the current frame, and the action as the reply.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+
+from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.sequence_text import action_text
+from infthor_eval.plans.plan import tasks_of
+from infthor_eval.plans.segments import Part, PlanSegment
+from infthor_eval.plans.system_prompts import system_prompt
+from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence, within
+
+__all__ = ["MemoryForm", "memory_sequences"]
+
+MemoryForm = Literal["text", "frames"]
+_NAMES = "top20"  # the list of the published trainer
+
+
+class _Entry(msgspec.Struct):
+    top20: list[str]
+
+
+class _Image(msgspec.Struct):
+    low_idx: Annotated[int, msgspec.Meta(ge=0)]
+    image_name: str
+
+
+def memory_sequences(
+    encoder: Encoder,
+    data: NiehSet,
+    trajectory: Trajectory,
+    segments: Sequence[PlanSegment],
+    form: MemoryForm,
+    limit: int,
+) -> Iterator[TrainingSequence | SkippedItem]:
+    """Yield a sequence for each action that the trajectory's file has a memory for, in the file's order.
+
+    Args:
+        encoder: builds the sequences.
+        data: set of the trajectory, with its frames.
+        trajectory: the trajectory, with its memory.
+        segments: its history.
+        form: which memory.
+        limit: most tokens of a sequence, frames expanded; longer ones are skipped.
+
+    Raises:
+        DataError: it has no memory, or one of another form; a frame cannot be read.
+        ModelError: the template refuses the turns.
+    """
+    memory = _State(data, trajectory) if form == "text" else _Retrieved(data, trajectory)
+    frames = [segments[0].before, *(frame for segment in segments for _, frame in segment.steps)]
+    goals = _goals(trajectory)
+    for action in memory.actions:
+        name = f"{trajectory.traj_id}, action {action}"
+        if action not in goals:
+            yield SkippedItem(name, "belongs to no task")
+            continue
+        try:
+            before = _before(action, memory)
+        except DataError as error:
+            yield SkippedItem(name, str(error))
+            continue
+        parts = [f"Your task is: {goals[action]}.\n", *before, frames[action], " Next action: "]
+        reply = action_text(trajectory.plan.low_actions[action].api_action, Words.PUBLISHED)
+        yield within(encoder.answer(name, parts, reply, system_prompt(form)), limit)
+
+
+class _State:
+    """The states in words."""
+
+    def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
+        self._states = data.states(trajectory.traj_id)
+        if not self._states:
+            raise DataError("the trajectory has no state_summary, which actions of the form text need")
+
+    @property
+    def actions(self) -> Sequence[int]:
+        return list(self._states)
+
+    def parts(self, action: int) -> list[Part]:
+        state = self._states[action]
+        told = f" {state};" if state else ""
+        return [f"State: You are in the middle of a room.{told}\n", "Current state: "]
+
+
+class _Retrieved:
+    """The frames that were retrieved; where the list is empty, those of all actions before, first and last of each."""
+
+    def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
+        place, hint = f"trajectory {trajectory.traj_id}", "restore the file"
+        if not trajectory.retrieved_image:
+            raise DataError("the trajectory has no retrieved_image, which actions of the form frames need")
+        with wrap_errors(
+            f"{place}: retrieved_image is no list {_NAMES} for each action", hint, catch=msgspec.ValidationError
+        ):
+            self._retrieved = msgspec.convert(trajectory.retrieved_image, dict[int, _Entry], strict=False)
+        with wrap_errors(f"{place}: images is no list of low_idx and image_name", hint, catch=msgspec.ValidationError):
+            images = msgspec.convert(trajectory.images, list[_Image])
+        self._of_actions = _by_action(images)
+        self._frames = {frame.path.stem: frame for frame in data.frames(trajectory.traj_id)}
+
+    @property
+    def actions(self) -> Sequence[int]:
+        return list(self._retrieved)
+
+    def parts(self, action: int) -> list[Part]:
+        names = self._retrieved[action].top20
+        if not names:
+            names = [name for earlier in range(action) for name in self._of_actions.get(earlier, ())]
+        return ["Previous states: ", *map(self._frame, names), "\nCurrent state: "]
+
+    def _frame(self, name: str) -> FrameRef:
+        frame = self._frames.get(Path(name).stem)
+        if frame is None:
+            raise DataError(f"its retrieved frame {name!r:.60} is not in the set")
+        return frame
+
+
+def _before(action: int, memory: _State | _Retrieved) -> Sequence[Part]:
+    """Return what stands between the goal and the current frame; the first action has no memory."""
+    return memory.parts(action) if action else ["Initial state: "]
+
+
+def _by_action(images: Sequence[_Image]) -> Mapping[int, Sequence[str]]:
+    """Return the first and the last frame of each action, or the one that it has."""
+    found: dict[int, list[str]] = {}
+    for image in images:
+        found.setdefault(image.low_idx, []).append(image.image_name)
+    return {action: names if len(names) == 1 else [names[0], names[-1]] for action, names in found.items()}
+
+
+def _goals(trajectory: Trajectory) -> Mapping[int, str]:
+    """Return the goal of each low-level action of a task."""
+    spans = trajectory.sub_trajs
+    tasks = tasks_of(trajectory) if spans else []
+    return {action: task.text for task, span in zip(tasks, spans, strict=True) for action in range(*span.low_pddl_idx)}
