@@ -1,6 +1,7 @@
 """Curves of reward as a figure; the same curves give the same bytes of SVG."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -16,6 +17,7 @@ __all__ = ["curves_figure", "draw_curves"]
 
 _PANEL, _NARROW = (4.6, 2.7), 3.5  # inches; the width of one of many
 _MARGIN = 1.1  # inches around the panels
+_IN_THOUSANDS = 10_000  # end of an x axis from which its ticks are in thousands
 _LINE = 0.2  # inches of a line of the legend
 
 
@@ -55,11 +57,16 @@ def _draw_panel(axes: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], 
     for order, run in enumerate(runs, 3):  # above the grid; the bound, the last, on top
         if name in run.curves:
             _draw_curve(axes, run.curves[name], looks[run.label], order)
-    if not any(name in run.curves for run in runs):
+    if not any(name in run.curves for run in runs if not run.is_bound):
         axes.text(0.5, 0.5, facet.missing, transform=axes.transAxes, ha="center", color="gray")
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(partial(_place_text, axes)))
     axes.tick_params(labelbottom=True)
+
+
+def _place_text(axes: Axes, value: float, _: object) -> str:
+    """Return the text of a tick: in thousands where the axis is that long, as the paper's are."""
+    return f"{value / 1_000:,g}K" if value and axes.get_xlim()[1] >= _IN_THOUSANDS else f"{value:,.0f}"
 
 
 def _draw_curve(axes: Axes, curve: Curve, look: Look, order: int) -> None:
