@@ -182,7 +182,7 @@ def compute_curves(
         count: returns the counts of some episodes by description, the number of all first.
     """
     drawn = [_drawn_run(run, of_run, functions_of, count) for run, of_run in zip(runs, shared.records, strict=True)]
-    notes = [*shared.notes, *_missing_notes(drawn, facets)]
+    notes = list(shared.notes)
     planners = [number for number, run in enumerate(runs) if run.is_planner]
     if len(planners) == 1:
         bound = drawn.pop(planners[0])
@@ -195,6 +195,7 @@ def compute_curves(
         bound = _on_lent_places(bound, lent, shared.records, functions_of)
         notes += _lent_notes(bound, [facets[name] for name in lent])
     everything = [*drawn, bound]
+    notes += _missing_notes(everything if len(planners) == 1 else drawn, facets)
     grids = {name: _grid([it.functions[name] for it in everything if name in it.functions]) for name in facets}
     return RewardCurves(
         task=" and ".join(shared.tasks),

@@ -11,9 +11,8 @@ from infthor_eval.plans.curves import plan_curves
 from infthor_eval.report.figures.curve_tables import curves_table, embedded_label, one_panel, read_panels
 from infthor_eval.report.figures.curves import draw_curves
 
-from ..plans.made_runs import made_run, plan, planner_run
+from ..plans.made_runs import made_run, plan, planner_run, write_run
 
-MODELS = ("qwen", "qwen-ft32k", "qwen-ft64k", "qwen-ft130k")
 EXAMPLE = Path(__file__).parents[2] / "docs" / "figure7_panels.yaml"
 
 
@@ -54,7 +53,8 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
         "Cumulative reward on infthor_plans",
         "mean over 3 trajectories, 95 % intervals shaded",
         "embedded simulator: not comparable with the paper's curves",
-        "context tokens are not reported: _random, planner",
+        "context tokens are not reported: _random",
+        "planner, context of the plan's last request (tokens): its plans are where the first of the runs has them",
     ):
         assert words in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figure7.png", "figure7.svg"]
@@ -126,9 +126,39 @@ def test_panels_of_another_form_are_refused(tmp_path, content):
         read_panels(file, plan_curves(runs()))
 
 
-def test_the_example_has_six_panels_with_the_published_settings():
-    extended = [f"{model}-{method}4" for model in MODELS for method in ("dynamic", "longrope", "yarn")]
-    names = {*MODELS, *extended, "qwen-ft130k-yarn8"}
-    panels = read_panels(EXAMPLE, plan_curves([made_run(name, records(1.0)) for name in sorted(names)]))
-    assert len(panels) == 6
-    assert {label for panel in panels for label in panel.labels} == names
+FT = {length: f"llava-ft{length}k" for length in (32, 64, 130)}  # the checkpoints of Table 5
+# Panels of Figure 7 by its caption and section C.1: methods at x4, YaRN's factors, lengths of training, both, the best.
+FIGURE_7 = {
+    "(a)": [FT[32], *(f"{FT[32]}-{method}4" for method in ("dynamic", "longrope", "yarn"))],
+    "(b)": [FT[32], *(f"{FT[32]}-yarn{factor}" for factor in (4, 8, 16))],
+    "(c)": [*FT.values()],
+    "(d)": [f"{FT[64]}@yarn4{extended}" for extended in ("", "-yarn8", "-yarn16")],
+    "(e)": [f"{FT[130]}@yarn4{extended}" for extended in ("", "-yarn8", "-yarn16")],
+    "(f)": [f"{FT[32]}-yarn4", FT[130], f"{FT[130]}@yarn4"],
+}
+NAMES = sorted({name for names in FIGURE_7.values() for name in names})
+
+
+def test_the_example_has_the_six_panels_of_the_papers_figure():
+    panels = read_panels(EXAMPLE, plan_curves([made_run(name, records(1.0)) for name in NAMES]))
+    assert {panel.title[:3]: list(panel.labels) for panel in panels} == FIGURE_7
+
+
+def long_records(done: float, *, tokens: bool = True):
+    """Two trajectories of plans of thirty steps of 700 tokens, up to half a million; a part of them is done."""
+    return [
+        plan(name, index, (30 * index, 30 * index + 30), 4.0 * done, context=21_000 * (index + 1) if tokens else None)
+        for name, n_plans in (("a", 24), ("b", 23))
+        for index in range(n_plans)
+    ]
+
+
+def test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each(tmp_path, run):
+    made = [made_run(name, long_records((number + 1) / 16)) for number, name in enumerate(NAMES)]
+    folders = [write_run(each, tmp_path) for each in (*made, planner_run(long_records(1.0, tokens=False)))]
+    code, said, err = run("report", *folders, "--figure", "7", "--panels", EXAMPLE, "--out", tmp_path)
+    assert (code, err) == (0, "")
+    assert "in no panel" not in said
+    words = texts(tmp_path / "figure7.svg")
+    assert [words.count(word) for word in ("planner", "500K", FT[130])] == [6, 6, 2]
+    assert sum(word.startswith(tuple(FIGURE_7)) for word in words) == 6

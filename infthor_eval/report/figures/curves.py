@@ -35,7 +35,8 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
     # One scale of reward for all panels, so that they can be compared.
     grid = figure.subplots(len(panels), len(facets), sharex="col", sharey=True, squeeze=False)
     bounds = {run.label: BOUND for run in curves.runs if run.is_bound}
-    looks = bounds | looks_of(run.label for run in curves.runs if not run.is_bound)
+    named = [label for panel in panels for label in panel.labels if label not in bounds]
+    looks = bounds | looks_of(named, [panel.labels for panel in panels])
     for row, panel in zip(grid, panels, strict=True):
         runs = [run for run in curves.runs if run.is_bound or run.label in panel.labels]
         for axes, (name, facet) in zip(row, facets.items(), strict=True):
@@ -43,7 +44,7 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
         row[0].set_ylabel("reward so far (points)")
         row[0].set_title(printable(panel.title), loc="left", fontweight="bold")
         # The bound comes first: its line is drawn last and lies on top.
-        labels = [run.label for run in reversed(runs) if run.is_bound] + [run.label for run in runs if not run.is_bound]
+        labels = [*bounds, *(label for label in panel.labels if label not in bounds)]
         add_legend(row[-1], [(label, looks[label]) for label in labels])
     for top, bottom, facet in zip(grid[0], grid[-1], facets.values(), strict=True):
         bottom.set_xlabel(facet.over)
