@@ -8,9 +8,13 @@ from PIL import Image
 
 from infthor_eval.errors import DataError
 from infthor_eval.plans.curves import plan_curves
+from infthor_eval.plans.records import RECORDS
 from infthor_eval.report.figures.curve_tables import curves_table, embedded_label, one_panel, read_panels
 from infthor_eval.report.figures.curves import draw_curves
+from infthor_eval.report.figures.style import looks_of
+from infthor_eval.runs import read_run
 
+from ..plans.cut import CANDLE, cut, write
 from ..plans.made_runs import made_run, plan, planner_run, write_run
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "figure7_panels.yaml"
@@ -144,6 +148,18 @@ def test_the_example_has_the_six_panels_of_the_papers_figure():
     assert {panel.title[:3]: list(panel.labels) for panel in panels} == FIGURE_7
 
 
+def test_runs_that_share_a_panel_differ_in_colour_and_all_runs_in_their_lines():
+    looks = looks_of(NAMES, FIGURE_7.values())
+    assert len(set(looks.values())) == len(NAMES)
+    for names in FIGURE_7.values():
+        assert len({looks[name].colour for name in names}) == len(names)
+
+
+def test_runs_beyond_the_number_of_lines_take_them_again():
+    looks = looks_of(map(str, range(20)))
+    assert [looks["18"], looks["19"]] == [looks["0"], looks["1"]]
+
+
 def long_records(done: float, *, tokens: bool = True):
     """Two trajectories of plans of thirty steps of 700 tokens, up to half a million; a part of them is done."""
     return [
@@ -162,3 +178,44 @@ def test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_e
     words = texts(tmp_path / "figure7.svg")
     assert [words.count(word) for word in ("planner", "500K", FT[130])] == [6, 6, 2]
     assert sum(word.startswith(tuple(FIGURE_7)) for word in words) == 6
+
+
+def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run, monkeypatch):
+    """The whole way of docs/figures.md: a checkpoint trained under YaRN, runs with its names, and their figure."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "data", cut(CANDLE, 2))
+    asked = ("--tasks", "infthor_plans", "--data", "data", "--rewards", "published")
+    training = ("--model", "llava-onevision-tiny", "--model-args", "dtype=float32,rope=yarn:4", "--set")
+    for words in (
+        ("replay", "data", "--out", "set"),
+        ("train", "--recipe", "infthor_32k", "--data", "set", "--out", "trained", *training, "max_steps=1"),
+        ("--model", "planner", *asked),
+        *(_asked_as(name, *asked) for name in NAMES),
+    ):
+        code, _, err = run(*words)
+        assert code == 0, f"{words}\n{err}"
+    code, said, _ = run("report", *sorted(Path("results").glob("*/*")), "--figure", "7", "--panels", EXAMPLE)
+    assert code == 0
+    assert "in no panel" not in said
+    assert {line.split()[0] for line in said.splitlines() if line.split()} >= {*NAMES, "planner"}
+    words = texts(Path("results/figures/figure7.svg"))
+    assert words.count("planner") == 6
+    replies = {name: _replies(Path("results", name)) for name in (FT[32], f"{FT[32]}-longrope4", f"{FT[32]}-yarn4")}
+    plain, longrope, yarn = replies.values()
+    assert plain == longrope != yarn  # as the published logs; contexts are within the original length
+    assert not any("continuation" in word or "differ" in word for word in words)
+
+
+def _replies(folder: Path) -> list[list[str | None]]:
+    (journal,) = folder.iterdir()
+    return [[step.reply for step in record.payload.steps] for record in read_run(journal, RECORDS)[1]]
+
+
+def _asked_as(name: str, *asked: str) -> tuple[str, ...]:
+    """The command of docs/figures.md that makes the run of this name, with a tiny model in the place of the large."""
+    _, trained, extended = re.fullmatch(r"(llava-ft\d+k)(@yarn4)?(?:-(.+))?", name).groups(default="")
+    model = "llava-onevision,pretrained=trained/checkpoint" if trained else "llava-onevision-tiny,dtype=float32"
+    model, _, options = model.partition(",")
+    rope = ("--rope", re.sub(r"(\d+)$", r":\1", extended)) if extended else ()
+    options = f"{options},prompt=plain,max_tokens=0"
+    return ("--model", model, "--model-args", options, *rope, "--history", "published", *asked, "--name", name)
