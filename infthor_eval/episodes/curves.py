@@ -1,10 +1,11 @@
 """Cumulative reward along trajectories: step functions of single trajectories, and their mean over trajectories."""
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
-from typing import Any
+from typing import Any, Generic
 
 import numpy as np
 
@@ -90,7 +91,7 @@ class Facet:
         missing: text in a panel if no run has such a curve.
         end_at: heading of the table's column with the place where curves end; None for no such column.
         earned: heading of the table's column with the last mean; None for no such column.
-        has_bound: whether the highest possible reward has a place on this axis.
+        has_bound: whether the highest possible reward has places of its own on this axis; else runs lend it theirs.
     """
 
     over: str
@@ -145,6 +146,21 @@ Earned = Sequence[tuple[UnitRecord[P], float]]  # the episodes of a trajectory i
 Functions = Mapping[str, Sequence[StepFunction]]  # by facet, one of each trajectory
 
 
+@dataclass(frozen=True)
+class _Drawn(Generic[P]):
+    """A run, or the highest possible reward, before its mean over trajectories is taken."""
+
+    label: str
+    is_embedded: bool
+    earned: Sequence[Earned[P]]
+    functions: Functions
+    counts: Mapping[str, int]
+
+    def curves(self, grids: Mapping[str, np.ndarray], *, is_bound: bool) -> RunCurves:
+        means = {name: _mean_curve(of_facet, grids[name]) for name, of_facet in self.functions.items()}
+        return RunCurves(self.label, is_bound, self.is_embedded, means, self.counts)
+
+
 def compute_curves(
     runs: Sequence[RecordedRun[P, Any]],
     shared: SharedUnits[P],
@@ -158,52 +174,88 @@ def compute_curves(
     keeps its last value, so the end of a curve is the mean reward of whole trajectories. Failed episodes earn nothing.
 
     There is exactly one bound: the planner among the runs if there is one, else the highest possible reward. Several
-    planners (of other settings) are runs like the others, as none of them bounds them all.
+    planners (of other settings) are runs like the others, as none of them bounds them all. In a facet where the bound
+    has no places, each of its episodes stands at the first place that a run has for it.
 
     Args:
         functions_of: returns the step functions of a run's trajectories, by facet.
         count: returns the counts of some episodes by description, the number of all first.
     """
-    functions = [
-        functions_of([[(r, 0.0 if r.failure is not None else r.payload.reward) for r in records] for records in run])
-        for run in shared.records
-    ]
-    grids = {name: _grid([by_facet[name] for by_facet in functions if name in by_facet]) for name in facets}
-    planners = [run for run in runs if run.is_planner]
-    bound = planners[0] if len(planners) == 1 else None
-    drawn = [
-        RunCurves(
-            label=run.label,
-            is_bound=run is bound,
-            is_embedded=run.is_embedded,
-            curves={name: _mean_curve(of_facet, grids[name]) for name, of_facet in by_facet.items()},
-            counts=count([record for trajectory in records for record in trajectory]),
-        )
-        for run, records, by_facet in zip(runs, shared.records, functions, strict=True)
-    ]
-    notes = [*shared.notes, *_missing_notes(drawn, facets)]
-    if bound is None:
-        most = [list(_highest_rewards(records)) for records in zip(*shared.records, strict=True)]
-        by_facet = functions_of([[(record, reward or 0.0) for record, reward in units] for units in most])
-        drawn.append(
-            RunCurves(
-                label=AT_MOST,
-                is_bound=True,
-                is_embedded=all(run.is_embedded for run in runs),
-                curves={name: _mean_curve(by_facet[name], grids[name]) for name in facets if facets[name].has_bound},
-                counts={what: n if number == 0 else 0 for number, (what, n) in enumerate(drawn[0].counts.items())},
-            )
-        )
-        if n_unknown := sum(reward is None for units in most for _, reward in units):
-            what = next(iter(drawn[0].counts))
+    drawn = [_drawn_run(run, of_run, functions_of, count) for run, of_run in zip(runs, shared.records, strict=True)]
+    notes = list(shared.notes)
+    planners = [number for number, run in enumerate(runs) if run.is_planner]
+    if len(planners) == 1:
+        bound = drawn.pop(planners[0])
+    else:
+        bound, n_unknown = _highest_possible(drawn, shared.records, facets, functions_of)
+        if n_unknown:
+            what = next(iter(bound.counts))
             notes.append(f"{what} that no run attempted, which add nothing to {AT_MOST!r}: {n_unknown}")
+    if lent := [name for name in facets if name not in bound.functions and any(name in it.functions for it in drawn)]:
+        bound = _on_lent_places(bound, lent, shared.records, functions_of)
+        notes += _lent_notes(bound, [facets[name] for name in lent])
+    everything = [*drawn, bound]
+    notes += _missing_notes(everything if len(planners) == 1 else drawn, facets)
+    grids = {name: _grid([it.functions[name] for it in everything if name in it.functions]) for name in facets}
     return RewardCurves(
         task=" and ".join(shared.tasks),
         facets=facets,
-        runs=tuple(sorted(drawn, key=lambda run: run.is_bound)),
+        runs=tuple(it.curves(grids, is_bound=it is bound) for it in everything),
         n_trajectories=len(shared.trajectories),
         notes=tuple(notes),
     )
+
+
+def _drawn_run(
+    run: RecordedRun[P, Any],
+    of_run: Sequence[Sequence[UnitRecord[P]]],
+    functions_of: Callable[[Sequence[Earned[P]]], Functions],
+    count: Callable[[Sequence[UnitRecord[P]]], dict[str, int]],
+) -> _Drawn[P]:
+    earned = [[(r, 0.0 if r.failure is not None else r.payload.reward) for r in records] for records in of_run]
+    counts = count([record for records in of_run for record in records])
+    return _Drawn(run.label, run.is_embedded, earned, functions_of(earned), counts)
+
+
+def _highest_possible(
+    drawn: Sequence[_Drawn[P]],
+    records: Sequence[Sequence[Sequence[UnitRecord[P]]]],
+    facets: Mapping[str, Facet],
+    functions_of: Callable[[Sequence[Earned[P]]], Functions],
+) -> tuple[_Drawn[P], int]:
+    """Return the highest possible reward, and the number of episodes for which no run recorded it."""
+    most = [list(_highest_rewards(of_runs)) for of_runs in zip(*records, strict=True)]
+    earned = [[(record, reward or 0.0) for record, reward in units] for units in most]
+    functions = {name: it for name, it in functions_of(earned).items() if facets[name].has_bound}
+    counts = {what: n if number == 0 else 0 for number, (what, n) in enumerate(drawn[0].counts.items())}
+    n_unknown = sum(reward is None for units in most for _, reward in units)
+    return _Drawn(AT_MOST, all(it.is_embedded for it in drawn), earned, functions, counts), n_unknown
+
+
+def _on_lent_places(
+    bound: _Drawn[P],
+    lent: Sequence[str],
+    records: Sequence[Sequence[Sequence[UnitRecord[P]]]],
+    functions_of: Callable[[Sequence[Earned[P]]], Functions],
+) -> _Drawn[P]:
+    """Add facets in which the bound's episodes stand where the first of the runs has them."""
+
+    def place(record: UnitRecord[P], facet: str) -> float:
+        alone = functions_of([[(record, 0.0)]])
+        return alone[facet][0].places[-1] if facet in alone else math.inf
+
+    functions = dict(bound.functions)
+    for facet in lent:
+        first = [
+            [min(same, key=lambda record: place(record, facet)) for same in zip(*of_runs, strict=True)]
+            for of_runs in zip(*records, strict=True)
+        ]
+        earned = [
+            [(record, reward) for record, (_, reward) in zip(of_first, units, strict=True)]
+            for of_first, units in zip(first, bound.earned, strict=True)
+        ]
+        functions[facet] = functions_of(earned)[facet]
+    return replace(bound, functions=functions)
 
 
 def _highest_rewards(of_runs: Sequence[Sequence[UnitRecord[P]]]) -> Iterator[tuple[UnitRecord[P], float | None]]:
@@ -213,10 +265,15 @@ def _highest_rewards(of_runs: Sequence[Sequence[UnitRecord[P]]]) -> Iterator[tup
         yield same[0], max(recorded, default=None)
 
 
-def _missing_notes(runs: Sequence[RunCurves], facets: Mapping[str, Facet]) -> Iterator[str]:
+def _missing_notes(runs: Sequence[_Drawn[Any]], facets: Mapping[str, Facet]) -> Iterator[str]:
     for name, facet in facets.items():
-        if missing := [run.label for run in runs if name not in run.curves]:
+        if missing := [run.label for run in runs if name not in run.functions]:
             yield f"{facet.missing}: {', '.join(missing)}"
+
+
+def _lent_notes(bound: _Drawn[Any], lent: Sequence[Facet]) -> Iterator[str]:
+    for facet in lent:
+        yield f"{bound.label}, {facet.over}: its {next(iter(bound.counts))} are where the first of the runs has them"
 
 
 def _grid(runs: Sequence[Sequence[StepFunction]]) -> np.ndarray:

@@ -71,7 +71,7 @@ def prepare_run(recipe: Recipe, folders: Sequence[Path]) -> TrainingRun:
         ModelError: the model cannot be loaded.
         DataError: there is nothing to train on.
     """
-    loaded = load_starting_model(recipe.model, recipe.model_args, recipe.prompt, recipe.seed)
+    loaded = load_starting_model(recipe.model, recipe.model_args, recipe.prompt, recipe.seed, recipe.max_tokens)
     return TrainingRun(recipe, loaded, read_training_data(recipe, Encoder(loaded), folders))
 
 

@@ -34,9 +34,6 @@ class SequenceModel(torch.nn.Module):
     Attributes:
         model: the transformers model, which is saved by `save_pretrained`.
         family: family of the model.
-
-    Raises:
-        UsageError: the rotary frequencies of the model depend on the length of a sequence.
     """
 
     # Tells transformers' Trainer that the loss is a sum over tokens divided by `num_items_in_batch`.
@@ -46,7 +43,6 @@ class SequenceModel(torch.nn.Module):
         super().__init__()
         self.model: Any = loaded.model
         self.family = loaded.family
-        _require_fixed_rope(self.decoder)
 
     @property
     def decoder(self) -> Any:
@@ -237,10 +233,3 @@ def freeze(model: SequenceModel, parts: Collection[str]) -> None:
             parameter.requires_grad_(False)
     if not any(parameter.requires_grad for parameter in model.parameters()):
         raise UsageError(f"nothing is left to train; freeze fewer of {', '.join(PARTS)}")
-
-
-def _require_fixed_rope(decoder: Any) -> None:
-    rope_type = (getattr(decoder.config, "rope_parameters", None) or {}).get("rope_type")
-    if rope_type in ("dynamic", "longrope"):
-        # Its frequencies would be those of the previous sequence, or on each rank those of its own part.
-        raise UsageError(f"a model with rope={rope_type} cannot be trained; use linear or yarn, or no extension")

@@ -13,7 +13,9 @@ from model_adapters.hf.model import TransformersModel
 __all__ = ["load_starting_model"]
 
 
-def load_starting_model(model: str, options: Mapping[str, str], prompt: str, seed: int) -> LoadedCheckpoint:
+def load_starting_model(
+    model: str, options: Mapping[str, str], prompt: str, seed: int, max_tokens: int | None = None
+) -> LoadedCheckpoint:
     """Load a model and add the marks of sequences to its tokens.
 
     Args:
@@ -21,6 +23,8 @@ def load_starting_model(model: str, options: Mapping[str, str], prompt: str, see
         options: options of the model as typed.
         prompt: template of the sequences, "plain" or "chat".
         seed: seed of the weights of a tiny model.
+        max_tokens: most tokens of a sequence of the training. Where rotary frequencies depend on the length, all
+            sequences have those of this length, as in the published trainer; None for a model that is not trained.
 
     Raises:
         UsageError: a name or an option is unknown, or the model cannot be trained here.
@@ -30,6 +34,8 @@ def load_starting_model(model: str, options: Mapping[str, str], prompt: str, see
     if not isinstance(loaded_model, TransformersModel):
         raise UsageError(f"{model} cannot be trained here; use a model of a transformers family")
     _add_marks(loaded_model.loaded)
+    if max_tokens is not None:
+        loaded_model.fix_rope(max_tokens)
     return loaded_model.loaded
 
 

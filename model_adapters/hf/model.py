@@ -46,6 +46,11 @@ class TransformersModel(HfModel):
             storage=torch.device("cpu") if options.kv_offload else None,
         )
 
+    def fix_rope(self, n_positions: int) -> None:
+        """Give all sequences of a training the rotary frequencies of one length, where they depend on the length."""
+        if self._rope is not None:
+            self._rope.set(n_positions)
+
     def close(self) -> None:
         """Free the KV cache, the features and the weights."""
         self._prefix.reset()

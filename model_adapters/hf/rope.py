@@ -18,14 +18,17 @@ from model_adapters.options.checkpoints import parse_rope
 __all__ = ["LengthRope", "apply_rope", "take_length_rope"]
 
 _FIXED = "fixed"  # a rope_type whose frequencies transformers does not recompute
+# transformers scales attention by this factor, whatever the length; 1 leaves it as it is.
+_PUBLISHED_LONGROPE_FACTOR = 1.0
 
 
 def apply_rope(config: Any, rope: str | None) -> int | None:
     """Write a context extension into a model's config.
 
-    The original length is the config's `max_position_embeddings`, as in the published evaluation. `longrope` uses the
-    checkpoint's own factors if it has them; else all frequencies are divided by the factor for prompts that are longer
-    than the original length.
+    The original length is the config's `max_position_embeddings`, as in the published evaluation. `longrope` is the
+    published form: all frequencies are divided by the factor for prompts that are longer than the original length, and
+    shorter ones are as without an extension. `longrope-scaled` is that of LongRoPE's authors: the checkpoint's own
+    factors of frequencies where it has them, and attention scaled at every length.
 
     Args:
         config: config of the model; its text config is changed.
@@ -47,15 +50,25 @@ def apply_rope(config: Any, rope: str | None) -> int | None:
         raise ModelError(f"rope={rope}: a {config.model_type} model has no single RoPE with a length to extend")
     kept = {name: parameters[name] for name in ("mrope_section", "partial_rotary_factor") if name in parameters}
     new: dict[str, Any] = {"rope_type": rope_type, "rope_theta": parameters["rope_theta"], "factor": factor, **kept}
-    if rope_type in ("yarn", "longrope"):
+    if rope_type not in ("dynamic", "linear"):
         new["original_max_position_embeddings"] = limit
-    if rope_type == "longrope":
-        head = getattr(text, "head_dim", None) or text.hidden_size // text.num_attention_heads
-        n_frequencies = int(head * kept.get("partial_rotary_factor", 1.0)) // 2
-        new["short_factor"] = parameters.get("short_factor", [1.0] * n_frequencies)
-        new["long_factor"] = parameters.get("long_factor", [factor] * n_frequencies)
+    if rope_type in ("longrope", "longrope-scaled"):
+        new |= _longrope_parameters(text, rope_type == "longrope-scaled", factor)
     text.rope_parameters = new
     return int(limit * factor)
+
+
+def _longrope_parameters(text: Any, is_scaled: bool, factor: float) -> dict[str, Any]:
+    parameters = text.rope_parameters
+    head = getattr(text, "head_dim", None) or text.hidden_size // text.num_attention_heads
+    n_frequencies = int(head * parameters.get("partial_rotary_factor", 1.0)) // 2
+    own = parameters if is_scaled else {}
+    return {
+        "rope_type": "longrope",
+        "short_factor": own.get("short_factor", [1.0] * n_frequencies),
+        "long_factor": own.get("long_factor", [factor] * n_frequencies),
+        "factor": factor if is_scaled else _PUBLISHED_LONGROPE_FACTOR,
+    }
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ _PACKAGES = {
 _LARGEST = 2**53  # largest value of an option; anything above is a typing error
 _MOST_THREADS = 1024
 _PROMPTS = ("chat", "plain")
-_ROPES = ("dynamic", "linear", "longrope", "yarn")
+_ROPES = ("dynamic", "linear", "longrope", "longrope-scaled", "yarn")
 
 
 def parse_rope(text: str) -> tuple[str, float]:
@@ -71,7 +71,8 @@ class Reading:
     Attributes:
         prompt: chat renders conversations by the checkpoint's chat template; plain concatenates the texts and frames
             of all turns, without roles.
-        rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8) instead of the checkpoint's RoPE.
+        rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8, longrope-scaled:8) instead of the
+            checkpoint's RoPE.
     """
 
     prompt: str = "chat"

@@ -10,7 +10,7 @@ from model_adapters.vllm.options import EngineOptions, VllmOptions
 __all__ = ["engine_arguments", "frame_limit", "model_arguments", "rope_overrides", "token_limit"]
 
 # vLLM reads the extended length of these from max_position_embeddings; for others it multiplies by the factor itself.
-_LENGTH_IN_CONFIG = ("yarn", "longrope")
+_LENGTH_IN_CONFIG = ("yarn", "longrope", "longrope-scaled")
 # vLLM multiplies the original length of these by a factor before it places YaRN's ramp; transformers does not.
 _FOURFOLD = {"qwen2_vl": 4, "qwen2_5_vl": 4}
 _NO_VIDEO = 0  # otherwise vLLM reserves memory for the longest possible video
@@ -96,6 +96,9 @@ def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
     overrides: dict[str, Any] = {"rope_parameters": dict(text.rope_parameters)}
     if has_axes:
         overrides["rope_parameters"]["original_max_position_embeddings"] //= _FOURFOLD[config.model_type]
+    if rope_type == "longrope":
+        # vLLM ignores `factor` here, and scales attention by the ratio of the two lengths unless it is told a scale.
+        overrides["rope_parameters"] |= {"short_mscale": 1.0, "long_mscale": 1.0}
     if rope_type in _LENGTH_IN_CONFIG:
         overrides["max_position_embeddings"] = int(text.max_position_embeddings * factor)
     nested = next((name for name in config.sub_configs if getattr(config, name, None) is text), None)

@@ -90,10 +90,27 @@ def test_tokens_are_those_of_the_envelope_or_of_the_last_step():
 
 
 def test_a_run_that_tells_no_tokens_has_no_curve_over_them():
-    told = [plan("a", 0, (0, 10), 1.0, context=500)]
-    curves = plan_curves([made_run("m", told), planner_run([plan("a", 0, (0, 10), 3.0)])])
-    assert [list(run.curves) for run in curves.runs] == [[Axis.STEPS, Axis.TOKENS], [Axis.STEPS]]
-    assert "context tokens are not reported: planner" in curves.notes
+    told, untold = [plan("a", 0, (0, 10), 1.0, context=500)], [plan("a", 0, (0, 10), 3.0)]
+    curves = plan_curves([made_run("m", told), made_run("n", untold)])
+    assert [list(run.curves) for run in curves.runs[:2]] == [[Axis.STEPS, Axis.TOKENS], [Axis.STEPS]]
+    assert "context tokens are not reported: n" in curves.notes
+
+
+@pytest.mark.parametrize("bound", ["planner", AT_MOST])
+def test_the_bound_over_tokens_is_where_the_first_of_the_runs_has_each_plan(bound):
+    def told(*contexts):
+        return [
+            plan("a", number, (10 * number, 10 * number + 10), 1.0, most=3.0 + number, context=context)
+            for number, context in enumerate(contexts)
+        ]
+
+    runs = [made_run("m", told(500, 800, 1400)), made_run("n", told(480, None, 1500))]
+    planned = [plan("a", number, (10 * number, 10 * number + 10), 3.0 + number) for number in range(3)]
+    curves = plan_curves([*runs, planner_run(planned)] if bound == "planner" else runs)
+    curve = curve_of(curves, bound, Axis.TOKENS)
+    assert [curve.places[0], curve.places[-1]] == [480, 1400]
+    assert dict(zip(curve.places, means(curve), strict=True)) == {480: 3, 500: 3, 800: 7, 1400: 12}
+    assert any(note.startswith(f"{bound}, context of the plan's last request") for note in curves.notes)
 
 
 def test_the_planner_is_the_bound_and_comes_last():

@@ -8,12 +8,15 @@ from PIL import Image
 
 from infthor_eval.errors import DataError
 from infthor_eval.plans.curves import plan_curves
+from infthor_eval.plans.records import RECORDS
 from infthor_eval.report.figures.curve_tables import curves_table, embedded_label, one_panel, read_panels
 from infthor_eval.report.figures.curves import draw_curves
+from infthor_eval.report.figures.style import looks_of
+from infthor_eval.runs import read_run
 
-from ..plans.made_runs import made_run, plan, planner_run
+from ..plans.cut import CANDLE, cut, write
+from ..plans.made_runs import made_run, plan, planner_run, write_run
 
-MODELS = ("qwen", "qwen-ft32k", "qwen-ft64k", "qwen-ft130k")
 EXAMPLE = Path(__file__).parents[2] / "docs" / "figure7_panels.yaml"
 
 
@@ -54,7 +57,8 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
         "Cumulative reward on infthor_plans",
         "mean over 3 trajectories, 95 % intervals shaded",
         "embedded simulator: not comparable with the paper's curves",
-        "context tokens are not reported: _random, planner",
+        "context tokens are not reported: _random",
+        "planner, context of the plan's last request (tokens): its plans are where the first of the runs has them",
     ):
         assert words in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figure7.png", "figure7.svg"]
@@ -93,7 +97,8 @@ def test_the_table_has_the_ends():
     # Of the first run, 4 plans in each of three trajectories: 4, 8 and 12 points; 8, 12 and 16 of the planner.
     assert table.rows[0].cells == ("model $x$ & <y>", "8.00", "[-1.94, 17.94]", "66.7", "40", "300", "12", "0", "0")
     assert table.rows[-1].cells[:4] == ("planner", "12.00", "[2.06, 21.94]", "100.0")
-    assert table.rows[-1].cells[5] == "-"
+    assert table.rows[1].cells[5] == "-"
+    assert table.rows[-1].cells[5] == "300"
 
 
 def test_panels_have_their_runs_and_the_bound(tmp_path):
@@ -125,9 +130,92 @@ def test_panels_of_another_form_are_refused(tmp_path, content):
         read_panels(file, plan_curves(runs()))
 
 
-def test_the_example_has_six_panels_with_the_published_settings():
-    extended = [f"{model}-{method}4" for model in MODELS for method in ("dynamic", "longrope", "yarn")]
-    names = {*MODELS, *extended, "qwen-ft130k-yarn8"}
-    panels = read_panels(EXAMPLE, plan_curves([made_run(name, records(1.0)) for name in sorted(names)]))
-    assert len(panels) == 6
-    assert {label for panel in panels for label in panel.labels} == names
+FT = {length: f"llava-ft{length}k" for length in (32, 64, 130)}  # the checkpoints of Table 5
+# Panels of Figure 7 by its caption and section C.1: methods at x4, YaRN's factors, lengths of training, both, the best.
+FIGURE_7 = {
+    "(a)": [FT[32], *(f"{FT[32]}-{method}4" for method in ("dynamic", "longrope", "yarn"))],
+    "(b)": [FT[32], *(f"{FT[32]}-yarn{factor}" for factor in (4, 8, 16))],
+    "(c)": [*FT.values()],
+    "(d)": [f"{FT[64]}@yarn4{extended}" for extended in ("", "-yarn8", "-yarn16")],
+    "(e)": [f"{FT[130]}@yarn4{extended}" for extended in ("", "-yarn8", "-yarn16")],
+    "(f)": [f"{FT[32]}-yarn4", FT[130], f"{FT[130]}@yarn4"],
+}
+NAMES = sorted({name for names in FIGURE_7.values() for name in names})
+
+
+def test_the_example_has_the_six_panels_of_the_papers_figure():
+    panels = read_panels(EXAMPLE, plan_curves([made_run(name, records(1.0)) for name in NAMES]))
+    assert {panel.title[:3]: list(panel.labels) for panel in panels} == FIGURE_7
+
+
+def test_runs_that_share_a_panel_differ_in_colour_and_all_runs_in_their_lines():
+    looks = looks_of(NAMES, FIGURE_7.values())
+    assert len(set(looks.values())) == len(NAMES)
+    for names in FIGURE_7.values():
+        assert len({looks[name].colour for name in names}) == len(names)
+
+
+def test_runs_beyond_the_number_of_lines_take_them_again():
+    looks = looks_of(map(str, range(20)))
+    assert [looks["18"], looks["19"]] == [looks["0"], looks["1"]]
+
+
+def long_records(done: float, *, tokens: bool = True):
+    """Two trajectories of plans of thirty steps of 700 tokens, up to half a million; a part of them is done."""
+    return [
+        plan(name, index, (30 * index, 30 * index + 30), 4.0 * done, context=21_000 * (index + 1) if tokens else None)
+        for name, n_plans in (("a", 24), ("b", 23))
+        for index in range(n_plans)
+    ]
+
+
+def test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each(tmp_path, run):
+    made = [made_run(name, long_records((number + 1) / 16)) for number, name in enumerate(NAMES)]
+    folders = [write_run(each, tmp_path) for each in (*made, planner_run(long_records(1.0, tokens=False)))]
+    code, said, err = run("report", *folders, "--figure", "7", "--panels", EXAMPLE, "--out", tmp_path)
+    assert (code, err) == (0, "")
+    assert "in no panel" not in said
+    words = texts(tmp_path / "figure7.svg")
+    assert [words.count(word) for word in ("planner", "500K", FT[130])] == [6, 6, 2]
+    assert sum(word.startswith(tuple(FIGURE_7)) for word in words) == 6
+
+
+def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run, monkeypatch):
+    """The whole way of docs/figures.md: a checkpoint trained under YaRN, runs with its names, and their figure."""
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "data", cut(CANDLE, 2))
+    asked = ("--tasks", "infthor_plans", "--data", "data", "--rewards", "published")
+    training = ("--model", "llava-onevision-tiny", "--model-args", "dtype=float32,rope=yarn:4", "--set")
+    for words in (
+        ("replay", "data", "--out", "set"),
+        ("train", "--recipe", "infthor_32k", "--data", "set", "--out", "trained", *training, "max_steps=1"),
+        ("--model", "planner", *asked),
+        *(_asked_as(name, *asked) for name in NAMES),
+    ):
+        code, _, err = run(*words)
+        assert code == 0, f"{words}\n{err}"
+    code, said, _ = run("report", *sorted(Path("results").glob("*/*")), "--figure", "7", "--panels", EXAMPLE)
+    assert code == 0
+    assert "in no panel" not in said
+    assert {line.split()[0] for line in said.splitlines() if line.split()} >= {*NAMES, "planner"}
+    words = texts(Path("results/figures/figure7.svg"))
+    assert words.count("planner") == 6
+    replies = {name: _replies(Path("results", name)) for name in (FT[32], f"{FT[32]}-longrope4", f"{FT[32]}-yarn4")}
+    plain, longrope, yarn = replies.values()
+    assert plain == longrope != yarn  # as the published logs; contexts are within the original length
+    assert not any("continuation" in word or "differ" in word for word in words)
+
+
+def _replies(folder: Path) -> list[list[str | None]]:
+    (journal,) = folder.iterdir()
+    return [[step.reply for step in record.payload.steps] for record in read_run(journal, RECORDS)[1]]
+
+
+def _asked_as(name: str, *asked: str) -> tuple[str, ...]:
+    """The command of docs/figures.md that makes the run of this name, with a tiny model in the place of the large."""
+    _, trained, extended = re.fullmatch(r"(llava-ft\d+k)(@yarn4)?(?:-(.+))?", name).groups(default="")
+    model = "llava-onevision,pretrained=trained/checkpoint" if trained else "llava-onevision-tiny,dtype=float32"
+    model, _, options = model.partition(",")
+    rope = ("--rope", re.sub(r"(\d+)$", r":\1", extended)) if extended else ()
+    options = f"{options},prompt=plain,max_tokens=0"
+    return ("--model", model, "--model-args", options, *rope, "--history", "published", *asked, "--name", name)

@@ -136,6 +136,17 @@ def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
     assert not any("lora" in name for name in weights(tmp_path / "out"))
 
 
+@pytest.mark.parametrize("rope", ["dynamic", "longrope"])
+def test_a_model_is_trained_under_a_rope_of_lengths_and_keeps_it(recipe, data, tmp_path, rope):
+    checkpoint, _ = train(recipe, data, tmp_path / "out", **{"model_args.rope": f"{rope}:4", "max_steps": 1})
+    config = json.loads((checkpoint / "config.json").read_text())
+    assert config["text_config"]["rope_parameters"]["rope_type"] == rope
+    model = load("qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0)
+    talk = model.conversation()
+    talk.append("Where is the mug?")
+    assert talk.reply(Decoding(max_new_tokens=2)).n_context_tokens > 0
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

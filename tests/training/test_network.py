@@ -175,11 +175,3 @@ def test_unknown_parts_and_freezing_all_are_refused(qwen: LoadedCheckpoint) -> N
         freeze(model, ["visio"])
     with pytest.raises(UsageError, match="nothing is left to train"):
         freeze(model, PARTS)
-
-
-def test_a_rope_that_depends_on_the_length_is_refused() -> None:
-    from model_adapters import load
-
-    model: Any = load("qwen2.5-vl-tiny", {"rope": "dynamic:4"}, seed=0)
-    with pytest.raises(UsageError, match="rope=dynamic cannot be trained"):
-        SequenceModel(model._loaded)

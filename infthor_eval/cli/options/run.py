@@ -55,7 +55,9 @@ _OPTIONS = (
         help="Options of the model, or of all of them (see `ls models`).",
     ),
     click.option(
-        "--rope", metavar="TYPE:FACTOR", help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8."
+        "--rope",
+        metavar="TYPE:FACTOR",
+        help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8, longrope-scaled:8.",
     ),
     click.option(
         "--threads",

@@ -1,6 +1,7 @@
 """Curves of reward as a figure; the same curves give the same bytes of SVG."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -16,6 +17,7 @@ __all__ = ["curves_figure", "draw_curves"]
 
 _PANEL, _NARROW = (4.6, 2.7), 3.5  # inches; the width of one of many
 _MARGIN = 1.1  # inches around the panels
+_IN_THOUSANDS = 10_000  # end of an x axis from which its ticks are in thousands
 _LINE = 0.2  # inches of a line of the legend
 
 
@@ -33,7 +35,8 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
     # One scale of reward for all panels, so that they can be compared.
     grid = figure.subplots(len(panels), len(facets), sharex="col", sharey=True, squeeze=False)
     bounds = {run.label: BOUND for run in curves.runs if run.is_bound}
-    looks = bounds | looks_of(run.label for run in curves.runs if not run.is_bound)
+    named = [label for panel in panels for label in panel.labels if label not in bounds]
+    looks = bounds | looks_of(named, [panel.labels for panel in panels])
     for row, panel in zip(grid, panels, strict=True):
         runs = [run for run in curves.runs if run.is_bound or run.label in panel.labels]
         for axes, (name, facet) in zip(row, facets.items(), strict=True):
@@ -41,7 +44,7 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
         row[0].set_ylabel("reward so far (points)")
         row[0].set_title(printable(panel.title), loc="left", fontweight="bold")
         # The bound comes first: its line is drawn last and lies on top.
-        labels = [run.label for run in reversed(runs) if run.is_bound] + [run.label for run in runs if not run.is_bound]
+        labels = [*bounds, *(label for label in panel.labels if label not in bounds)]
         add_legend(row[-1], [(label, looks[label]) for label in labels])
     for top, bottom, facet in zip(grid[0], grid[-1], facets.values(), strict=True):
         bottom.set_xlabel(facet.over)
@@ -55,11 +58,16 @@ def _draw_panel(axes: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], 
     for order, run in enumerate(runs, 3):  # above the grid; the bound, the last, on top
         if name in run.curves:
             _draw_curve(axes, run.curves[name], looks[run.label], order)
-    if not any(name in run.curves for run in runs):
+    if not any(name in run.curves for run in runs if not run.is_bound):
         axes.text(0.5, 0.5, facet.missing, transform=axes.transAxes, ha="center", color="gray")
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    axes.xaxis.set_major_formatter(FuncFormatter(partial(_place_text, axes)))
     axes.tick_params(labelbottom=True)
+
+
+def _place_text(axes: Axes, value: float, _: object) -> str:
+    """Return the text of a tick: in thousands where the axis is that long, as the paper's are."""
+    return f"{value / 1_000:,g}K" if value and axes.get_xlim()[1] >= _IN_THOUSANDS else f"{value:,.0f}"
 
 
 def _draw_curve(axes: Axes, curve: Curve, look: Look, order: int) -> None:

@@ -1,11 +1,10 @@
 """The style of all figures: colours and lines of runs, texts around panels, files in PNG and SVG."""
 
 import io
-import itertools
 import re
 import textwrap
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -64,11 +63,23 @@ class Look(NamedTuple):
 BOUND = Look("black", "dashed", 1.4)
 
 
-def looks_of(labels: Iterable[str]) -> dict[str, Look]:
-    """Return a look for each label of a run that is not the bound."""
+def looks_of(labels: Iterable[str], together: Iterable[Collection[str]] = ()) -> dict[str, Look]:
+    """Return a look for each label of a run that is not the bound.
+
+    Args:
+        labels: labels of the runs.
+        together: labels that share a panel; they have different colours as long as there are enough.
+    """
     # The colours of one style of line, then those of the next.
-    looks = itertools.cycle(Look(colour, style, 1.5) for style in _STYLES for colour in _COLOURS)
-    return dict(zip(labels, looks, strict=False))
+    all_looks = [Look(colour, style, 1.5) for style in _STYLES for colour in _COLOURS]
+    panels, looks = list(together), dict[str, Look]()
+    for number, label in enumerate(dict.fromkeys(labels)):
+        beside = {name for panel in panels if label in panel for name in panel}
+        colours = {looks[name].colour for name in beside if name in looks}
+        free = [look for look in all_looks if look not in looks.values()]
+        apart = [look for look in free if look.colour not in colours]
+        looks[label] = next(iter(apart or free), all_looks[number % len(all_looks)])
+    return looks
 
 
 def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Path]:

@@ -3,11 +3,13 @@
 import math
 from collections.abc import Sequence
 from importlib import import_module
+from itertools import combinations
 from typing import Any
 
 import pytest
 import torch
 from transformers import LlamaConfig, Qwen2Config
+from transformers.modeling_rope_utils import ROPE_INIT_FUNCTIONS
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
@@ -21,7 +23,7 @@ from model_adapters.options.checkpoints import HfOptions
 from ..asking import up_to, user
 
 ORIGINAL = 64
-ROPES = ["linear:2", "dynamic:4", "yarn:4", "longrope:8"]
+ROPES = ["linear:2", "dynamic:4", "yarn:4", "longrope:8", "longrope-scaled:8"]
 TWINS = {"qwen2_5_vl": "Qwen25VLTiny", "pixtral": "PixtralTiny"}  # multimodal and plain RoPE
 
 
@@ -122,7 +124,46 @@ def test_yarn_scales_attention_by_its_own_rule() -> None:
     assert rotary.attention_scaling == pytest.approx(0.1 * math.log(4) + 1)
 
 
-def test_longrope_takes_the_checkpoints_own_factors() -> None:
+def _logits(rope: str | None, parts: Sequence[Part]) -> torch.Tensor:
+    model, _ = _model("qwen2_5_vl", rope)
+    return model.encode(model.pieces(user(*parts)))
+
+
+def test_the_published_longrope_is_plain_within_the_original_length(frames: list[FrameRef]) -> None:
+    short: list[Part] = [frames[0], "Where?"]
+    plain = _logits(None, short)
+    assert torch.equal(_logits("longrope:4", short), plain)
+    assert not torch.allclose(_logits("longrope-scaled:4", short), plain, atol=1e-4)
+
+
+def test_the_forms_of_longrope_differ_beyond_the_original_length_too(frames: list[FrameRef]) -> None:
+    long: list[Part] = [*frames, "RotateLeft " * 40]
+    published, scaled, plain = (_logits(rope, long) for rope in ("longrope:4", "longrope-scaled:4", None))
+    for one, other in combinations((published, scaled, plain), 2):
+        assert not torch.allclose(one, other, atol=1e-4)
+
+
+def test_longrope_is_what_the_published_scripts_ask_for() -> None:
+    config = Qwen2Config(hidden_size=64, num_attention_heads=4, max_position_embeddings=100)
+    published = {"long_factor": 4.0, "short_factor": 1, "factor": 1.0, "original_max_position_embeddings": 100}
+    theirs = Qwen2Config(hidden_size=64, num_attention_heads=4, max_position_embeddings=100)
+    theirs.rope_parameters = {**config.rope_parameters, "rope_type": "longrope", **published}
+    assert apply_rope(config, "longrope:4") == 400
+    compute = ROPE_INIT_FUNCTIONS["longrope"]
+    for length in (100, 101):
+        (ours, our_scale), (wanted, scale) = (compute(each, "cpu", seq_len=length) for each in (config, theirs))
+        assert torch.equal(ours, wanted)
+        assert our_scale == scale == 1.0
+
+
+def test_scaled_longrope_scales_attention_by_its_authors_rule() -> None:
+    _, peer = _model("qwen2_5_vl", "longrope-scaled:4")
+    scaling = math.sqrt(1 + math.log(4) / math.log(ORIGINAL))
+    assert peer.model.language_model.rotary_emb.attention_scaling == pytest.approx(scaling)
+
+
+@pytest.mark.parametrize(("rope", "long_factor"), [("longrope-scaled:4", 2.0), ("longrope:4", 4.0)])
+def test_only_scaled_longrope_takes_the_checkpoints_own_factors(rope: str, long_factor: float) -> None:
     config = Qwen2Config(hidden_size=64, num_attention_heads=4, max_position_embeddings=100)
     config.rope_parameters = {
         "rope_type": "longrope",
@@ -130,8 +171,8 @@ def test_longrope_takes_the_checkpoints_own_factors() -> None:
         "short_factor": [1.0] * 8,
         "long_factor": [2.0] * 8,
     }
-    apply_rope(config, "longrope:4")
-    assert config.rope_parameters["long_factor"] == [2.0] * 8
+    apply_rope(config, rope)
+    assert config.rope_parameters["long_factor"] == [long_factor] * 8
 
 
 def test_without_extension_nothing_changes() -> None:
@@ -161,3 +202,5 @@ def test_limit_and_identity_tell_the_extension() -> None:
     assert plain.capabilities.max_tokens_before_extension is None
     assert plain.identity() != extended.identity()
     assert extended.identity()["rope"]["factor"] == 4.0
+    forms = [load("qwen2.5-vl-tiny", {"rope": rope}, seed=0).identity() for rope in ("longrope:4", "longrope-scaled:4")]
+    assert forms[0] != forms[1]

@@ -163,17 +163,26 @@ def test_a_checkpoint_without_a_limit_needs_one() -> None:
         token_limit("x", None, VllmOptions(pretrained="x"))
 
 
-@pytest.mark.parametrize(("rope_type", "longer"), [("yarn", True), ("longrope", True), ("linear", False)])
+@pytest.mark.parametrize(("rope_type", "longer"), [("yarn", True), ("longrope-scaled", True), ("linear", False)])
 def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type: str, longer: bool) -> None:
     config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
     apply_rope(config, f"{rope_type}:2")
     overrides = rope_overrides(config, f"{rope_type}:2")
-    assert overrides["rope_parameters"]["rope_type"] == rope_type
+    assert overrides["rope_parameters"]["rope_type"] == rope_type.partition("-")[0]
     assert overrides["rope_parameters"]["factor"] == 2
     assert overrides.get("max_position_embeddings") == (200 if longer else None)
 
 
-@pytest.mark.parametrize("rope", ["linear:2", "longrope:2"])
+@pytest.mark.parametrize(("rope", "scale"), [("longrope:2", 1.0), ("longrope-scaled:2", None)])
+def test_the_published_longrope_tells_vllm_that_attention_is_not_scaled(rope: str, scale: float | None) -> None:
+    config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
+    apply_rope(config, rope)
+    overrides = rope_overrides(config, rope)
+    assert [overrides["rope_parameters"].get(f"{length}_mscale") for length in ("short", "long")] == [scale, scale]
+    assert overrides["max_position_embeddings"] == 200
+
+
+@pytest.mark.parametrize("rope", ["linear:2", "longrope:2", "longrope-scaled:2"])
 def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> None:
     with pytest.raises(ModelError, match=r"qwen2_5_vl, which has three-axis positions, .* only yarn; use yarn:2"):
         rope_overrides(_qwen(rope), rope)
