@@ -39,11 +39,11 @@ class Scene:
 
 
 def _pickupable(item: ThorObject) -> bool:
-    return item.pickupable
+    return bool(item.pickupable)
 
 
 def _receptacle(item: ThorObject) -> bool:
-    return item.receptacle
+    return bool(item.receptacle)
 
 
 def _inside(item: ThorObject, receptacles: Iterable[ThorObject]) -> bool:

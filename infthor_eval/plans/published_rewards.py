@@ -170,7 +170,7 @@ class PublishedTask:
         return per_success, not (step.before.last_action == "OpenObject" and now == "PutObject")
 
     def _open(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.OPEN, lambda item: item.is_open)
+        return self._state_reward(step, PlanKind.OPEN, lambda item: bool(item.is_open))
 
     def _close(self, step: "_Step") -> tuple[float, bool]:
         return self._state_reward(step, PlanKind.CLOSE, lambda item: not item.is_open)
