@@ -101,8 +101,9 @@ def task_of(recorded: SubTask) -> Task:
     task_type = _task_type(info.goal)
     if task_type == TaskType.PUT_AWAY:
         # Its parameters are those of the task before it; the object is the movable one, and none is picked up.
-        held = _object_type(task_type, {}, "mrecep_target", info.movable or info.pickup)
-        return Task(task_type, held, _object_type(task_type, {}, "parent_target", info.receptacle))
+        if not (info.movable and info.receptacle):
+            raise DataError(f"a task of type {task_type} needs task_info's movable and receptacle; give object types")
+        return Task(task_type, modern_type(info.movable), modern_type(info.receptacle))
     examines, stacks = task_type == TaskType.EXAMINE, task_type == TaskType.STACK
     pickup = _object_type(task_type, params, "object_target", info.pickup)
     whole = pickup.removesuffix("Sliced")

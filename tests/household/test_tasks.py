@@ -69,9 +69,9 @@ def test_what_is_put_away_is_the_movable_object_whatever_the_parameters_say():
         (recorded("pick_and_place_with_movable_recep", "Mug", "", "Desk"), "task_info's movable or .*' mrecep_target"),
         (
             recorded("put object", receptacle="Toilet", mrecep_target="Mug"),
-            "type put object has no task_info's movable",
+            "needs task_info's movable and receptacle",
         ),
-        (recorded("put object", None, "Mug", parent_target="Toilet"), "type put object has no task_info's receptacle"),
+        (recorded("put object", None, "Mug", parent_target="Toilet"), "needs task_info's movable and receptacle"),
         (recorded("look_at_obj_in_light", "Mug", toggle_target=""), "has no pddl_params' toggle_target"),
         (recorded("look_at_obj_in_light", "Mug", toggle_target=3), "has no pddl_params' toggle_target"),
         (recorded("pick_and_place_simple", "Mug", None, "Desk", object_sliced="no"), "object_sliced 'no'"),
