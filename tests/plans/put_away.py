@@ -32,14 +32,15 @@ def pen_put_away(**changes: Any) -> dict[str, Any]:
     return _with_task(document, held, place, first, low)
 
 
-def fork_put_away_without_actions() -> dict[str, Any]:
-    """The document of FORK with a sub-goal without actions between its two tasks, as files of before July 2026."""
-    document = cut(FORK, 6)
-    before, after = document["sub_trajs"]
+def put_away_without_actions(name: str = FORK, n_plans: int = 6, **changes: Any) -> dict[str, Any]:
+    """A document with a sub-goal without actions behind its first task, as files of before July 2026."""
+    document = cut(name, n_plans, **changes)
+    before, *later = document["sub_trajs"]
     first, low = before["high_pddl_idx"][1], before["low_pddl_idx"][1]
     for action in document["plan"]["low_actions"][low:]:
         action["high_idx"] += 1
-    after["high_pddl_idx"] = [number + 1 for number in after["high_pddl_idx"]]
+    for part in later:
+        part["high_pddl_idx"] = [number + 1 for number in part["high_pddl_idx"]]
     return _with_task(document, "Fork", "Drawer", first, (low, low))
 
 

@@ -14,8 +14,8 @@ from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
-from .cut import MUG, cut, write
-from .put_away import PEN, fork_put_away_without_actions, pen_put_away, read
+from .cut import CANDLE, FORK, MUG, cut, write
+from .put_away import PEN, pen_put_away, put_away_without_actions, read
 
 PUT = 4  # the plan that puts the pen away; 22 actions, the last of which puts it
 
@@ -109,7 +109,7 @@ def test_the_published_history_has_its_goal_and_its_plan(simulator, tmp_path):
 
 
 def test_without_actions_it_is_no_plan_and_the_others_are():
-    trajectory = read(fork_put_away_without_actions())
+    trajectory = read(put_away_without_actions())
     assert [task.task.task_type for task in tasks_of(trajectory)] == [
         TaskType.PLACE,
         TaskType.PUT_AWAY,
@@ -121,8 +121,18 @@ def test_without_actions_it_is_no_plan_and_the_others_are():
 
 @pytest.mark.usefixtures("shared_simulator")
 def test_without_actions_the_default_goes_on_and_the_published_loop_is_over(prepared, tmp_path):
-    data = write(tmp_path / "old", fork_put_away_without_actions())
+    data = write(tmp_path / "old", put_away_without_actions())
     assert [record.payload.ended for record in execute(prepared(data=data)).records] == ["done"] * 6
     outcome = execute(prepared(data=data, rewards="published", history="published"))
-    ends = "the published loop ends at sub-goal 4, which has no actions"
+    ends = "the published script ends at sub-goal 4, which has no actions"
     assert [record.excluded for record in outcome.records] == [None] * 4 + [ends] * 2
+
+
+@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.parametrize(("name", "n_plans", "is_last"), [(FORK, 6, True), (CANDLE, 16, False)])
+def test_final_scripts_go_on_but_after_the_last_task_before_it(prepared, tmp_path, name, n_plans, is_last):
+    data = write(tmp_path / "final", put_away_without_actions(name, n_plans, final=True))
+    published = {"protocol": "published", "rewards": "published"}
+    first, *_ = execute(prepared(tasks=("infthor_final",), data=data, **published)).records
+    ends = "the published script ends at sub-goal 4, which has no actions"
+    assert (first.excluded, first.payload.ended) == ((ends, "") if is_last else (None, "done"))
