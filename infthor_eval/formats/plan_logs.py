@@ -3,8 +3,8 @@
     {"traj_id": "floorplan7_12_471_1744791924", "metric": {"total_count": 4, "success_count": 1, "goto_count": 2,
      "goto_success": 1, "pick_count": 1, "pick_success": 0, "put_count": 1, "put_success": 0, "agent_reward": 0}}
 
-A total of 0 says that the trajectory never came to its final task: the set-up failed. `agent_reward` is not read: it is
-0 in every published row.
+A total of 0 says that the trajectory never came to its final task: the set-up failed, which means the task just before
+it; of earlier ones the script leaves out the rest. `agent_reward` is not read: it is 0 in every published row.
 """
 
 import re

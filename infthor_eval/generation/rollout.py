@@ -166,7 +166,7 @@ class Rollout:
 
     def _is_closed(self, key: str) -> bool:
         item = self._view.objects[key]
-        return item.openable and not item.is_open and item.receptacle
+        return bool(item.openable and not item.is_open and item.receptacle)
 
     def _nearest(self, object_type: str, to: str) -> str:
         objects = self._view.objects

@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from infthor_eval.household.tasks import TaskType
+from infthor_eval.household.tasks import SAMPLED, TaskType
 
 __all__ = ["MAX_FAIL", "MIN_STEPS", "MIN_SUBGOALS", "TrajectorySettings"]
 
@@ -32,7 +32,7 @@ class TrajectorySettings:
     min_steps: int = MIN_STEPS
     min_subgoals: int = MIN_SUBGOALS
     final_task: bool = False
-    task_types: tuple[TaskType, ...] = tuple(TaskType)
+    task_types: tuple[TaskType, ...] = SAMPLED
     max_fail: int = MAX_FAIL
     save_floor: int = 0
 

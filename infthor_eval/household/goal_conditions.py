@@ -27,7 +27,7 @@ def goal_conditions(task: Task, view: SimulatorView, treatments: Treatments) -> 
     """Return the conditions of a task's goal in the current state, given what was washed, heated and cooled."""
     types = {key: item.object_type for key, item in view.objects.items()}
     parents = dict(room_of(view).start.where)
-    items = {key for key, object_type in types.items() if object_type == task.target}
+    items = {key for key, object_type in types.items() if object_type in task.targets}
     two = 2 if task.task_type == TaskType.PLACE_TWO else 1
     slices = GoalConditions(min(len(items), two), two) if task.sliced else GoalConditions(0, 0)
     if task.task_type == TaskType.EXAMINE:
@@ -48,7 +48,7 @@ def goal_conditions(task: Task, view: SimulatorView, treatments: Treatments) -> 
             treated = items & _treated(task.task_type, treatments)
             others = [bool(placed), bool(treated), bool(placed & treated)]
         else:
-            others = [bool(placed)]
+            others = [bool(placed) and not (task.task_type == TaskType.PUT_AWAY and view.inventory)]
     return GoalConditions(slices.met + sum(others), slices.total + len(others))
 
 

@@ -19,6 +19,8 @@ def is_achieved(task: Task, room: SymbolicRoom, state: State) -> bool:
     if task.task_type == TaskType.EXAMINE:
         held = state.held is not None and room.types[state.held] == task.target
         return held and state.at in state.lit and room.types.get(state.at or "") == task.light
+    if task.task_type == TaskType.PUT_AWAY and state.held is not None:
+        return False
     return _n_placed(task, room, state) >= _n_required(task)
 
 
@@ -26,7 +28,8 @@ def goal_holds(task: Task, view: SimulatorView, treatments: Treatments | None = 
     """Return True if the goal of a task holds in the simulator.
 
     The conditions are ALFRED's, except that an `Apple` does not count as an `AppleSliced`, as it does in ALFRED's
-    comparison of ids. Any object of the type will do, and any slice. A lamp must be lit and visible.
+    comparison of ids. Any object of the type will do, and any slice. A lamp must be lit and visible. PUT_AWAY is the
+    published condition: the hand is empty, and an object of the type, whole or sliced, in such a receptacle.
 
     Args:
         task: the task.
@@ -80,7 +83,7 @@ def _n_to_carry(task: Task, room: SymbolicRoom, state: State, held: str | None) 
         return (0 if there else 2 - (held == task.movable)) + (0 if filled else 2 - (held == task.target))
     if task.sliced:
         return 0
-    return 2 * (_n_required(task) - _n_placed(task, room, state)) - (held == task.target)
+    return 2 * (_n_required(task) - _n_placed(task, room, state)) - (held in task.targets)
 
 
 def _n_required(task: Task) -> int:
@@ -99,9 +102,9 @@ def _n_placed(task: Task, room: SymbolicRoom, state: State) -> int:
     """
     where = dict(state.where)
     treated = _treated_items(task, state)
-    count = Counter[str]()
+    targets, count = task.targets, Counter[str]()
     for item, parent in state.where:
-        if room.types[item] != task.target or (treated is not None and item not in treated):
+        if room.types[item] not in targets or (treated is not None and item not in treated):
             continue
         if task.task_type == TaskType.STACK:
             inside = room.types.get(parent) == task.movable

@@ -23,6 +23,7 @@ _FINISHES = {
     TaskType.HEAT: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (hot ?i))",
     TaskType.COOL: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (cold ?i))",
     TaskType.STACK: "(?i ?c - item ?p - place) (and (target ?i) (carrier ?c) (goal-place ?p) (in ?i ?c) (in ?c ?p))",
+    TaskType.PUT_AWAY: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (handempty))",
 }
 
 _OPERATORS = (
@@ -66,6 +67,10 @@ _OPERATORS = (
 _APPLIANCES = {"SinkBasin": "basin", "Microwave": "oven", "Fridge": "fridge"}
 
 
+def _symbol(task_type: TaskType) -> str:
+    return task_type.replace(" ", "-")
+
+
 def _build_domain() -> str:
     lines = [
         "(define (domain household)",
@@ -76,7 +81,7 @@ def _build_domain() -> str:
         "  (basin ?p - place) (oven ?p - place) (fridge ?p - place) (lamp ?p - place) (lit ?p - place)",
         "  (clean ?i - item) (hot ?i - item) (cold ?i - item)",
         "  (target ?i - item) (carrier ?i - item) (goal-place ?p - place) (goal-lamp ?p - place)",
-        *(f"  (asked-{task_type})" for task_type in TaskType),
+        *(f"  (asked-{_symbol(task_type)})" for task_type in TaskType),
         "  (done))",
         " (:functions (total-cost) - number)",
     ]
@@ -86,8 +91,8 @@ def _build_domain() -> str:
         lines.append(f"  :effect (and {effect} (increase (total-cost) 1)))")
     for task_type, finish in _FINISHES.items():
         parameters, _, condition = finish.partition(") (and")
-        lines.append(f" (:action finish-{task_type} :parameters {parameters})")
-        lines.append(f"  :precondition (and (asked-{task_type}){condition}")
+        lines.append(f" (:action finish-{_symbol(task_type)} :parameters {parameters})")
+        lines.append(f"  :precondition (and (asked-{_symbol(task_type)}){condition}")
         lines.append("  :effect (and (done) (increase (total-cost) 0)))")
     return "\n".join([*lines, ")", ""])
 
@@ -154,8 +159,8 @@ def _rules(task: Task, room: SymbolicRoom, items: list[str], names: dict[str, st
 
 
 def _goal(task: Task, room: SymbolicRoom, items: list[str], names: dict[str, str]) -> Iterable[str]:
-    yield f"asked-{task.task_type}"
-    yield from (f"target {names[item]}" for item in items if room.types[item] == task.target)
+    yield f"asked-{_symbol(task.task_type)}"
+    yield from (f"target {names[item]}" for item in items if room.types[item] in task.targets)
     yield from (f"carrier {names[item]}" for item in items if room.types[item] == task.movable)
     for place in sorted(room.places):
         if room.types[place] == task.receptacle:

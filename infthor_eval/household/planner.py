@@ -53,7 +53,7 @@ def is_feasible(task: Task, room: SymbolicRoom) -> bool:
     """
     if task.receptacle is None:
         return True
-    items = _of_types(room, {task.pickup, task.target})
+    items = _of_types(room, {task.pickup, *task.targets})
     goals = [key for key in room.receptacles if room.types[key] == task.receptacle]
     if task.movable is None:
         return _any_fits(room, items, goals)
@@ -71,7 +71,7 @@ def _any_fits(room: SymbolicRoom, items: list[str], receptacles: list[str]) -> b
 
 def relevant_items(task: Task, room: SymbolicRoom) -> set[str]:
     """Return the ids of the items of the task's types, of knives if it slices, and of the items that hold these."""
-    types = {task.pickup, task.target, task.movable} | (set(KNIVES) if task.sliced else set())
+    types = {task.pickup, *task.targets, task.movable} | (set(KNIVES) if task.sliced else set())
     where = dict(room.start.where)
     relevant = {item for item in where if room.types[item] in types or item == room.start.held}
     if task.sliced:

@@ -3,7 +3,7 @@
 import re
 
 from infthor_eval.household.affordances import GOALS_BY_ROOM
-from infthor_eval.household.tasks import TaskType
+from infthor_eval.household.tasks import SAMPLED, TaskType
 
 __all__ = ["BATHROOM", "scene_type", "usual_tasks"]
 
@@ -26,6 +26,6 @@ def scene_type(scene: str) -> str | None:
 
 
 def usual_tasks(scene: str) -> frozenset[TaskType]:
-    """Return the task types of a scene's room type, or all task types if that is unknown."""
+    """Return the task types that are drawn from in a scene's room type, or all of these if that is unknown."""
     room = scene_type(scene)
-    return frozenset(name for name in TaskType if room is None or room in GOALS_BY_ROOM[name])
+    return frozenset(name for name in SAMPLED if room is None or room in GOALS_BY_ROOM[name])

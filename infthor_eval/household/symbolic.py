@@ -136,4 +136,4 @@ def _is_remains(item: ThorObject) -> bool:
 def _is_place(item: ThorObject) -> bool:
     furniture = item.receptacle and item.object_type != "Floor"
     lamp = item.toggleable and item.object_type.endswith("Lamp")
-    return not item.pickupable and (furniture or lamp)
+    return not item.pickupable and bool(furniture or lamp)

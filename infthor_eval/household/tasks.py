@@ -1,4 +1,4 @@
-"""Tasks: ALFRED's seven task types, with object types."""
+"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one of them."""
 
 from enum import StrEnum
 from typing import Any
@@ -11,11 +11,11 @@ from infthor_eval.formats.trajectory import SubTask, TaskInfo
 from infthor_eval.household.affordances import preposition
 from infthor_eval.household.wording import noun, plural, with_article
 
-__all__ = ["Task", "TaskType", "sub_task", "task_of"]
+__all__ = ["SAMPLED", "Task", "TaskType", "sub_task", "task_of"]
 
 
 class TaskType(StrEnum):
-    """ALFRED's task types."""
+    """ALFRED's task types, and PUT_AWAY of the published generator, by their names in trajectories."""
 
     PLACE = "pick_and_place_simple"
     PLACE_TWO = "pick_two_obj_and_place"
@@ -24,6 +24,10 @@ class TaskType(StrEnum):
     HEAT = "pick_heat_then_place_in_recep"
     COOL = "pick_cool_then_place_in_recep"
     STACK = "pick_and_place_with_movable_recep"
+    PUT_AWAY = "put object"
+
+
+SAMPLED = tuple(item for item in TaskType if item != TaskType.PUT_AWAY)  # those that a task is drawn from: ALFRED's
 
 
 class Task(msgspec.Struct, frozen=True):
@@ -31,7 +35,8 @@ class Task(msgspec.Struct, frozen=True):
 
     Attributes:
         task_type: type of the task.
-        pickup: the object to pick up (the type of the whole, also if `sliced`).
+        pickup: the object to pick up (the type of the whole, also if `sliced`), or for PUT_AWAY the one in the hand,
+            where the type of the whole stands for a slice as well.
         receptacle: the receptacle to put it into; None for EXAMINE.
         movable: the receptacle that is carried with it, for STACK.
         light: the lamp, for EXAMINE.
@@ -50,6 +55,11 @@ class Task(msgspec.Struct, frozen=True):
         """Type of the object that must be in the receptacle in the end."""
         return f"{self.pickup}Sliced" if self.sliced else self.pickup
 
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Types of which one must be in the receptacle in the end."""
+        return (self.pickup, f"{self.pickup}Sliced") if self.task_type == TaskType.PUT_AWAY else (self.target,)
+
 
 _TEMPLATES = {
     TaskType.PLACE: "put {item} {where}",
@@ -59,12 +69,15 @@ _TEMPLATES = {
     TaskType.HEAT: "put a hot {bare} {where}",
     TaskType.COOL: "put a cold {bare} {where}",
     TaskType.STACK: "put {movable} with {item} in it {where}",
+    TaskType.PUT_AWAY: "put the {pickup} on the {receptacle}",  # published, with the types as they are
 }
 _ONTO = {"Plate"}  # objects are on these, not in them
 
 
 def sub_task(task: Task, scene: str) -> SubTask:
     """Return a task in a scene in the form of trajectories, with a description in words."""
+    if task.task_type == TaskType.PUT_AWAY:  # as the published generator writes it
+        return SubTask(TaskInfo(str(task.task_type), None, task.pickup, task.receptacle, scene), _describe(task))
     info = TaskInfo(str(task.task_type), task.pickup, task.movable, task.receptacle, scene)
     params = {
         "mrecep_target": task.movable or "",
@@ -86,6 +99,11 @@ def task_of(recorded: SubTask) -> Task:
     """
     info, params = recorded.task_info, recorded.pddl_params
     task_type = _task_type(info.goal)
+    if task_type == TaskType.PUT_AWAY:
+        # Its parameters are those of the task before it; the object is the movable one, and none is picked up.
+        if not (info.movable and info.receptacle):
+            raise DataError(f"a task of type {task_type} needs task_info's movable and receptacle; give object types")
+        return Task(task_type, modern_type(info.movable), modern_type(info.receptacle))
     examines, stacks = task_type == TaskType.EXAMINE, task_type == TaskType.STACK
     pickup = _object_type(task_type, params, "object_target", info.pickup)
     whole = pickup.removesuffix("Sliced")
@@ -131,6 +149,8 @@ def _describe(task: Task) -> str:
     bare = f"sliced {noun(task.pickup)}" if task.sliced else noun(task.pickup)
     place = task.receptacle
     text = _TEMPLATES[task.task_type].format(
+        pickup=task.pickup,
+        receptacle=place,
         item=with_article(bare),
         items=f"slices of {noun(task.pickup)}" if task.sliced else plural(bare),
         bare=bare,

@@ -112,6 +112,7 @@ class PlanEnvironment:
         max_steps: int = MAX_STEPS,
         frames: FrameKeeper | None = None,
         in_words: bool = False,
+        in_one_go: bool = False,
     ) -> None:
         """Restore the scene.
 
@@ -123,6 +124,7 @@ class PlanEnvironment:
             max_steps: number of steps after which a plan is truncated.
             frames: keeps the frames; None keeps none.
             in_words: whether the past is also described in words; the simulator must then send instance masks.
+            in_one_go: whether published rewards are those of a final task that is done in one go.
 
         Raises:
             DataError: the trajectory has a task without a goal, or an unknown kind of plan.
@@ -139,7 +141,9 @@ class PlanEnvironment:
         self._expert = Expert(trajectory, self.plans, self.tasks, simulator, self._frames, words, in_words)
         self._script: PublishedScript | None = None
         if self._rules.scoring == "published":
-            self._script = PublishedScript(self._rules, trajectory, self.plans, self.tasks, simulator)
+            self._script = PublishedScript(
+                self._rules, trajectory, self.plans, self.tasks, simulator, in_one_go=in_one_go
+            )
             self._expert.watched_by(self._script.pass_plan)
         self._plan: Plan | None = None
         self._reward: PlanReward | PublishedReward

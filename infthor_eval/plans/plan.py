@@ -110,6 +110,7 @@ def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
         if low is None:
             continue
         task = max((number for number, item in enumerate(tasks) if item.first_high <= place), default=0)
+        object_id, receptacle_id = _ids(trajectory, high, low)
         plans.append(
             Plan(
                 index=len(plans),
@@ -119,8 +120,8 @@ def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
                 task=task,
                 in_task=tasks[task].holds(place),
                 low=low,
-                object_id=high.planner_action.object_id,
-                receptacle_id=high.planner_action.receptacle_id,
+                object_id=object_id,
+                receptacle_id=receptacle_id,
                 location=high.planner_action.location,
                 is_final=task == final and tasks[task].holds(place),
             )
@@ -170,6 +171,19 @@ def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
     if unknown := spans.keys() - {high.high_idx for high in trajectory.plan.high_pddl}:
         raise _error(trajectory, f"there is no sub-goal {min(unknown)}, which actions belong to")
     return spans
+
+
+def _ids(trajectory: Trajectory, high: HighAction, low: tuple[int, int]) -> tuple[str | None, str | None]:
+    """Return the ids of a sub-goal's object and receptacle.
+
+    What is put away after a task is named by its type in the sub-goal; its ids are in the action that puts it.
+    """
+    planner = high.planner_action
+    if "|" not in (planner.object_id or "|"):
+        for action in trajectory.plan.low_actions[slice(*low)]:
+            if action.api_action.action == high.discrete_action.action and action.api_action.object_id is not None:
+                return action.api_action.object_id, action.api_action.receptacle_id or planner.receptacle_id
+    return planner.object_id, planner.receptacle_id
 
 
 def _kind(trajectory: Trajectory, high: HighAction) -> PlanKind:

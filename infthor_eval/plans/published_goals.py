@@ -12,7 +12,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import TaskInfo
 from infthor_eval.thor.view import ThorObject
 
-__all__ = ["GOALS", "Scene", "Treated"]
+__all__ = ["Scene", "Treated", "goal_holds"]
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Scene:
 
 
 def _pickupable(item: ThorObject) -> bool:
-    return item.pickupable
+    return bool(item.pickupable)
 
 
 def _receptacle(item: ThorObject) -> bool:
-    return item.receptacle
+    return bool(item.receptacle)
 
 
 def _inside(item: ThorObject, receptacles: Iterable[ThorObject]) -> bool:
@@ -99,14 +99,14 @@ def _place_with_movable(info: TaskInfo, scene: Scene) -> bool:
 
 
 def _put(info: TaskInfo, scene: Scene) -> bool:
-    """A task of the generation alone: anything of a name lies in anything of another, and the hand is empty."""
+    """What is put away after a task: anything of a name lies in anything of another, and the hand is empty."""
     wanted = {info.pickup, info.movable}
     receptacles = [] if scene.held else scene.named(info.receptacle, _receptacle)
     inside = (key for receptacle in receptacles for key in receptacle.receptacle_object_ids or ())
     return any(Words.PUBLISHED.name_of(key) in wanted for key in inside)
 
 
-GOALS: Mapping[str, Callable[[TaskInfo, Scene], bool]] = {
+_GOALS: Mapping[str, Callable[[TaskInfo, Scene], bool]] = {
     "pick_and_place_simple": _place,
     "pick_two_obj_and_place": _place_two,
     "look_at_obj_in_light": _look_in_light,
@@ -116,3 +116,8 @@ GOALS: Mapping[str, Callable[[TaskInfo, Scene], bool]] = {
     "pick_and_place_with_movable_recep": _place_with_movable,
     "put_object": _put,
 }
+
+
+def goal_holds(info: TaskInfo, scene: Scene) -> bool:
+    """Return whether the goal of a task holds; KeyError if its name, with blanks or underscores, is unknown."""
+    return _GOALS[info.goal.replace(" ", "_")](info, scene)

@@ -13,7 +13,7 @@ from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import HighAction, PlannerAction, TaskInfo
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.published_goals import GOALS, Scene, Treated
+from infthor_eval.plans.published_goals import Scene, Treated, goal_holds
 from infthor_eval.plans.published_paths import Pose, PublishedPaths
 from infthor_eval.plans.reward_rules import RewardRules
 from infthor_eval.thor.view import SimulatorView, ThorObject
@@ -123,7 +123,7 @@ class PublishedTask:
         return Transition(reward, self.goal_index >= self.n_sub_goals or self.goal_reached, plan_done)
 
     def _goal_holds(self, state: PublishedState, treated: Treated) -> bool:
-        return GOALS[self.info.goal](self.info, Scene(state.objects, state.held, treated))
+        return goal_holds(self.info, Scene(state.objects, state.held, treated))
 
     def _plan_reward(self, step: "_Step") -> tuple[float, bool]:
         kind = PlanKind(self.plan[step.index].planner_action.action)
@@ -170,7 +170,7 @@ class PublishedTask:
         return per_success, not (step.before.last_action == "OpenObject" and now == "PutObject")
 
     def _open(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.OPEN, lambda item: item.is_open)
+        return self._state_reward(step, PlanKind.OPEN, lambda item: bool(item.is_open))
 
     def _close(self, step: "_Step") -> tuple[float, bool]:
         return self._state_reward(step, PlanKind.CLOSE, lambda item: not item.is_open)

@@ -2,7 +2,8 @@
 
 The loop sets up a task at its first plan, and again after each plan, before the expert repeats that plan. So the agent
 meets a task that has counted the expert's actions of the plan before, from the first sub-goal on. In the first plan of
-each task the state before the agent's first action is the scene's first one.
+each task the state before the agent's first action is the scene's first one. A sub-goal without actions ends the loop.
+The scripts of final tasks go on with the next task, and look at the last one before the final one alone.
 """
 
 from collections.abc import Mapping, Sequence
@@ -84,14 +85,19 @@ class PublishedScript:
         plans: Sequence[Plan],
         tasks: Sequence[TrajectoryTask],
         simulator: Simulator,
+        *,
+        in_one_go: bool = False,
     ) -> None:
         """Take a trajectory whose scene was restored in a simulator.
+
+        `in_one_go` is True for the scripts in which an agent has the final task alone, in one go.
 
         Raises:
             InfeasibleError: the agent can reach no cell.
             SimulatorError: the simulator fails.
         """
         self._rules, self._trajectory, self._plans, self._tasks = rules, trajectory, plans, tasks
+        self._empty = _first_empty(plans, tasks[-2:-1] if in_one_go else tasks)
         self._first = PublishedState.of(simulator.view, _FIRST)
         grid = reachable_grid(simulator)
         cells = {(round(x / _CELL), round(z / _CELL)) for x, z in map(grid.position, grid.cells)}
@@ -122,6 +128,8 @@ class PublishedScript:
         try:
             if self._stopped is not None:
                 raise self._stopped
+            if self._empty is not None and plan.high > self._empty:
+                raise UnscoredError(f"the published script ends at sub-goal {self._empty}, which has no actions")
             self._passed[plan.index] = self._pass(plan, replayed)
         except UnscoredError as error:
             self._passed[plan.index] = error
@@ -154,3 +162,10 @@ class PublishedScript:
         except UnscoredError:
             pass
         return total
+
+
+def _first_empty(plans: Sequence[Plan], tasks: Sequence[TrajectoryTask]) -> int | None:
+    """Return the place of the first sub-goal of a task that has no actions, None if all have some."""
+    acted = {plan.high for plan in plans}
+    every = (high for task in tasks for high in range(task.first_high, task.end_high))
+    return next((high for high in every if high not in acted), None)

@@ -138,7 +138,7 @@ class PlanReward:
 
     def _open_or_close(self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
         wanted = self._target.kind == PlanKind.OPEN
-        is_done = object_id == self._object_id and after.objects[object_id].is_open == wanted
+        is_done = object_id == self._object_id and bool(after.objects[object_id].is_open) == wanted
         return self._success() if is_done else StepReward()
 
     def _toggle(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
@@ -266,7 +266,7 @@ def _paths_to_goal(rules: RewardRules, target: PlanTarget, grid: Grid | None) ->
 
 
 def _is_closed(item: ThorObject) -> bool:
-    return item.openable and not item.is_open
+    return bool(item.openable and not item.is_open)
 
 
 def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:

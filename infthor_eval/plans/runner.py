@@ -67,6 +67,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
                 max_steps=task.max_steps,
                 frames=frames,
                 in_words=factory.sees and task.history.needs_state,
+                in_one_go=task.final_form is not None,
             ),
         )
         self._trajectory, self._actor = trajectory, factory.create(task, trajectory.data)

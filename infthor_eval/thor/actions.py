@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from msgspec import UnsetType
+
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
@@ -25,7 +27,7 @@ __all__ = [
     "text_of_call",
 ]
 
-_APPLIES: dict[str, Callable[[ThorObject], bool]] = {
+_APPLIES: dict[str, Callable[[ThorObject], bool | UnsetType]] = {
     "OpenObject": lambda item: item.openable and not item.is_open,
     "CloseObject": lambda item: item.openable and item.is_open,
     "PickupObject": lambda item: item.pickupable and not item.is_picked_up,

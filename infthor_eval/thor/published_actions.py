@@ -2,17 +2,22 @@
 
 A name is sought as a part of the objects' names, case apart, and the first visible object that has the property is
 taken, whatever its state. What cannot be grounded is sent nevertheless: without an id, or as an action of that name.
+Where the metadata of an object that is looked at lack the property, the script drops the action with the error.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
+
+from msgspec import UNSET, UnsetType
 
 from infthor_eval.thor.actions import Misuse, UngroundedError
 from infthor_eval.thor.view import SimulatorView, ThorObject
 
 __all__ = ["current_call", "ground_published", "published_call"]
 
-_HAS: Mapping[str, Callable[[ThorObject], bool]] = {
+_Has = Callable[[ThorObject], bool | UnsetType]
+
+_HAS: Mapping[str, _Has] = {
     "OpenObject": lambda item: item.openable,
     "CloseObject": lambda item: item.is_open,
     "PickupObject": lambda item: item.pickupable,
@@ -32,13 +37,16 @@ def ground_published(text: str, objects: Iterable[ThorObject]) -> tuple[str | No
         text: what the agent said.
         objects: all objects, in the order of the metadata.
     """
-    if text.startswith(_PUT):
-        return _PUT, _first(objects, _last_word(text), lambda item: item.receptacle)
-    if text.startswith(_TOGGLE):  # on and off alike
-        return _TOGGLE, _first(objects, _last_word(text), lambda item: item.toggleable)
-    for action, has in _HAS.items():
-        if text.startswith(action):
-            return action, _first(objects, text.rsplit(action, maxsplit=1)[-1].strip(), has)
+    try:
+        if text.startswith(_PUT):
+            return _PUT, _first(objects, _last_word(text), lambda item: item.receptacle)
+        if text.startswith(_TOGGLE):  # on and off alike
+            return _TOGGLE, _first(objects, _last_word(text), lambda item: item.toggleable)
+        for action, has in _HAS.items():
+            if text.startswith(action):
+                return action, _first(objects, text.rsplit(action, maxsplit=1)[-1].strip(), has)
+    except _UnreportedError:
+        pass
     return None, None
 
 
@@ -67,11 +75,21 @@ def _last_word(text: str) -> str:
     return text.rsplit(maxsplit=1)[-1]
 
 
-def _first(objects: Iterable[ThorObject], name: str, has: Callable[[ThorObject], bool]) -> str | None:
+class _UnreportedError(LookupError):
+    """The metadata of an object lack a property."""
+
+
+def _first(objects: Iterable[ThorObject], name: str, has: _Has) -> str | None:
     """Return the id of the first visible object with this text in its name that has a property."""
     wanted = name.lower()
-    fitting = (item for item in objects if wanted in item.name.lower() and item.visible and has(item))
-    return next((item.object_id for item in fitting), None)
+    for item in objects:
+        if wanted in item.name.lower() and item.visible:
+            value = has(item)
+            if value is UNSET:
+                raise _UnreportedError(item.object_id)
+            if value:
+                return item.object_id
+    return None
 
 
 def current_call(text: str, view: SimulatorView) -> dict[str, Any]:

@@ -107,7 +107,7 @@ def state_of(item: ThorObject) -> ObjectState:
         parents=tuple(item.parent_receptacles or ()),
         position=(round(at.x, 3), round(at.y, 3), round(at.z, 3)),
         held=item.is_picked_up,
-        is_open=item.is_open if item.openable else None,
+        is_open=bool(item.is_open) if item.openable else None,
         is_on=item.is_toggled if item.toggleable else None,
         is_sliced=item.is_sliced,
         is_dirty=item.is_dirty,

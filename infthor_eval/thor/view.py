@@ -5,6 +5,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from msgspec import UNSET, UnsetType
 from numpy.typing import NDArray
 
 from infthor_eval.errors import SimulatorError, in_one_line
@@ -40,7 +41,11 @@ class Box(msgspec.Struct, frozen=True):
 
 
 class ThorObject(msgspec.Struct, rename="camel", frozen=True):
-    """One object of `metadata["objects"]`; names and meanings are AI2-THOR's."""
+    """One object of `metadata["objects"]`; names and meanings are AI2-THOR's.
+
+    What an agent's action looks at is UNSET, which counts as false, where a simulator does not report it: the published
+    script tells it from false.
+    """
 
     object_id: str
     object_type: str
@@ -49,18 +54,18 @@ class ThorObject(msgspec.Struct, rename="camel", frozen=True):
     rotation: Vector = Vector()
     distance: float = 0.0
     visible: bool = False
-    receptacle: bool = False
+    receptacle: bool | UnsetType = UNSET
     receptacle_object_ids: list[str] | None = None
     parent_receptacles: list[str] | None = None
-    pickupable: bool = False
+    pickupable: bool | UnsetType = UNSET
     moveable: bool = False
     is_picked_up: bool = False
-    openable: bool = False
-    is_open: bool = False
+    openable: bool | UnsetType = UNSET
+    is_open: bool | UnsetType = UNSET
     openness: float = 0.0
-    toggleable: bool = False
+    toggleable: bool | UnsetType = UNSET
     is_toggled: bool = False
-    sliceable: bool = False
+    sliceable: bool | UnsetType = UNSET
     is_sliced: bool = False
     breakable: bool = False
     is_broken: bool = False

@@ -26,6 +26,7 @@ TWO = Task(TaskType.PLACE_TWO, "Apple", "SideTable", sliced=True)
 EXAMINE = Task(TaskType.EXAMINE, "Mug", light="DeskLamp")
 HEAT = Task(TaskType.HEAT, "Mug", "Fridge")
 STACK = Task(TaskType.STACK, "Apple", "Fridge", movable="Plate")
+AWAY = Task(TaskType.PUT_AWAY, "Apple", "Fridge")
 HOT_MUG, HOT_CUP = (Treatments(hot=frozenset({key})) for key in (MUG, CUP))
 
 
@@ -35,6 +36,8 @@ HOT_MUG, HOT_CUP = (Treatments(hot=frozenset({key})) for key in (MUG, CUP))
         (PLACE, kitchen(), Treatments(), 0, 1),
         (PLACE, kitchen({MUG: FRIDGE}), Treatments(), 1, 1),
         (PLACE, kitchen({CUP: FRIDGE}), Treatments(), 0, 1),
+        (AWAY, kitchen({SLICE_1: FRIDGE}), Treatments(), 1, 1),
+        (AWAY, kitchen({SLICE_1: FRIDGE}, held=MUG), Treatments(), 0, 1),
         (SLICE, kitchen(without=[SLICE_1, SLICE_2]), Treatments(), 0, 2),
         (SLICE, kitchen(), Treatments(), 1, 2),
         (SLICE, kitchen({SLICE_1: FRIDGE}), Treatments(), 2, 2),

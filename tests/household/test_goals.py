@@ -47,6 +47,7 @@ CLEAN = Task(TaskType.CLEAN, "Mug", "SideTable")
 HEAT = Task(TaskType.HEAT, "Mug", "SideTable")
 COOL = Task(TaskType.COOL, "Mug", "SideTable")
 STACK = Task(TaskType.STACK, "Apple", "SideTable", movable="Plate")
+AWAY = Task(TaskType.PUT_AWAY, "Apple", "SideTable")
 
 
 @pytest.mark.parametrize(
@@ -83,6 +84,11 @@ STACK = Task(TaskType.STACK, "Apple", "SideTable", movable="Plate")
         (STACK, state(apple="table-2", plate="table-2"), False),
         (STACK, state(apple="plate", held="plate", at="table-2"), False),
         (STACK, state(mug_1="plate", plate="table-2"), False),
+        (AWAY, state(apple="table-1"), True),
+        (AWAY, state(slice="table-1"), True),
+        (AWAY, state(slice="table-1", held="mug-1"), False),
+        (AWAY, state(held="apple"), False),
+        (AWAY, state(apple="desk"), False),
     ],
     ids=str,
 )

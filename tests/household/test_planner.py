@@ -28,6 +28,7 @@ def names(task):
         (Task(TaskType.EXAMINE, "Mug", light="DeskLamp"), "Goto Pickup Goto Toggle"),
         (Task(TaskType.PLACE_TWO, "Apple", "CounterTop"), "Goto Pickup Goto Put Goto Pickup Goto Put"),
         (Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate"), "Goto Pickup Put Pickup Goto Put"),
+        (Task(TaskType.PUT_AWAY, "Mug", "DiningTable"), "Goto Pickup Goto Put"),
         (
             Task(TaskType.PLACE, "Apple", "CounterTop", sliced=True),
             "Goto Pickup Goto Put Pickup Slice",
@@ -50,7 +51,10 @@ def test_contents_move_with_what_carries_them():
     assert [step.item for step in steps if step.name == "PickupObject"] == [MUG.object_id]
 
 
-@pytest.mark.parametrize("task", tasks_of(ROOM, EXTRA), ids=str)
+PUT_AWAY = [Task(TaskType.PUT_AWAY, item, "DiningTable") for item in ("Mug", "Apple")]
+
+
+@pytest.mark.parametrize("task", [*tasks_of(ROOM, EXTRA), *PUT_AWAY], ids=str)
 def test_no_shorter_plan_exists(task):
     """Against plain breadth-first search, and the bound never exceeds what is left."""
     found = plan(task, ROOM)

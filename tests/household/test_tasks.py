@@ -26,6 +26,7 @@ TASKS = [
     Task(TaskType.HEAT, "Potato", "Fridge", sliced=True),
     Task(TaskType.COOL, "Mug", "SideTable"),
     Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate", sliced=True),
+    Task(TaskType.PUT_AWAY, "Knife", "Toilet"),
 ]
 
 
@@ -47,6 +48,14 @@ def test_types_out_of_the_parameters_and_of_another_version():
     assert task_of(examine) == Task(TaskType.EXAMINE, "Book", light="FloorLamp")
 
 
+def test_what_is_put_away_is_the_movable_object_whatever_the_parameters_say():
+    """They are those of the task before."""
+    params = {"object_target": "Bread", "parent_target": "Fridge", "mrecep_target": "", "object_sliced": True}
+    away = recorded("put object", None, "Glassbottle", "Toilet", **params)
+    assert task_of(away) == Task(TaskType.PUT_AWAY, "Bottle", "Toilet")
+    assert sub_task(Task(TaskType.PUT_AWAY, "Knife", "Toilet"), "kitchen-1").task_desc == "put the Knife on the Toilet"
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -58,6 +67,11 @@ def test_types_out_of_the_parameters_and_of_another_version():
         ),
         (recorded("pick_clean_then_place_in_recep", "Mug"), "has no task_info's receptacle or .*' parent_target"),
         (recorded("pick_and_place_with_movable_recep", "Mug", "", "Desk"), "task_info's movable or .*' mrecep_target"),
+        (
+            recorded("put object", receptacle="Toilet", mrecep_target="Mug"),
+            "needs task_info's movable and receptacle",
+        ),
+        (recorded("put object", None, "Mug", parent_target="Toilet"), "needs task_info's movable and receptacle"),
         (recorded("look_at_obj_in_light", "Mug", toggle_target=""), "has no pddl_params' toggle_target"),
         (recorded("look_at_obj_in_light", "Mug", toggle_target=3), "has no pddl_params' toggle_target"),
         (recorded("pick_and_place_simple", "Mug", None, "Desk", object_sliced="no"), "object_sliced 'no'"),

@@ -2,9 +2,9 @@
 
 import gzip
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -32,11 +32,12 @@ from infthor_eval.thor.published_actions import ground_published, published_call
 from infthor_eval.thor.view import ThorObject, Vector
 
 GOLDENS = Path(__file__).parents[2] / "../shared/data/published_goldens"
+OURS = Path(__file__).parents[1] / "goldens"  # outputs of the same functions on inputs made for these tests
 RULES = reward_rules("published")
 
 
-def lines(name: str) -> Iterator[dict[str, Any]]:
-    path = GOLDENS / f"{name}.jsonl.gz"
+def lines(name: str, folder: Path = GOLDENS) -> Iterator[dict[str, Any]]:
+    path = folder / f"{name}.jsonl.gz"
     if not path.is_file():
         pytest.skip(f"{path} is not here")
     with gzip.open(path, "rt") as file:
@@ -49,7 +50,8 @@ def thing(record: dict[str, Any]) -> ThorObject:
 
 
 def test_every_text_is_the_published_one():
-    for line in lines("plan_texts"):
+    put_away = (line for line in lines("put_away", OURS) if "text" in line)
+    for line in chain(put_away, lines("plan_texts")):
         try:
             if "high_pddl" in line:
                 text = plan_text(msgspec.convert({"high_idx": 0, **line["high_pddl"]}, HighAction), Words.PUBLISHED)
@@ -61,7 +63,7 @@ def test_every_text_is_the_published_one():
 
 
 def test_every_text_is_grounded_as_published():
-    for line in lines("plan_grounding"):
+    for line in chain(lines("unreported_properties", OURS), lines("plan_grounding")):
         assert list(ground_published(line["action"], map(thing, line["objects"]))) == line["result"], line
 
 
@@ -81,8 +83,16 @@ class _Story:
 
 @pytest.mark.parametrize("every", [20, 1])  # a part of them each time, all of them with the slow tests
 def test_every_step_earns_and_ends_as_published(every):
+    check_rewards(islice(lines("plan_rewards"), None, None, every))
+
+
+def test_every_step_of_putting_away_earns_and_ends_as_published():
+    check_rewards(line for line in lines("put_away", OURS) if "steps" in line)
+
+
+def check_rewards(stories: Iterable[dict[str, Any]]) -> None:
     graphs: dict[str, PublishedGraph] = {}
-    for line in islice(lines("plan_rewards"), None, None, every):
+    for line in stories:
         grid = json.dumps(line["grid"])
         graphs[grid] = graphs.get(grid) or PublishedGraph(map(tuple, line["grid"]))
         story = _Story()

@@ -1,0 +1,31 @@
+"""A replayed trajectory in which something is put away as a task of its own, as training sequences."""
+
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.generation.replay_set import replay_set, select
+from infthor_eval.thor.launch import embedded_launch
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.training.action_sequences import single_plans
+from infthor_eval.training.data import read_history
+
+from ..plans.cut import write
+from ..plans.put_away import PEN, pen_put_away
+
+
+def test_it_is_a_plan_with_its_goal(tmp_path, encoder):
+    data = write(tmp_path / "data", pen_put_away())
+    with Simulator(embedded_launch()) as simulator:
+        replayed = replay_set(select([data]), simulator, tmp_path / "set")
+    assert not replayed.failures
+    _, history = read_history(NiehSet(tmp_path / "set", needs_questions=False), PEN, Words.PUBLISHED)
+    assert [segment.goal for segment in history if segment.goal is not None] == [
+        "look at a pen under the desk lamp",
+        "put the Pen on the DiningTable",
+        "look at a mug under the floor lamp",
+    ]
+    away = history[4]
+    assert (away.plan, away.in_task, len(away.steps)) == ("put the Pen in the DiningTable", True, 22)
+    assert away.steps[-1][0] == "PutObject Pen DiningTable"
+    alone = list(single_plans(encoder, PEN, history))[4]
+    text = encoder._tokenizer.decode([piece for piece in alone.pieces if isinstance(piece, int)])
+    assert text.startswith("<|goal|>Your main goal: put the Pen on the DiningTable<|goal|>")
