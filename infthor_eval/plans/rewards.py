@@ -26,6 +26,7 @@ __all__ = ["PlanReward", "StepReward", "count_actions_to_goal", "max_reward"]
 
 _SMALL_LOOK = 0.01  # share of a look below which the camera's angle is right: simulators report rounded angles
 _COOLING_STAGES = 3  # cooled, opened again, picked up again
+_TAKING_WHILE_CLOSED = {"Toilet"}  # the receptacle that AI2-THOR need not have opened; experts put things onto its lid
 _NOTHING = Treatments()
 
 
@@ -266,7 +267,8 @@ def _paths_to_goal(rules: RewardRules, target: PlanTarget, grid: Grid | None) ->
 
 
 def _is_closed(item: ThorObject) -> bool:
-    return bool(item.openable and not item.is_open)
+    """Return whether a receptacle is to be opened before anything is put there."""
+    return bool(item.openable and not item.is_open and item.object_type not in _TAKING_WHILE_CLOSED)
 
 
 def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:

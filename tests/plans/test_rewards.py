@@ -28,6 +28,7 @@ from .building import (
     SLICE_1,
     SLICE_2,
     TABLE,
+    TOILET,
     kitchen,
 )
 
@@ -124,6 +125,7 @@ def test_no_way_there_pays_nothing():
 
 PICKUP = PlanTarget(PlanKind.PICKUP, MUG)
 PUT = PlanTarget(PlanKind.PUT, MUG, OTHER_TABLE)
+ON_THE_LID = PlanTarget(PlanKind.PUT, MUG, TOILET)
 STOW = PlanTarget(PlanKind.PUT, MUG, FRIDGE)
 HOLDING = kitchen(held=MUG)
 OPEN_FRIDGE = kitchen(held=MUG, opened=[FRIDGE])
@@ -256,6 +258,7 @@ PUTS = [
         [("PutObject", FRIDGE, IN_FRIDGE)],
         [(2.0, DONE)],
     ),
+    ("onto a closed lid", ON_THE_LID, HOLDING, [("PutObject", TOILET, kitchen({MUG: TOILET}))], [(2.0, DONE)]),
     (
         "taken out again",
         STOW,
@@ -437,6 +440,7 @@ MOST = [
     (STOW, HOLDING, None, 6.0),
     (STOW, HOLDING, IN_THE_FRIDGE, 11.0),
     (STOW, OPEN_FRIDGE, None, 2.0),
+    (ON_THE_LID, HOLDING, None, 2.0),
     (PlanTarget(PlanKind.OPEN, DRAWER), kitchen(), None, 2.0),
     (PlanTarget(PlanKind.CLOSE, DRAWER), kitchen(opened=[DRAWER]), None, 1.0),
     (TOGGLE, HOLDING, EXAMINE, 6.0),
