@@ -126,7 +126,6 @@ class Step(msgspec.Struct, omit_defaults=True):
         img_idx: number of the frame.
         img_filename: name of the frame's file.
         step: index of the low-level action before the frame (see the module's docstring).
-        low_idx: the same in the layout of `dev`, where it is null or 0 before the first action; None in the others.
         object_log: the published fields.
         action: text of that action ("PickupObject Mug"); None at the first frame and in published logs.
         success: True if the simulator accepted the action.
@@ -137,12 +136,12 @@ class Step(msgspec.Struct, omit_defaults=True):
         receptacle: id of the receptacle acted on.
         seen: object instances in the frame by id; None in published logs.
         changes: states, by id, of the objects that changed since the frame before; of all objects at the first frame.
+        low_idx: `step` in the layout of `dev`, where it is null or 0 before the first action; None in the others.
     """
 
     img_idx: int
     img_filename: str
     step: int = 0
-    low_idx: int | None = None
     object_log: ObjectLog = msgspec.field(default_factory=ObjectLog)
     action: str | None = None
     success: bool = True
@@ -153,6 +152,7 @@ class Step(msgspec.Struct, omit_defaults=True):
     receptacle: str | None = None
     seen: dict[str, ObjectInFrame] | None = None
     changes: dict[str, ObjectState] = msgspec.field(default_factory=dict)
+    low_idx: int | None = None
 
 
 def read_steps(folder: Path) -> list[Step]:
@@ -215,8 +215,8 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
         case Layout.COLUMNS:
             return _rows(path, document)
         case Layout.OBJECTS:
-            # A frame's number is its place, unless it has one.
-            listed = enumerate(document["img_idx"])
+            # The published code counts the sorted pictures, so a frame's number is its place among their names.
+            listed = enumerate(sorted(document["img_idx"], key=lambda frame: str(frame.get("img_filename"))))
             return [{"img_idx": place, "step": frame.get("low_idx") or 0, **frame} for place, frame in listed]
 
 
