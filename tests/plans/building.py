@@ -17,6 +17,7 @@ MICROWAVE = "Microwave|+02.00|+00.90|+00.00"
 BASIN = "Sink|+03.00|+00.80|+00.00|SinkBasin"
 FAUCET = "Faucet|+03.00|+01.00|+00.20"
 BATHTUB = "Bathtub|+09.00|+00.40|+00.00|BathtubBasin"
+TOILET = "Toilet|+08.00|+00.00|+00.00"
 BATH_FAUCET = "Faucet|+09.00|+00.80|+00.90"
 LAMP = "DeskLamp|+00.10|+01.00|+00.00"
 DRAWER = "Drawer|+04.00|+00.50|+00.00"
@@ -35,6 +36,7 @@ _FURNITURE = {
     FAUCET: {"toggleable": True},
     BATHTUB: {"receptacle": True},
     BATH_FAUCET: {"toggleable": True},
+    TOILET: {"receptacle": True, "openable": True},
     LAMP: {"toggleable": True},
     DRAWER: {"receptacle": True, "openable": True},
 }
