@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import importlib.util
 import json
 import os
 from functools import cache
@@ -20,10 +21,20 @@ from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN, question_t
 
 GOLDEN = json.loads((Path(__file__).parents[1] / "goldens" / "prompts.json").read_text())
 REPLIES = Path(__file__).parents[2] / "../shared/data/published_sets/replies"
-# The package `dashscope` ships Qwen's vocabulary as dashscope/resources/qwen.tiktoken (pip install --no-deps --target).
-VOCABULARY = Path(os.environ.get("QWEN_VOCABULARY", "qwen.tiktoken"))
+
+
+def vocabulary() -> Path:
+    """Qwen's vocabulary: the file that QWEN_VOCABULARY names, or that of the package `dashscope`, if it is installed."""
+    package = importlib.util.find_spec("dashscope")
+    folder = Path(package.origin).parent if package is not None and package.origin is not None else Path()
+    return Path(os.environ.get("QWEN_VOCABULARY", folder / "resources" / "qwen.tiktoken"))
+
+
+VOCABULARY = vocabulary()
 needs_logs = pytest.mark.skipif(not REPLIES.is_dir(), reason="the published logs are not at ../shared/data")
-needs_vocabulary = pytest.mark.skipif(not VOCABULARY.is_file(), reason="QWEN_VOCABULARY names no vocabulary of Qwen")
+needs_vocabulary = pytest.mark.skipif(
+    not VOCABULARY.is_file(), reason="neither QWEN_VOCABULARY nor the package dashscope"
+)
 VIEWS, FILM = CONTEXTS["trajectory"].intro, CONTEXTS["video"].intro
 
 # Qwen2's split of a text into pieces that are merged apart.
