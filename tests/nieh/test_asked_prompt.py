@@ -24,7 +24,7 @@ REPLIES = Path(__file__).parents[2] / "../shared/data/published_sets/replies"
 
 
 def vocabulary() -> Path:
-    """Qwen's vocabulary: the file that QWEN_VOCABULARY names, or that of the package `dashscope`, if it is installed."""
+    """Qwen's vocabulary: the file that QWEN_VOCABULARY names, or that of the package `dashscope`, if there is one."""
     package = importlib.util.find_spec("dashscope")
     folder = Path(package.origin).parent if package is not None and package.origin is not None else Path()
     return Path(os.environ.get("QWEN_VOCABULARY", folder / "resources" / "qwen.tiktoken"))
