@@ -160,8 +160,8 @@ def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
 
 def test_an_accepted_task_ends_the_row_of_failures(simulator, monkeypatch):
     tries = iter(range(10_000))
-    _Failing(monkeypatch, lambda _: next(tries) % 3 != 2)
-    made = generate(TrajectorySettings("living-room-2", 5, 60, 3, max_fail=2), simulator)
+    _Failing(monkeypatch, lambda _: next(tries) % 4 < 2)  # what fails of itself is among the other two
+    made = generate(TrajectorySettings("living-room-2", 5, 60, 6, max_fail=4), simulator)
     assert made.statistics.roll_backs == [] and made.statistics.reasons["made to fail"] >= 6
 
 
@@ -176,7 +176,7 @@ def test_what_gives_up_is_kept_from_a_floor_on(simulator, monkeypatch, floor):
     _Failing(monkeypatch, while_)
     settings = TrajectorySettings("living-room-2", 5, 300, 3, True, max_fail=2, save_floor=floor)
     if floor != 40:
-        with pytest.raises(UsageError, match=r"no further task works after .* failed tasks \(made to fail"):
+        with pytest.raises(UsageError, match=r"no further task works after .* failed tasks \(.*made to fail"):
             generate(settings, simulator)
         return
     made = generate(settings, simulator)
