@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 # here. It must stay out of the environment itself, where transformers would find it and fail.
 PEERS := $(VENV)/test-peers
 # The renderer is compiled once; otherwise each process that finds it missing would compile it.
-COMPILE := $(BIN)/python -m pytest -q tests/sim/test_questions.py tests/sim/test_pictures.py -m "not slow" \
+COMPILE := $(BIN)/python -m pytest -q tests/infthor_sim/test_questions.py tests/infthor_sim/test_pictures.py -m "not slow" \
 	-k "test_questions or test_ids_frame_names or numba"
 
 # Real vLLM, on a GPU or a CPU, has an environment of its own.

@@ -1,14 +1,16 @@
 """Which files go into the wheel; everything else about the package is in pyproject.toml.
 
 `tasks/` and `results/` lie beside the package in a checkout (people edit and read them there) and inside it in a
-wheel, as data. `infthor_eval.formats.packaged` finds them in either place.
+wheel, as data. `infthor_eval.storage.packaged` finds them in either place.
 """
 
 from setuptools import find_packages, setup
 
 setup(
     packages=[
-        *find_packages(include=["infthor_eval", "infthor_eval.*", "model_adapters", "model_adapters.*"]),
+        *find_packages(
+            include=["infthor_eval", "infthor_eval.*", "model_adapters", "model_adapters.*"]
+        ),
         "infthor_eval.tasks",
         "infthor_eval.results",
     ],

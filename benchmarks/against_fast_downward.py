@@ -25,7 +25,15 @@ from infthor_eval.household.tasks import Task
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
-_SCENES = ("kitchen-1", "kitchen-2", "kitchen-3", "living-room-1", "living-room-2", "bedroom-1", "bedroom-2")
+_SCENES = (
+    "kitchen-1",
+    "kitchen-2",
+    "kitchen-3",
+    "living-room-1",
+    "living-room-2",
+    "bedroom-1",
+    "bedroom-2",
+)
 
 
 def main() -> None:
@@ -66,7 +74,14 @@ def optimal_cost(script: Path, text: str) -> int | None:
         folder = Path(name)
         (folder / "domain.pddl").write_text(DOMAIN)
         (folder / "problem.pddl").write_text(text)
-        command = [sys.executable, script, "domain.pddl", "problem.pddl", "--search", "astar(lmcut())"]
+        command = [
+            sys.executable,
+            script,
+            "domain.pddl",
+            "problem.pddl",
+            "--search",
+            "astar(lmcut())",
+        ]
         result = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     match = re.search(r"Plan cost: (\d+)", result.stdout)
     return int(match[1]) if match else None

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from noise_set import write_set
 
-from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.storage.packaged import packaged_folder
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
 SHIM = Path(__file__).parents[1] / "tests" / "peers"
@@ -32,7 +32,9 @@ def main() -> None:
     parser.add_argument("--questions", type=int, default=24)
     options = parser.parse_args()
     if not PEERS.is_dir():
-        sys.exit(f"{PEERS}: no torchvision, which lm-eval's model needs; run `make test` once, which puts it there")
+        sys.exit(
+            f"{PEERS}: no torchvision, which lm-eval's model needs; run `make test` once, which puts it there"
+        )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         save_tiny_checkpoint(folder / "checkpoint", seed=0)
@@ -40,7 +42,9 @@ def main() -> None:
         whole = compare(folder, options.frames, options.questions)
     print(f"{options.frames} frames, {options.questions} questions, nieh_full")
     print(f"{'':24}{'whole process':>14}{'start-up':>10}{'the rest':>10}")
-    for name, long, short in zip(("infthor-eval", "lm-eval hf-multimodal"), whole[:2], start_up[:2], strict=True):
+    for name, long, short in zip(
+        ("infthor-eval", "lm-eval hf-multimodal"), whole[:2], start_up[:2], strict=True
+    ):
         print(f"{name:24}{long:12.1f} s{short:8.1f} s{long - short:8.1f} s")
     rest = (whole[1] - start_up[1]) / (whole[0] - start_up[0])
     print(f"{'factor':24}{whole[1] / whole[0]:13.1f}x{'':9}{rest:9.1f}x")
@@ -64,18 +68,46 @@ def run_ours(checkpoint: Path, folder: Path) -> float:
         "--model-args",
         f"pretrained={checkpoint},dtype=float32,device=cpu",
     ]
-    arguments += ["--tasks", "nieh_full", "--data", str(folder / "set"), "--output", str(folder / "ours")]
+    arguments += [
+        "--tasks",
+        "nieh_full",
+        "--data",
+        str(folder / "set"),
+        "--output",
+        str(folder / "ours"),
+    ]
     return _time_process(["-c", "from infthor_eval.cli import main; main()", *arguments], {})
 
 
 def run_theirs(checkpoint: Path, folder: Path) -> float:
     """Return the seconds of the whole process of `lm-eval`."""
-    arguments = ["run", "--model", "hf-multimodal", "--model_args", f"pretrained={checkpoint},dtype=float32"]
-    arguments += ["--tasks", "nieh_full", "--include_path", str(packaged_folder("tasks")), "--device", "cpu"]
-    arguments += ["--metadata", json.dumps({"data": str(folder / "set")}), "--apply_chat_template", "--batch_size", "1"]
+    arguments = [
+        "run",
+        "--model",
+        "hf-multimodal",
+        "--model_args",
+        f"pretrained={checkpoint},dtype=float32",
+    ]
+    arguments += [
+        "--tasks",
+        "nieh_full",
+        "--include_path",
+        str(packaged_folder("tasks")),
+        "--device",
+        "cpu",
+    ]
+    arguments += [
+        "--metadata",
+        json.dumps({"data": str(folder / "set")}),
+        "--apply_chat_template",
+        "--batch_size",
+        "1",
+    ]
     arguments += ["--log_samples", "--output_path", str(folder / "theirs")]
     path = {"PYTHONPATH": f"{SHIM}{os.pathsep}{PEERS}"}
-    return _time_process(["-c", "from lm_eval.__main__ import cli_evaluate; cli_evaluate()", *arguments], path)
+    return _time_process(
+        ["-c", "from lm_eval.__main__ import cli_evaluate; cli_evaluate()", *arguments], path
+    )
 
 
 def replies(folder: Path) -> dict[str, str]:

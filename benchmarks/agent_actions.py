@@ -29,11 +29,11 @@ import torch
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.household.sequence_text import ACT
+from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.training.data import read_history, trajectory_names
 from model_adapters import Decoding
-from model_adapters.hf.model import TransformersModel
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
 Part = str | FrameRef
@@ -76,11 +76,17 @@ def main() -> None:
     options = _arguments()
     torch.set_num_threads(options.threads)
     opening, steps = read_bundled_steps(max(options.steps) + options.actions)
-    model = Qwen25VLTiny.build("qwen2.5-vl-tiny", Qwen25VLTiny.Options(prompt="plain", max_tokens=0), options.seed)
+    model = Qwen25VLTiny.build(
+        "qwen2.5-vl-tiny", Qwen25VLTiny.Options(prompt="plain", max_tokens=0), options.seed
+    )
     acted = partial(reply, n_tokens=options.tokens)
-    act_in_turn(start_conversation(model, opening, steps[:5]), steps[5:7], acted)  # imports, threads and kernels
+    act_in_turn(
+        start_conversation(model, opening, steps[:5]), steps[5:7], acted
+    )  # imports, threads and kernels
     print(f"{options.tokens} tokens an action; seconds, in brackets processor time")
-    print(f"{'steps':>6} {'tokens':>8}   {'ours':15} {'per action':17} {'per token':17} {'ratios':>15}   replies equal")
+    print(
+        f"{'steps':>6} {'tokens':>8}   {'ours':15} {'per action':17} {'per token':17} {'ratios':>15}   replies equal"
+    )
     counts = {"per action": options.per_action, "per token": options.per_token}
     rows = []
     for n_steps in options.steps:
@@ -92,13 +98,17 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, nargs="+", default=[10, 50, 100, 200], help="lengths of the history")
+    parser.add_argument(
+        "--steps", type=int, nargs="+", default=[10, 50, 100, 200], help="lengths of the history"
+    )
     parser.add_argument("--tokens", type=int, default=6, help="tokens of each action")
     parser.add_argument("--actions", type=int, default=5, help="actions at each length")
     parser.add_argument("--repeats", type=int, default=5, help="repetitions of our way")
     parser.add_argument("--per-action", type=int, default=3, help="number of actions that way")
     parser.add_argument("--per-token", type=int, default=1, help="number of actions that way")
-    parser.add_argument("--threads", type=int, default=1, help="one is disturbed least by other work")
+    parser.add_argument(
+        "--threads", type=int, default=1, help="one is disturbed least by other work"
+    )
     parser.add_argument("--seed", type=int, default=0)
     return parser.parse_args()
 
@@ -113,11 +123,15 @@ def read_bundled_steps(n_steps: int) -> tuple[list[Part], list[Step]]:
             (steps[-1][1] if steps else opening).extend(segment.opening())
             steps += [(action, [frame]) for action, frame in segment.steps]
     if len(steps) < n_steps:
-        raise SystemExit(f"the bundled trajectories have {len(steps)} steps; ask for at most that many")
+        raise SystemExit(
+            f"the bundled trajectories have {len(steps)} steps; ask for at most that many"
+        )
     return opening, steps[:n_steps]
 
 
-def start_conversation(model: TransformersModel, opening: Sequence[Part], history: Sequence[Step]) -> Any:
+def start_conversation(
+    model: TransformersModel, opening: Sequence[Part], history: Sequence[Step]
+) -> Any:
     """Return a conversation with a history, before an action."""
     talk = model.conversation()
     talk.append(*opening, ACT)
@@ -182,7 +196,9 @@ def measure_ours(
         with measure_parts(model) as spent:
             times.add(act_in_turn(talk, behind, partial(reply, n_tokens=n_tokens)))
         shares.append({name: seconds / len(behind) for name, seconds in spent.items()})
-    return OurTimes(times, {name: statistics.median(item[name] for item in shares) for name in _SHARES}, context)
+    return OurTimes(
+        times, {name: statistics.median(item[name] for item in shares) for name in _SHARES}, context
+    )
 
 
 def measure_slow_ways(
@@ -218,7 +234,9 @@ def measure_parts(model: TransformersModel) -> Iterator[dict[str, float]]:
     }
     with ExitStack() as stack:
         for name, (owner, function) in places.items():
-            stack.enter_context(mock.patch.object(owner, function, _timing(getattr(owner, function), spent, name)))
+            stack.enter_context(
+                mock.patch.object(owner, function, _timing(getattr(owner, function), spent, name))
+            )
         yield spent
 
 
@@ -236,10 +254,15 @@ def _timing(run: Callable[..., Any], spent: dict[str, float], name: str) -> Call
 def show(n_steps: int, ours: OurTimes, slow: Mapping[str, ActionTimes]) -> None:
     """Print a line of the first table."""
     wall, process = statistics.median(ours.times.wall), statistics.median(ours.times.process)
-    seconds = [(statistics.median(way.wall), statistics.median(way.process)) for way in slow.values()]
+    seconds = [
+        (statistics.median(way.wall), statistics.median(way.process)) for way in slow.values()
+    ]
     cells = f"{wall:6.3f} ({process:.3f}) " + "".join(f"{a:8.2f} ({b:6.2f})" for a, b in seconds)
     ratios = ", ".join(f"{a / wall:.0f}x ({b / process:.0f}x)" for a, b in seconds)
-    equal = [(sum(map(tuple.__eq__, way.replies, ours.times.replies)), len(way.replies)) for way in slow.values()]
+    equal = [
+        (sum(map(tuple.__eq__, way.replies, ours.times.replies)), len(way.replies))
+        for way in slow.values()
+    ]
     equal_text = ", ".join(f"{number} of {every}" for number, every in equal)
     print(f"{n_steps:6} {ours.n_tokens:8}   {cells}   {ratios}   {equal_text}", flush=True)
 
@@ -247,7 +270,10 @@ def show(n_steps: int, ours: OurTimes, slow: Mapping[str, ActionTimes]) -> None:
 def show_shares(rows: Sequence[tuple[int, OurTimes]]) -> None:
     """Print the second table, and the growth of our time."""
     print("\nours, processor milliseconds per action")
-    print(f"{'steps':>6} " + "".join(f"{name:>11}" for name in (*_SHARES, "rest", "all", "all but model")))
+    print(
+        f"{'steps':>6} "
+        + "".join(f"{name:>11}" for name in (*_SHARES, "rest", "all", "all but model"))
+    )
     beside = []
     for n_steps, (times, shares, _) in rows:
         every = statistics.median(times.process)
@@ -257,7 +283,9 @@ def show_shares(rows: Sequence[tuple[int, OurTimes]]) -> None:
     for name, about in _SHARES.items():
         print(f"  {name}: {about}")
     growth = [last / first for first, last in zip(beside[0], beside[-1], strict=True)]
-    print(f"from {rows[0][0]} to {rows[-1][0]} steps: {growth[0]:.2f} times; without the model {growth[1]:.2f} times")
+    print(
+        f"from {rows[0][0]} to {rows[-1][0]} steps: {growth[0]:.2f} times; without the model {growth[1]:.2f} times"
+    )
 
 
 if __name__ == "__main__":

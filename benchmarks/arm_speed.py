@@ -34,7 +34,9 @@ def main() -> None:
             single = single if not image else rate
             print(f"arm, {'frames' if image else 'no frames'}: {rate:.0f} steps/s", flush=True)
     together = steps_per_second_together(options.simulators, options.steps)
-    print(f"arm, frames, {options.simulators} simulators: {together:.0f} steps/s, {together / single:.2f} times one")
+    print(
+        f"arm, frames, {options.simulators} simulators: {together:.0f} steps/s, {together / single:.2f} times one"
+    )
     with tempfile.TemporaryDirectory() as folder, _simulator(True) as simulator:
         frame = FrameFolder(Path(folder)).keep(simulator.view)
         assert frame is not None
@@ -43,7 +45,9 @@ def main() -> None:
             assert isinstance(policy, Policy)
             policy.reset()
             policy.act(frame, "pick up the mug")
-            seconds = seconds_per_call(lambda policy=policy: policy.act(frame, "pick up the mug"), _ACTS)
+            seconds = seconds_per_call(
+                lambda policy=policy: policy.act(frame, "pick up the mug"), _ACTS
+            )
             print(f"{name}: {1 / seconds:.1f} chunks/s, {1000 * seconds:.0f} ms each", flush=True)
             policy.close()
 
@@ -68,7 +72,9 @@ def steps_per_second(simulator: Simulator, n_steps: int) -> float:
 
     def step(number: int) -> None:
         sign = (-1.0) ** number
-        for call in conversion.calls(ArmDelta((sign * 0.03, 0.0, sign * 0.04), (0.0, 0.0, sign * 0.1), 0.0)):
+        for call in conversion.calls(
+            ArmDelta((sign * 0.03, 0.0, sign * 0.04), (0.0, 0.0, sign * 0.1), 0.0)
+        ):
             simulator.step(**call)
 
     step(0)

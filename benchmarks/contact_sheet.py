@@ -12,18 +12,18 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from infthor_eval.sim.actions import bind
-from infthor_eval.sim.default_objects import default_object
-from infthor_eval.sim.geometry import euler_matrix
-from infthor_eval.sim.objects import SimObject
-from infthor_eval.sim.render.camera import PinholeCamera
-from infthor_eval.sim.render.lighting import Lights
-from infthor_eval.sim.render.picture import cast_picture, choose_rasterizer, colour_picture
-from infthor_eval.sim.render.primitives import Form, Material, ShapePart, rows
-from infthor_eval.sim.render.shapes import shape
-from infthor_eval.sim.scenes.catalogue import Catalogue
-from infthor_eval.sim.simulation import Simulation
-from infthor_eval.sim.views import Display
+from infthor_sim.actions import bind
+from infthor_sim.default_objects import default_object
+from infthor_sim.geometry import euler_matrix
+from infthor_sim.objects import SimObject
+from infthor_sim.pictures.views import Display
+from infthor_sim.render.camera import PinholeCamera
+from infthor_sim.render.lighting import Lights
+from infthor_sim.render.picture import cast_picture, choose_rasterizer, colour_picture
+from infthor_sim.render.primitives import Form, Material, ShapePart, rows
+from infthor_sim.render.shapes import shape
+from infthor_sim.scenes.catalogue import Catalogue
+from infthor_sim.simulation import Simulation
 
 _ROOMS = ("kitchen", "living-room", "bedroom", "bathroom")
 _SEEDS = (1, 2, 3)
@@ -35,7 +35,12 @@ _SHAPES = ("Bowl", "AppleSliced", "BreadSliced", "TomatoSliced", "PotatoSliced",
            "Drawer", "Cabinet", "SinkBasin", "DiningTable", "SideTable", "CoffeeTable", "Desk", "Apple", "Tomato",
            "TennisRacket", "AlarmClock", "Watch", "Ladle", "Statue", "CreditCard", "CellPhone", "SaltShaker",
            "PepperShaker", "Microwave", "Safe", "DogBed", "Lettuce")  # fmt: skip
-_HELD = (("kitchen-1", "Pan"), ("kitchen-2", "Bread"), ("bedroom-1", "BaseballBat"), ("living-room-1", "Box"))
+_HELD = (
+    ("kitchen-1", "Pan"),
+    ("kitchen-2", "Bread"),
+    ("bedroom-1", "BaseballBat"),
+    ("living-room-1", "Box"),
+)
 
 
 def do(sim: Simulation, action: str, **arguments: object) -> None:
@@ -80,12 +85,16 @@ def close_up(object_type: str) -> Image.Image:
     reach = float(np.linalg.norm(item.box_size)) * (1.4 if item.state.openness else 1.0)
     ground = ShapePart(Form.BOX, (0, -0.02, 0), (30, 0.02, 30), (0.62, 0.6, 0.56), Material.STONE)
     under = np.array([0.0, float(item.bounds()[0][1]), 0.0])
-    prims = np.concatenate([rows([ground], under, np.eye(3), 0), rows(shape(item), item.position, item.matrix, 1)])
+    prims = np.concatenate(
+        [rows([ground], under, np.eye(3), 0), rows(shape(item), item.position, item.matrix, 1)]
+    )
     view = euler_matrix((34.0, 205.0, 0.0))
     camera = PinholeCamera(item.center - view[:, 2] * reach * 2.5, view, 28.0, _NEAR, _NEAR)
     rasterizer = choose_rasterizer()
     seen = cast_picture(prims, ("ground", object_type), camera, rasterizer)
-    return Image.fromarray(np.ascontiguousarray(colour_picture(seen, Lights.none(), rasterizer)[::-1]))
+    return Image.fromarray(
+        np.ascontiguousarray(colour_picture(seen, Lights.none(), rasterizer)[::-1])
+    )
 
 
 def in_hand(sim: Simulation, name: str, object_type: str) -> Image.Image:
@@ -105,7 +114,10 @@ def main() -> None:
         (f"{room}-{seed}", best_view(sim, f"{room}-{seed}")) for seed in _SEEDS for room in _ROOMS
     ]  # fmt: skip
     tiles += [(object_type, close_up(object_type)) for object_type in _SHAPES]
-    tiles += [(f"{name}, {object_type} in hand", in_hand(sim, name, object_type)) for name, object_type in _HELD]
+    tiles += [
+        (f"{name}, {object_type} in hand", in_hand(sim, name, object_type))
+        for name, object_type in _HELD
+    ]
     lay(tiles).quantize(256, dither=Image.Dither.NONE).save(out, optimize=True)
 
 

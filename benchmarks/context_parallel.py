@@ -30,8 +30,8 @@ from infthor_eval.training.context_parallel import context_parallel
 from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.ranks import assign_ranks
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.prompt import Prompter
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.prompt import Prompter
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
@@ -62,7 +62,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--tokens", type=int, default=4096)
     options = parser.parse_args()
-    print(f"{'processes':>9} {'kept MB':>9} {'recomputed':>11} {'peak MB':>9} {'seconds':>8} {'loss':>9}")
+    print(
+        f"{'processes':>9} {'kept MB':>9} {'recomputed':>11} {'peak MB':>9} {'seconds':>8} {'loss':>9}"
+    )
     for n_ranks in (1, 2, 4):
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
@@ -71,7 +73,10 @@ def main() -> None:
             numbers = [torch.load(folder / f"{rank}.pt") for rank in range(n_ranks)]
         kept, recomputed, peak, seconds = (max(one[field] for one in numbers) for field in range(4))
         loss = sum(one[4] for one in numbers)
-        print(f"{n_ranks:9} {kept:9.1f} {recomputed:11.1f} {peak:9.0f} {seconds:8.1f} {loss:9.5f}", flush=True)
+        print(
+            f"{n_ranks:9} {kept:9.1f} {recomputed:11.1f} {peak:9.0f} {seconds:8.1f} {loss:9.5f}",
+            flush=True,
+        )
 
 
 def measure(rank: int, n_ranks: int, n_tokens: int, folder: Path) -> None:
@@ -133,7 +138,9 @@ def write_frames(folder: Path) -> None:
     """Write frames of noise."""
     draw = np.random.default_rng(0)
     for number in range(N_FRAMES):
-        Image.fromarray(draw.integers(0, 256, (300, 300, 3), dtype=np.uint8)).save(folder / f"{number}.png")
+        Image.fromarray(draw.integers(0, 256, (300, 300, 3), dtype=np.uint8)).save(
+            folder / f"{number}.png"
+        )
 
 
 if __name__ == "__main__":

@@ -49,7 +49,9 @@ def main() -> None:
         records = answer(folder, "large")
         seconds = time.perf_counter() - start
         peak = megabytes("VmHWM")
-    print(f"{options.frames} frames, {options.questions} questions of {records[0].tokens.context:,} tokens, nieh_full")
+    print(
+        f"{options.frames} frames, {options.questions} questions of {records[0].tokens.context:,} tokens, nieh_full"
+    )
     print(f"run             {seconds:8.1f} s")
     print(f"process before  {before:8.0f} MB")
     print(f"peak            {peak:8.0f} MB")
@@ -70,7 +72,9 @@ def answer(folder: Path, data: str) -> list[UnitRecord]:
     """
     options = {"pretrained": str(folder / "checkpoint"), "device": "cpu", "max_tokens": "0"}
     models = (ModelSpec("qwen2.5-vl", options),)
-    ((request, suite),) = RunOptions(models, ("nieh_full",), folder / data, folder / "out").requests()
+    ((request, suite),) = RunOptions(
+        models, ("nieh_full",), folder / data, folder / "out"
+    ).requests()
     records = execute(prepare(request, suite)).records
     failures = [record.failure for record in records if record.failure]
     if failures:
@@ -80,7 +84,11 @@ def answer(folder: Path, data: str) -> list[UnitRecord]:
 
 def megabytes(field: str) -> float:
     """Return a field of the process's status in MB (10^6 bytes)."""
-    line = next(line for line in (PROCESS / "status").read_text().splitlines() if line.startswith(f"{field}:"))
+    line = next(
+        line
+        for line in (PROCESS / "status").read_text().splitlines()
+        if line.startswith(f"{field}:")
+    )
     return int(line.split()[1]) * 1024 / 1e6
 
 

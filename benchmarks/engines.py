@@ -25,13 +25,20 @@ from typing import Any
 from noise_set import write_set
 from served import serve_vllm
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.runs import read_run
+from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.suites import find_suite
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
 MODEL = "checkpoint"
-WAYS = ("ours", "ours one by one", "vLLM", "vLLM uncached", "vLLM's server", "lm-eval hf-multimodal")
+WAYS = (
+    "ours",
+    "ours one by one",
+    "vLLM",
+    "vLLM uncached",
+    "vLLM's server",
+    "lm-eval hf-multimodal",
+)
 SLOW = {"vLLM uncached", "lm-eval hf-multimodal"}
 REFERENCE = "ours one by one"
 _COMMAND = ["-c", "from infthor_eval.cli import main; main()"]
@@ -51,7 +58,11 @@ class Race:
     @property
     def environment(self) -> dict[str, str]:
         """The variables of every process."""
-        variables = {"OMP_NUM_THREADS": str(self.threads), "HF_HUB_OFFLINE": "1", "VLLM_CPU_OMP_THREADS_BIND": "nobind"}
+        variables = {
+            "OMP_NUM_THREADS": str(self.threads),
+            "HF_HUB_OFFLINE": "1",
+            "VLLM_CPU_OMP_THREADS_BIND": "nobind",
+        }
         return {**os.environ, **variables, "VLLM_CPU_KVCACHE_SPACE": "4"}
 
 
@@ -88,7 +99,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--ways", nargs="+", choices=WAYS, default=WAYS)
     parser.add_argument("--frames", type=int, default=500, help="frames of the long trajectory")
     parser.add_argument("--questions", type=int, default=24, help="questions on it")
-    parser.add_argument("--slow-questions", type=int, default=4, help="questions for ways that encode all for each")
+    parser.add_argument(
+        "--slow-questions", type=int, default=4, help="questions for ways that encode all for each"
+    )
     return parser.parse_args()
 
 
@@ -102,7 +115,11 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
     config = Qwen25VLTiny.twin.config(ids, vocab_size)
     text, vision = config.text_config, config.vision_config
     text.hidden_size, text.intermediate_size, text.num_hidden_layers = 768, 2304, 16
-    text.num_attention_heads, text.num_key_value_heads, text.layer_types = 12, 2, ["full_attention"] * 16
+    text.num_attention_heads, text.num_key_value_heads, text.layer_types = (
+        12,
+        2,
+        ["full_attention"] * 16,
+    )
     text.rope_parameters["mrope_section"] = [8, 12, 12]
     vision.depth, vision.hidden_size, vision.intermediate_size, vision.num_heads = 4, 256, 512, 4
     vision.out_hidden_size, vision.fullatt_block_indexes = 768, [1, 3]
@@ -112,7 +129,9 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
 
 def run_race(race: Race, folder: Path, options: argparse.Namespace) -> None:
     """Run every way on one question and on more, and print what they took."""
-    print(f"\n{race.task}, {race.dtype}, {race.threads} thread(s); processor seconds (seconds by the clock)")
+    print(
+        f"\n{race.task}, {race.dtype}, {race.threads} thread(s); processor seconds (seconds by the clock)"
+    )
     heads = f"{'one question':>18}{'whole run':>20}{'asked':>6}{'each further':>18}{'encoded':>9}{'cached':>8}"
     print(f"{'':22}{heads}  equal")
     expected: Mapping[str, str] = {}
@@ -126,8 +145,13 @@ def run_race(race: Race, folder: Path, options: argparse.Namespace) -> None:
 
 def _row(way: str, one: Cost, whole: Cost, expected: Mapping[str, str]) -> str:
     n_more = len(whole.replies) - len(one.replies)
-    each = [(after - before) / n_more for before, after in ((one.processor, whole.processor), (one.wall, whole.wall))]
-    equal = sum(whole.replies[key] == reply for key, reply in expected.items() if key in whole.replies)
+    each = [
+        (after - before) / n_more
+        for before, after in ((one.processor, whole.processor), (one.wall, whole.wall))
+    ]
+    equal = sum(
+        whole.replies[key] == reply for key, reply in expected.items() if key in whole.replies
+    )
     tokens = f"{'?':>9}{'?':>8}"
     if whole.n_read is not None and whole.n_cached is not None:
         tokens = f"{whole.n_read - whole.n_cached:>9,}{whole.n_cached / whole.n_read:>8.1%}"
@@ -146,11 +170,18 @@ def run_way(way: str, race: Race, folder: Path, limit: int | None) -> Cost:
             return _run_lm_eval(race, folder / MODEL, tasks, output)
         data = [] if race.data is None else ["--data", str(race.data)]
         if way != "vLLM's server":
-            wall, processor = _time([*_COMMAND, *_model(way, race, folder / MODEL), *tasks, *data, *_to(output)], race)
+            wall, processor = _time(
+                [*_COMMAND, *_model(way, race, folder / MODEL), *tasks, *data, *_to(output)], race
+            )
             return _cost(wall, processor, output)
         start = time.perf_counter()
         with serve_vllm(folder / MODEL, race.dtype, race.environment, most_frames=512) as served:
-            given = ["--model", "openai", "--model-args", f"base_url={served.url},model={folder / MODEL}"]
+            given = [
+                "--model",
+                "openai",
+                "--model-args",
+                f"base_url={served.url},model={folder / MODEL}",
+            ]
             _, processor = _time([*_COMMAND, *given, *tasks, *data, *_to(output)], race)
         return _cost(time.perf_counter() - start, processor + served.processor_seconds, output)
 
@@ -169,18 +200,46 @@ def _model(way: str, race: Race, checkpoint: Path) -> list[str]:
             given |= {"prefix_caching": "false", "max_num_seqs": "1"}
     else:
         given |= {"device": "cpu"} | ({"batch_size": "1"} if way == REFERENCE else {})
-    return ["--model", "qwen2.5-vl", *engine, "--model-args", ",".join(f"{key}={given[key]}" for key in given)]
+    return [
+        "--model",
+        "qwen2.5-vl",
+        *engine,
+        "--model-args",
+        ",".join(f"{key}={given[key]}" for key in given),
+    ]
 
 
 def _run_lm_eval(race: Race, checkpoint: Path, tasks: Sequence[str], output: Path) -> Cost:
-    command = [*_LM_EVAL, "run", "--model", "hf-multimodal", *tasks, "--device", "cpu", "--batch_size", "1"]
-    command += ["--model_args", f"pretrained={checkpoint},dtype={race.dtype}", "--apply_chat_template"]
-    command += ["--include_path", str(packaged_folder("tasks")), "--log_samples", "--output_path", str(output)]
+    command = [
+        *_LM_EVAL,
+        "run",
+        "--model",
+        "hf-multimodal",
+        *tasks,
+        "--device",
+        "cpu",
+        "--batch_size",
+        "1",
+    ]
+    command += [
+        "--model_args",
+        f"pretrained={checkpoint},dtype={race.dtype}",
+        "--apply_chat_template",
+    ]
+    command += [
+        "--include_path",
+        str(packaged_folder("tasks")),
+        "--log_samples",
+        "--output_path",
+        str(output),
+    ]
     command += [] if race.data is None else ["--metadata", json.dumps({"data": str(race.data)})]
     wall, processor = _time(command, race)
     (path,) = output.rglob("samples_*.jsonl")
     samples = [json.loads(line) for line in path.read_text().splitlines()]
-    return Cost(wall, processor, {sample["doc"]["question_id"]: sample["resps"][0][0] for sample in samples})
+    return Cost(
+        wall, processor, {sample["doc"]["question_id"]: sample["resps"][0][0] for sample in samples}
+    )
 
 
 def _cost(wall: float, processor: float, output: Path) -> Cost:
@@ -191,14 +250,18 @@ def _cost(wall: float, processor: float, output: Path) -> Cost:
         sys.exit(f"{len(failed)} questions failed: {failed[0]}")
     read = sum(record.tokens.context or 0 for record in records)
     cached = sum(record.tokens.cached or 0 for record in records)
-    return Cost(wall, processor, {record.key.id: record.payload.reply for record in records}, read, cached)
+    return Cost(
+        wall, processor, {record.key.id: record.payload.reply for record in records}, read, cached
+    )
 
 
 def _time(arguments: Sequence[str], race: Race) -> tuple[float, float]:
     """Return the seconds by the clock and the processor seconds of a process and its children."""
     start = time.perf_counter()
     with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen([sys.executable, *arguments], env=race.environment, stdout=said, stderr=said)
+        process = subprocess.Popen(
+            [sys.executable, *arguments], env=race.environment, stdout=said, stderr=said
+        )
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         if process.returncode:

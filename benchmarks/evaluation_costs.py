@@ -202,11 +202,15 @@ def rates_from_prefill(rates: Rates, short: tuple[int, float], long: tuple[int, 
     """
     (n_short, slow_short), (n_long, slow_long) = ((n, 1 / rate) for n, rate in (short, long))
     if n_long <= n_short or slow_long < slow_short:
-        raise UsageError(f"of {short} and {long}, the longer context must come second and be the slower one")
+        raise UsageError(
+            f"of {short} and {long}, the longer context must come second and be the slower one"
+        )
     pair = 2 * (slow_long - slow_short) / (n_long - n_short)
     token = slow_short - pair * n_short / 2
     if token <= 0:
-        raise UsageError(f"{short} and {long} leave no time for anything but attention; measure a shorter context")
+        raise UsageError(
+            f"{short} and {long} leave no time for anything but attention; measure a shorter context"
+        )
     return Rates(token, pair, rates.step, rates.cached_token)
 
 

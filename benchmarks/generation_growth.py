@@ -43,7 +43,9 @@ def main() -> None:
             f"{own_mb:8.0f} {simulator_mb:19.0f}",
             flush=True,
         )
-    print(f"processor time per step, longest over shortest: {per_step[-1] / per_step[0]:.2f} (aim <= 1.3)")
+    print(
+        f"processor time per step, longest over shortest: {per_step[-1] / per_step[0]:.2f} (aim <= 1.3)"
+    )
 
 
 def processor_seconds() -> float:

@@ -30,7 +30,7 @@ _EDGE = 0.98  # of a solid's half extents: points on its very surface touch what
 
 def unit_points(form: int, bottom: float, top: float) -> np.ndarray:
     """Return points (n, 3) of a primitive in its own frame, scaled by its half extents; see `render.primitives`."""
-    from infthor_eval.sim.render.primitives import Form
+    from infthor_sim.render.primitives import Form
 
     steps = np.linspace(-_EDGE, _EDGE, 7)
     grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -41,15 +41,25 @@ def unit_points(form: int, bottom: float, top: float) -> np.ndarray:
         heights = np.linspace(-_EDGE, _EDGE if form == Form.ELLIPSOID else 0.0, 7)
         radii = np.sqrt(np.maximum(_EDGE**2 - heights**2, 0))
         if form == Form.BOWL:
-            heights = 1 + 2 * heights  # the lower half of an ellipsoid is scaled to the whole height
+            heights = (
+                1 + 2 * heights
+            )  # the lower half of an ellipsoid is scaled to the whole height
     else:
         heights = steps
         radii = _EDGE * (bottom + (top - bottom) * (heights + 1) / 2)
     hollow = form in (Form.CUP, Form.BOWL)  # of which only the wall is solid
-    rings = [np.array([[0.0, heights[0], 0.0]]) if hollow else heights[:, None] * np.array([[0.0, 1.0, 0.0]])]
+    rings = [
+        np.array([[0.0, heights[0], 0.0]])
+        if hollow
+        else heights[:, None] * np.array([[0.0, 1.0, 0.0]])
+    ]
     for share in (1.0,) if hollow else (0.5, 1.0):
         for angle in angles:
-            rings.append(np.stack([radii * share * np.cos(angle), heights, radii * share * np.sin(angle)], axis=1))
+            rings.append(
+                np.stack(
+                    [radii * share * np.cos(angle), heights, radii * share * np.sin(angle)], axis=1
+                )
+            )
     return np.concatenate(rings)
 
 
@@ -57,7 +67,7 @@ class Solid:
     """One drawn primitive of an object: its points in the world, and how deep points of others lie in it."""
 
     def __init__(self, row: np.ndarray) -> None:
-        from infthor_eval.sim.render.primitives import AXES, BOTTOM, CENTER, FORM, HALF, TOP
+        from infthor_sim.render.primitives import AXES, BOTTOM, CENTER, FORM, HALF, TOP
 
         self.form = int(row[FORM])
         self.center, self.half = row[CENTER : CENTER + 3], row[HALF : HALF + 3]
@@ -68,7 +78,7 @@ class Solid:
         self.low, self.high = self.points.min(axis=0), self.points.max(axis=0)
 
     def _radius(self, y: np.ndarray) -> np.ndarray:
-        from infthor_eval.sim.render.primitives import Form
+        from infthor_sim.render.primitives import Form
 
         if self.form == Form.BOWL:
             return np.sqrt(np.maximum(1 - ((1 - y) / 2) ** 2, 0))
@@ -79,7 +89,7 @@ class Solid:
 
         For a vessel: how far points lie outside of its wall while others of the same solid are inside.
         """
-        from infthor_eval.sim.render.primitives import Form
+        from infthor_sim.render.primitives import Form
 
         unit = (points - self.center) @ self.axes.T / self.half
         if self.form == Form.BOX:
@@ -106,8 +116,8 @@ class Solid:
 
 def solids(item: Any) -> list[Solid]:
     """Return the drawn primitives of an object of the world."""
-    from infthor_eval.sim.render.primitives import rows
-    from infthor_eval.sim.render.shapes import shape
+    from infthor_sim.render.primitives import rows
+    from infthor_sim.render.shapes import shape
 
     return [Solid(row) for row in rows(shape(item), item.position, item.matrix, 0)]
 
@@ -143,7 +153,11 @@ class Room:
 
     def pairs(self, seen_by: set[str] | None = None) -> Iterator[tuple[str, str, float]]:
         """Yield pairs of ids that go into each other and how deep; only with one of `seen_by`, if given."""
-        shown = [o for o in self.world.objects.values() if not self.world.is_hidden(o) and o.object_type != "Floor"]
+        shown = [
+            o
+            for o in self.world.objects.values()
+            if not self.world.is_hidden(o) and o.object_type != "Floor"
+        ]
         boxes = {}
         for item in shown:
             parts = self.drawn(item)
@@ -169,7 +183,9 @@ class Room:
     def _counts(a: Any, b: Any, opened: set[str]) -> bool:
         """Return whether a pair can be a fault: parts of furniture that are built into each other are none."""
         if any(x.parent == y.object_id and y.type.overhang for x, y in ((a, b), (b, a))):
-            return False  # what hangs over a rail goes around it, and dishes may have things stick out
+            return (
+                False  # what hangs over a rail goes around it, and dishes may have things stick out
+            )
         if a.type.pickupable or b.type.pickupable:
             return True
         fixed = {
@@ -183,8 +199,13 @@ class Room:
             "Bathtub",
             "BathtubBasin",
         }
-        built = [o.type.built_in or o.object_type in {*fixed, "StoveKnob", "StoveBurner", "Faucet"} for o in (a, b)]
-        return not all(built) or bool({a.object_id, b.object_id} & opened and all(o.type.openable for o in (a, b)))
+        built = [
+            o.type.built_in or o.object_type in {*fixed, "StoveKnob", "StoveBurner", "Faucet"}
+            for o in (a, b)
+        ]
+        return not all(built) or bool(
+            {a.object_id, b.object_id} & opened and all(o.type.openable for o in (a, b))
+        )
 
     def through_walls(self) -> Iterator[tuple[str, str, float]]:
         """Yield loose objects that go through a wall of the room they are in."""
@@ -192,22 +213,27 @@ class Room:
             if not item.type.pickupable or self.world.is_hidden(item):
                 continue
             parts = self.drawn(item)
-            low, high = np.min([p.low for p in parts], axis=0), np.max([p.high for p in parts], axis=0)
+            low, high = (
+                np.min([p.low for p in parts], axis=0),
+                np.max([p.high for p in parts], axis=0),
+            )
             middle = (low + high) / 2
             room = next((r for r in self.world.rooms
                          if r.x_min <= middle[0] <= r.x_max and r.z_min <= middle[2] <= r.z_max), None)  # fmt: skip
             if room is None:
                 yield item.object_id, "Wall", 1.0
                 continue
-            deep = max(room.x_min - low[0], high[0] - room.x_max, room.z_min - low[2], high[2] - room.z_max)
+            deep = max(
+                room.x_min - low[0], high[0] - room.x_max, room.z_min - low[2], high[2] - room.z_max
+            )
             if deep > 0.002:
                 yield item.object_id, "Wall", float(deep)
 
 
 def open_one(world: Any, item: Any, openness: float) -> None:
     """Open or close an object as its action does, whatever stands in the way."""
-    from infthor_eval.sim.receptacles import drawer_offset
-    from infthor_eval.sim.unfolding import unfold
+    from infthor_sim.physics.receptacles import drawer_offset
+    from infthor_sim.physics.unfolding import unfold
 
     before = drawer_offset(item)
     unfold(item, openness)
@@ -239,10 +265,10 @@ def faults(world: Any) -> dict[str, set[tuple[str, str]]]:
 
 def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[tuple[str, str]]:
     """Return the pairs that arise when an agent puts loose things into or onto what takes them, one after the other."""
-    from infthor_eval.sim.object_types import allowed_in
-    from infthor_eval.sim.scenes.catalogue import Catalogue
-    from infthor_eval.sim.server import SimulatorServer
-    from infthor_eval.sim.simulation import Simulation
+    from infthor_sim.object_types import allowed_in
+    from infthor_sim.player.server import SimulatorServer
+    from infthor_sim.scenes.catalogue import Catalogue
+    from infthor_sim.simulation import Simulation
 
     server = SimulatorServer(sim := Simulation(Catalogue()))
     server.run({"action": "Reset", "sceneName": scene})
@@ -260,7 +286,14 @@ def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[
         server.run({"action": "PickupObject", "objectId": item.object_id, "forceAction": True})
         if home.type.openable and home.state.openness == 0:
             server.run({"action": "OpenObject", "objectId": home.object_id, "forceAction": True})
-        server.run({"action": "PutObject", "objectId": home.object_id, "forceAction": True, "placeStationary": True})
+        server.run(
+            {
+                "action": "PutObject",
+                "objectId": home.object_id,
+                "forceAction": True,
+                "placeStationary": True,
+            }
+        )
         if world.held is not None:  # there was no room
             server.run({"action": "DropHandObject", "forceAction": True})
             continue
@@ -270,7 +303,7 @@ def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[
 
 def count(n_rooms: int, n_puts: int) -> dict[str, Any]:
     """Return all numbers, see the module's docstring."""
-    from infthor_eval.sim.scenes.procedural import build_scene
+    from infthor_sim.scenes.procedural import build_scene
 
     pairs, types, examples, n_objects = Counter[str](), Counter[str](), {}, 0
     with_fault = 0
@@ -278,7 +311,10 @@ def count(n_rooms: int, n_puts: int) -> dict[str, Any]:
         kind, seed = _KINDS[index % 4], 1000 + index // 4
         world = build_scene(kind, seed)
         n_objects += len(world.objects)
-        found = {**faults(world), "put": faults_of_puts(f"{kind}-{seed}", n_puts, np.random.default_rng(index))}
+        found = {
+            **faults(world),
+            "put": faults_of_puts(f"{kind}-{seed}", n_puts, np.random.default_rng(index)),
+        }
         with_fault += any(found.values())
         for where, listed in found.items():
             pairs[where] += len(listed)
@@ -295,21 +331,40 @@ def count(n_rooms: int, n_puts: int) -> dict[str, Any]:
 
 def main() -> None:
     """Parse the arguments and print the numbers."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rooms", type=int, default=200, help="rooms, of the four kinds in turn, from seed 1000")
-    parser.add_argument("--puts", type=int, default=10, help="things that an agent puts somewhere, in each room")
-    parser.add_argument("--against", metavar="CHECKOUT", help="also count with the simulator of another checkout")
-    parser.add_argument("--examples", action="store_true", help="name a pair of objects of each kind of pair")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--rooms", type=int, default=200, help="rooms, of the four kinds in turn, from seed 1000"
+    )
+    parser.add_argument(
+        "--puts", type=int, default=10, help="things that an agent puts somewhere, in each room"
+    )
+    parser.add_argument(
+        "--against", metavar="CHECKOUT", help="also count with the simulator of another checkout"
+    )
+    parser.add_argument(
+        "--examples", action="store_true", help="name a pair of objects of each kind of pair"
+    )
     options = parser.parse_args()
     result = count(options.rooms, options.puts)
     if not options.examples:
         del result["examples"]
     if options.against:
         # This file, with the other checkout's simulator.
-        command = [sys.executable, __file__, "--rooms", str(options.rooms), "--puts", str(options.puts)]
+        command = [
+            sys.executable,
+            __file__,
+            "--rooms",
+            str(options.rooms),
+            "--puts",
+            str(options.puts),
+        ]
         environment = {**os.environ, "PYTHONPATH": str(Path(options.against).resolve())}
         result = {
-            "other": json.loads(subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout),
+            "other": json.loads(
+                subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout
+            ),
             "ours": result,
         }
     print(json.dumps(result, indent=1))

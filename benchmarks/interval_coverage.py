@@ -23,7 +23,9 @@ def coverage(
     for _ in range(n_sets):
         sizes = random.integers(5, 40, size=n_trajectories)
         own = random.beta(accuracy * spread, (1 - accuracy) * spread, size=n_trajectories)
-        scores = [float(right) for p, n in zip(own, sizes, strict=True) for right in random.random(n) < p]
+        scores = [
+            float(right) for p, n in zip(own, sizes, strict=True) for right in random.random(n) < p
+        ]
         names = np.repeat(np.arange(n_trajectories), sizes).tolist()
         for_trajectories = clustered_mean(scores, names)
         for_questions = clustered_mean(scores, list(range(len(scores))))
@@ -37,13 +39,19 @@ if __name__ == "__main__":
     parser.add_argument("--sets", type=int, default=2000)
     parser.add_argument("--trajectories", type=int, default=60)
     parser.add_argument("--accuracy", type=float, default=0.7)
-    parser.add_argument("--ends", action="store_true", help="a table near the end of the scale instead")
+    parser.add_argument(
+        "--ends", action="store_true", help="a table near the end of the scale instead"
+    )
     options = parser.parse_args()
     if options.ends:
         for trajectories in (6, 12, 30):
-            row = [coverage(options.sets, trajectories, accuracy)[0] for accuracy in (0.9, 0.97, 0.99)]
+            row = [
+                coverage(options.sets, trajectories, accuracy)[0] for accuracy in (0.9, 0.97, 0.99)
+            ]
             shown = ", ".join(f"{100 * share:.1f}" for share in row)
-            print(f"{trajectories} trajectories, accuracy 0.9, 0.97, 0.99: {shown} % (aim 93 % at least)")
+            print(
+                f"{trajectories} trajectories, accuracy 0.9, 0.97, 0.99: {shown} % (aim 93 % at least)"
+            )
         raise SystemExit
     by_trajectory, by_question = coverage(options.sets, options.trajectories, options.accuracy)
     print(f"clustered by trajectory: {100 * by_trajectory:.1f} % (aim 93-97 %)")

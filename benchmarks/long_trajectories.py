@@ -42,7 +42,9 @@ class Group:
         for scene in self.scenes:
             number = int("".join(filter(str.isdigit, scene)))
             seed = number if self.seed is None else self.seed
-            yield TrajectorySettings(scene, seed, self.min_steps, self.min_subgoals, self.is_test_set)
+            yield TrajectorySettings(
+                scene, seed, self.min_steps, self.min_subgoals, self.is_test_set
+            )
 
 
 def groups(data: Path | None) -> dict[str, Group]:
@@ -81,7 +83,9 @@ def main() -> int:
         parser.error(f"unknown group {', '.join(sorted(unknown))}; give some of {', '.join(known)}")
     rows = []
     if not options.json:
-        print(f"{'group':10}" + "".join(f"{column:>12}" for column in Row.__annotations__), flush=True)
+        print(
+            f"{'group':10}" + "".join(f"{column:>12}" for column in Row.__annotations__), flush=True
+        )
     with tempfile.TemporaryDirectory() as scratch:
         for name in options.groups or known:
             out = (options.out or Path(scratch)) / name
@@ -92,7 +96,14 @@ def main() -> int:
             for failure in failures:
                 print(f"  not made: {failure}", file=sys.stderr, flush=True)
     if options.json:
-        print(json.dumps({name: row._asdict() for name, row in zip(options.groups or known, rows, strict=True)}))
+        print(
+            json.dumps(
+                {
+                    name: row._asdict()
+                    for name, row in zip(options.groups or known, rows, strict=True)
+                }
+            )
+        )
     return 0 if all(row.made == row.tries for row in rows) else 1
 
 
@@ -131,7 +142,9 @@ def run(group: Group, data: Path | None, out: Path, workers: int) -> tuple[Row, 
         unexecuted=sum(summary.not_executed.values()),
         dead_ends=len(summary.roll_backs),
         pool_again=summary.pool_restarts,
-        cpu_ms_step=round(1000 * (processor_seconds() - before) / summary.steps, 1) if is_new else None,
+        cpu_ms_step=round(1000 * (processor_seconds() - before) / summary.steps, 1)
+        if is_new
+        else None,
     )
     return row, [str(failure) for failure in made.failures]
 

@@ -41,7 +41,10 @@ def main() -> None:
         out.mkdir(parents=True, exist_ok=True)
         data = out / "trajectories.jsonl"
         if not data.exists():
-            lines = (source.raw.replace(b"\n", b" ").strip() + b"\n" for source in choose_trajectories(options))
+            lines = (
+                source.raw.replace(b"\n", b" ").strip() + b"\n"
+                for source in choose_trajectories(options)
+            )
             data.write_bytes(b"".join(lines))
         for radius, protocol in product(options.radii.split(","), options.protocols.split(",")):
             # Baselines but random-arm close their hand themselves, so that --closing would change nothing.
@@ -51,11 +54,19 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--trajectories", type=Path, required=True, help="folder of generated trajectories")
+    parser.add_argument(
+        "--trajectories", type=Path, required=True, help="folder of generated trajectories"
+    )
     parser.add_argument("--data", type=Path, help="folder of recorded floor plans")
-    parser.add_argument("--episodes", type=int, default=300, help="minimum number of episodes of each kind")
-    parser.add_argument("--radii", default="0.5", help="radii of the hand's sphere in metres, separated by commas")
-    parser.add_argument("--protocols", default="default", help="such as default,stand=before,stand=before+hand=low")
+    parser.add_argument(
+        "--episodes", type=int, default=300, help="minimum number of episodes of each kind"
+    )
+    parser.add_argument(
+        "--radii", default="0.5", help="radii of the hand's sphere in metres, separated by commas"
+    )
+    parser.add_argument(
+        "--protocols", default="default", help="such as default,stand=before,stand=before+hand=low"
+    )
     parser.add_argument("--out", type=Path, help="folder of the results; default: temporary")
     return parser.parse_args()
 
@@ -75,17 +86,32 @@ def choose_trajectories(options: argparse.Namespace) -> Iterator[TrajectorySourc
             return
 
 
-def run(name: str, radius: str, protocol: str, data: Path, out: Path, options: argparse.Namespace) -> Path:
+def run(
+    name: str, radius: str, protocol: str, data: Path, out: Path, options: argparse.Namespace
+) -> Path:
     """Run a baseline and return the folder of its run."""
     results = out / f"radius-{radius}" / protocol
     settings = [] if protocol == "default" else [f"--{setting}" for setting in protocol.split("+")]
     scenes = ["--scenes", str(options.data)] if options.data else []
-    arguments = ["--tasks", "manipulathor", "--data", data, "--radius", radius, *settings, "--output", results, *scenes]
+    arguments = [
+        "--tasks",
+        "manipulathor",
+        "--data",
+        data,
+        "--radius",
+        radius,
+        *settings,
+        "--output",
+        results,
+        *scenes,
+    ]
     command = [Path(sys.executable).with_name("infthor-eval"), "run", "--model", name, *arguments]
     result = subprocess.run(list(map(str, command)), check=False, stdout=subprocess.DEVNULL)
     folders = list((results / name).glob("manipulathor-*"))
     if len(folders) != 1:
-        raise SystemExit(f"{name} ended with {result.returncode}, and {results / name} has {len(folders)} runs")
+        raise SystemExit(
+            f"{name} ended with {result.returncode}, and {results / name} has {len(folders)} runs"
+        )
     return folders[0]
 
 
@@ -117,7 +143,9 @@ def count_obstacles(records: Sequence[UnitRecord[ArmRecord]]) -> list[tuple[str,
         payload = record.payload
         if payload.done:
             continue
-        blocking = Counter(name for step in payload.steps for text in step.refusals for name in _NAME.findall(text))
+        blocking = Counter(
+            name for step in payload.steps for text in step.refusals for name in _NAME.findall(text)
+        )
         most = ", ".join(name for name, _ in blocking.most_common(2)) or "nothing"
         target = (payload.receptacle_id or payload.object_id).split("|")[0]
         counts[f"{payload.kind} {target}: {payload.ended}; blocked by {most}"] += 1

@@ -35,8 +35,14 @@ _MODULES = {
     "rewards": ("infthor_eval/plans/rewards.py", "tests/plans/test_rewards.py"),
     "statistics": ("infthor_eval/statistics.py", "tests/test_statistics.py"),
     "haystack": ("infthor_eval/nieh/contexts/haystack.py", "tests/nieh/contexts/test_haystack.py"),
-    "journal": ("infthor_eval/runs/journal.py", "tests/runs/test_journal.py tests/runs/test_driver.py"),
-    "driver": ("infthor_eval/runs/driver.py", "tests/runs/test_driver.py tests/runs/test_results.py"),
+    "journal": (
+        "infthor_eval/runs/journals/journal.py",
+        "tests/runs/journals/test_journal.py tests/runs/work/test_driver.py",
+    ),
+    "driver": (
+        "infthor_eval/runs/work/driver.py",
+        "tests/runs/work/test_driver.py tests/runs/test_results.py",
+    ),
 }
 # Hypothesis' profile "ci" draws the same examples each time, remembers none and sets no deadlines.
 _PYTEST = ("-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", "--hypothesis-profile=ci")
@@ -53,7 +59,12 @@ _OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
     ast.Mod: ast.Mult, ast.Pow: ast.Mult, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd,
 }  # fmt: skip
 _FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
-_NOT_RUN = ("annotation", "returns", "decorator_list", "type_params")  # parts of statements that stay as they are
+_NOT_RUN = (
+    "annotation",
+    "returns",
+    "decorator_list",
+    "type_params",
+)  # parts of statements that stay as they are
 
 
 class Mutant(NamedTuple):
@@ -74,22 +85,33 @@ def main() -> None:
             copies.put(_copied(chosen.tree, chosen.shared, Path(scratch) / str(number)))
         for name in chosen.only.split(","):
             module, tests = (path.replace(*chosen.moved) for path in _MODULES[name])
-            mutants = sample((chosen.tree / module).read_text(encoding="utf-8"), chosen.per_module, chosen.seed)
+            mutants = sample(
+                (chosen.tree / module).read_text(encoding="utf-8"), chosen.per_module, chosen.seed
+            )
             killed = _try_all(copies, module, tests.split(), mutants, chosen.processes)
-            alive = [mutant for mutant, is_killed in zip(mutants, killed, strict=True) if not is_killed]
+            alive = [
+                mutant for mutant, is_killed in zip(mutants, killed, strict=True) if not is_killed
+            ]
             lines = (f"\n    {module}:{mutant.line}: {mutant.change}" for mutant in alive)
-            print(f"{name:12} {len(mutants):7} {sum(killed):7} {len(alive):10}{''.join(lines)}", flush=True)
+            print(
+                f"{name:12} {len(mutants):7} {sum(killed):7} {len(alive):10}{''.join(lines)}",
+                flush=True,
+            )
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("tree", type=Path, nargs="?", default=Path(__file__).parents[1], help="a checkout")
+    parser.add_argument(
+        "tree", type=Path, nargs="?", default=Path(__file__).parents[1], help="a checkout"
+    )
     parser.add_argument("--per-module", type=int, default=21, help="mutants of each module")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--only", default=",".join(_MODULES), help="names of modules, with commas")
     parser.add_argument("--processes", type=int, choices=(1, 2), default=2)
     parser.add_argument("--moved", default="=", metavar="NEW=OLD", help="part of a path in TREE")
-    parser.add_argument("--shared", type=Path, help="folder with recorded data; else `shared` beside TREE")
+    parser.add_argument(
+        "--shared", type=Path, help="folder with recorded data; else `shared` beside TREE"
+    )
     chosen = parser.parse_args()
     chosen.tree, chosen.moved = chosen.tree.resolve(), chosen.moved.split("=")
     chosen.shared = (chosen.shared or chosen.tree.parent / "shared").resolve()
@@ -108,9 +130,14 @@ def sample(source: str, count: int, seed: int) -> list[Mutant]:
         for new in (*_changed_expressions(node), *_changed_flow(node)):
             looks = f"{seed} {_nameless(statement)} {_nameless(node)} {_nameless(new)}"
             seen[looks] = seen.get(looks, 0) + 1
-            ranked.append((hashlib.sha256(f"{looks} {seen[looks]}".encode()).hexdigest(), node, new))
+            ranked.append(
+                (hashlib.sha256(f"{looks} {seen[looks]}".encode()).hexdigest(), node, new)
+            )
     drawn = sorted(ranked, key=lambda item: item[0])[:count]
-    return sorted((_mutant(tree, node, new) for _, node, new in drawn), key=lambda found: (found.line, found.change))
+    return sorted(
+        (_mutant(tree, node, new) for _, node, new in drawn),
+        key=lambda found: (found.line, found.change),
+    )
 
 
 def _mutant(tree: ast.AST, old: Any, new: Any) -> Mutant:
@@ -134,7 +161,9 @@ def _sites(tree: ast.AST) -> Iterator[tuple[ast.stmt, ast.AST]]:
     """What can be changed, each with its innermost statement."""
     for parent in ast.walk(tree):
         for statement in ast.iter_child_nodes(parent):
-            if isinstance(statement, ast.stmt) and not isinstance(statement, ast.Import | ast.ImportFrom):
+            if isinstance(statement, ast.stmt) and not isinstance(
+                statement, ast.Import | ast.ImportFrom
+            ):
                 yield statement, statement
                 yield from ((statement, node) for node in _expressions(statement))
 
@@ -142,7 +171,11 @@ def _sites(tree: ast.AST) -> Iterator[tuple[ast.stmt, ast.AST]]:
 def _expressions(node: ast.AST) -> Iterator[ast.AST]:
     for name, value in ast.iter_fields(node):
         for child in value if isinstance(value, list) else [value]:
-            if isinstance(child, ast.AST) and not isinstance(child, ast.stmt | ast.JoinedStr) and name not in _NOT_RUN:
+            if (
+                isinstance(child, ast.AST)
+                and not isinstance(child, ast.stmt | ast.JoinedStr)
+                and name not in _NOT_RUN
+            ):
                 yield child
                 yield from _expressions(child)
 
@@ -153,7 +186,13 @@ def _nameless(value: Any) -> str:
         fields = ", ".join(_nameless(item) for _, item in ast.iter_fields(value))
         return f"{type(value).__name__}({fields})"
     if isinstance(value, list):
-        return str([_nameless(item) for item in value if not isinstance(item, ast.stmt | ast.excepthandler)])
+        return str(
+            [
+                _nameless(item)
+                for item in value
+                if not isinstance(item, ast.stmt | ast.excepthandler)
+            ]
+        )
     return "" if isinstance(value, str) else repr(value)
 
 
@@ -161,7 +200,10 @@ def _changed_expressions(node: ast.AST) -> Iterator[ast.AST]:
     """What an expression is replaced with, one at a time."""
     match node:
         case ast.Compare(left, [operator, *rest], comparators):
-            yield from (ast.Compare(left, [other(), *rest], comparators) for other in _COMPARISONS[type(operator)])
+            yield from (
+                ast.Compare(left, [other(), *rest], comparators)
+                for other in _COMPARISONS[type(operator)]
+            )
         case ast.BoolOp(operator, operands):
             yield ast.BoolOp(ast.And() if isinstance(operator, ast.Or) else ast.Or(), operands)
         case ast.BinOp(left, operator, right) if type(operator) in _OPERATORS:
@@ -195,13 +237,19 @@ def _changed_flow(node: ast.AST) -> Iterator[ast.AST]:
 
 def _copied(tree: Path, shared: Path, scratch: Path) -> Path:
     """Copy a checkout, with what numba has compiled; the recorded data are linked beside the copy."""
-    shutil.copytree(tree, scratch / "tree", ignore=shutil.ignore_patterns(".git", ".venv", "build", ".*_cache"))
+    shutil.copytree(
+        tree, scratch / "tree", ignore=shutil.ignore_patterns(".git", ".venv", "build", ".*_cache")
+    )
     (scratch / "shared").symlink_to(shared)
     return scratch / "tree"
 
 
 def _try_all(
-    copies: "SimpleQueue[Path]", module: str, tests: Sequence[str], mutants: Sequence[Mutant], processes: int
+    copies: "SimpleQueue[Path]",
+    module: str,
+    tests: Sequence[str],
+    mutants: Sequence[Mutant],
+    processes: int,
 ) -> list[bool]:
     """Whether the tests kill each mutant."""
 
@@ -219,16 +267,28 @@ def _try_all(
         raise SystemExit(f"{' '.join(tests)} fail without a mutant; fix that first")
     timeout_s = max(_MIN_TIMEOUT_S, 5 * (time.monotonic() - began))
     with ThreadPoolExecutor(processes) as pool:
-        return [not survived for survived in pool.map(lambda mutant: passes(mutant.source, timeout_s), mutants)]
+        return [
+            not survived
+            for survived in pool.map(lambda mutant: passes(mutant.source, timeout_s), mutants)
+        ]
 
 
 def _passes(tree: Path, module: str, source: str, tests: Sequence[str], timeout_s: float) -> bool:
     """Whether the tests pass with this source as the module; if they take too long they do not."""
     (tree / module).write_text(source, encoding="utf-8")
     command = ["nice", "-n", "10", sys.executable, "-m", "pytest", *_PYTEST, *tests]
-    quiet: Any = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+    quiet: Any = {
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.DEVNULL,
+        "start_new_session": True,
+    }
     # No bytecode is written, as Python would take that of the mutant before: it tells sources apart by second and size.
-    environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(tree),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "OMP_NUM_THREADS": "1",
+    }
     process = subprocess.Popen(command, cwd=tree, env=environment, **quiet)
     try:
         code = process.wait(timeout_s)

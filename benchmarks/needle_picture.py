@@ -15,7 +15,11 @@ FRAMES = Path(__file__).parents[1] / "infthor_eval/sets/nieh_mini/metadata/kitch
 SHOWN = (2, 30, 58, 90, 100, 133)
 CLUES = (133,)
 QUESTION = "How many objects were on the dining table?"
-LINES = (("gold answer", "2", "#222222"), ("qwen2.5-vl-nano", "2", "#2a7f3f"), ("blind", "1", "#b03030"))
+LINES = (
+    ("gold answer", "2", "#222222"),
+    ("qwen2.5-vl-nano", "2", "#2a7f3f"),
+    ("blind", "1", "#b03030"),
+)
 
 
 def main() -> None:
@@ -34,7 +38,14 @@ def main() -> None:
     figure.text(0.012, 0.2, QUESTION, fontsize=12, weight="bold")
     for place, (name, reply, colour) in zip((0.012, 0.16, 0.345), LINES, strict=True):
         figure.text(place, 0.06, f"{name}:", fontsize=10.5, color="#555555")
-        figure.text(place + 0.0087 * len(name) + 0.012, 0.06, reply, fontsize=10.5, color=colour, weight="bold")
+        figure.text(
+            place + 0.0087 * len(name) + 0.012,
+            0.06,
+            reply,
+            fontsize=10.5,
+            color=colour,
+            weight="bold",
+        )
     figure.savefig(Path(__file__).parents[1] / "docs" / "needle.png", metadata={"Software": None})
 
 

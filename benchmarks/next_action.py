@@ -4,7 +4,7 @@
 
 SET is a replayed set (`infthor-eval replay`). At every action the model gets the true history up to it (teacher
 forcing) and replies greedily. `history` predicts what experts did next in other scenes after the same action in a plan
-of the same words (infthor_eval/plans/habits.py). `most frequent` always predicts the most frequent action.
+of the same words (infthor_eval/plans/actors/habits.py). `most frequent` always predicts the most frequent action.
 """
 
 import argparse
@@ -20,8 +20,8 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.plans.habits import Habits
-from infthor_eval.plans.segments import PlanSegment
+from infthor_eval.plans.actors.habits import Habits
+from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.statistics import MeanEstimate, clustered_mean, paired_difference
 from infthor_eval.training.data import read_history, trajectory_names
 from model_adapters import Decoding, load
@@ -35,7 +35,12 @@ def main() -> None:
     options = _arguments()
     data = NiehSet(options.data)
     histories = [read_history(data, name, Words.PUBLISHED) for name in trajectory_names(data)]
-    clusters = [trajectory.traj_id for trajectory, segments in histories for segment in segments for _ in segment.steps]
+    clusters = [
+        trajectory.traj_id
+        for trajectory, segments in histories
+        for segment in segments
+        for _ in segment.steps
+    ]
     rows = {
         "most frequent": [float(hit) for hit in most_frequent_hits(histories)],
         "history": [float(hit) for hit in habit_hits(histories)],
@@ -43,14 +48,18 @@ def main() -> None:
     model: Any = load(options.model, parse_model_args(options.model_args), seed=0)
     for way in options.frames.split(","):
         rows[f"{options.model}, frames {way}"] = [
-            float(hit) for _, segments in histories for hit in model_hits(model, segments, _SHOWN[way])
+            float(hit)
+            for _, segments in histories
+            for hit in model_hits(model, segments, _SHOWN[way])
         ]
     print(
         f"{len(clusters)} actions of {len(histories)} trajectories; accuracy of the next action, %, with 95 % interval"
     )
     for name, hits in rows.items():
         print(f"{name:40} {_interval(clustered_mean(hits, clusters))}", end="")
-        print(f"   over history {_interval(paired_difference(rows['history'], hits, clusters).estimate)}")
+        print(
+            f"   over history {_interval(paired_difference(rows['history'], hits, clusters).estimate)}"
+        )
 
 
 def _arguments() -> argparse.Namespace:
@@ -64,7 +73,9 @@ def _arguments() -> argparse.Namespace:
 
 def most_frequent_hits(histories: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) -> list[bool]:
     """Return True for each action that is the most frequent one."""
-    actions = [action for _, segments in histories for segment in segments for action, _ in segment.steps]
+    actions = [
+        action for _, segments in histories for segment in segments for action, _ in segment.steps
+    ]
     ((first, _),) = Counter(actions).most_common(1)
     return [action == first for action in actions]
 
@@ -73,7 +84,9 @@ def habit_hits(histories: Sequence[tuple[Trajectory, Sequence[PlanSegment]]]) ->
     """Yield True for each action that the habits of the other scenes predict."""
     for trajectory, segments in histories:
         scene = trajectory.scene.floor_plan
-        habits = Habits((other for other, _ in histories if other.scene.floor_plan != scene), Words.PUBLISHED)
+        habits = Habits(
+            (other for other, _ in histories if other.scene.floor_plan != scene), Words.PUBLISHED
+        )
         for segment in segments:
             done: list[str] = []
             for action, _ in segment.steps:
@@ -93,7 +106,9 @@ def model_hits(model: Any, segments: Sequence[PlanSegment], show: Show) -> Itera
 
 
 def _interval(estimate: MeanEstimate) -> str:
-    low, high = (value if value is None else round(100 * value, 1) for value in (estimate.low, estimate.high))
+    low, high = (
+        value if value is None else round(100 * value, 1) for value in (estimate.low, estimate.high)
+    )
     return f"{100 * estimate.mean:5.1f} [{low}, {high}]"
 
 

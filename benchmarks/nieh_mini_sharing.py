@@ -35,11 +35,15 @@ def main() -> None:
             records = answer(options.model, options.tasks, shared, Path(folder))
             replies[shared] = {record.key: record.payload.reply for record in records}
             for record in records:
-                seconds[record.task][shared] = seconds[record.task].get(shared, 0.0) + record.seconds
+                seconds[record.task][shared] = (
+                    seconds[record.task].get(shared, 0.0) + record.seconds
+                )
     print(f"{'task':18} {'questions':>9} {'shared s':>9} {'plain s':>9} {'factor':>7}")
     for task, times in sorted(seconds.items()):
         n = sum(key.task == task for key in replies[True])
-        print(f"{task:18} {n:9} {times[True]:9.2f} {times[False]:9.2f} {times[False] / times[True]:7.2f}")
+        print(
+            f"{task:18} {n:9} {times[True]:9.2f} {times[False]:9.2f} {times[False] / times[True]:7.2f}"
+        )
     print("replies equal:", "yes" if replies[True] == replies[False] else "NO")
 
 

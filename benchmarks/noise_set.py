@@ -35,7 +35,10 @@ def write_set(root: Path, n_frames: int, n_questions: int) -> None:
     trajectory = root / "metadata" / "t"
     (trajectory / "img").mkdir(parents=True)
     names = [path.name for path in write_frames(trajectory / "img", n_frames)]
-    entries = [{"img_idx": i, "img_filename": name, "step": i, "object_log": {}} for i, name in enumerate(names)]
+    entries = [
+        {"img_idx": i, "img_filename": name, "step": i, "object_log": {}}
+        for i, name in enumerate(names)
+    ]
     (trajectory / "metadata.json").write_text(json.dumps(entries))
     questions = [
         Question("t", text, (number % n_frames,), ("yes",), "object_presence")

@@ -28,9 +28,9 @@ import msgspec
 from playwright.sync_api import sync_playwright
 
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs.shards import FOLDER, read_run
+from infthor_eval.runs.journals.shards import FOLDER, read_run
+from infthor_eval.storage.packaged import packaged_folder
 
 _MODELS, _TASK = ("oracle", "blind"), "nieh_gt"
 _ROUNDS = 5
@@ -47,11 +47,19 @@ _SEARCHES = ("h", "ha", "have", "bowl (copy 7", "no such words", "")
 
 def main() -> None:
     """Make the runs, then the page by each checkout, and measure it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--records", type=int, default=20_000, help="records of each of the two runs")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--records", type=int, default=20_000, help="records of each of the two runs"
+    )
     parser.add_argument("--words", type=int, default=40, help="words that are added to each reply")
-    parser.add_argument("--against", type=Path, help="another checkout, whose page is measured, too")
-    parser.add_argument("--keep", type=Path, help="folder for the runs and the pages; else a temporary one")
+    parser.add_argument(
+        "--against", type=Path, help="another checkout, whose page is measured, too"
+    )
+    parser.add_argument(
+        "--keep", type=Path, help="folder for the runs and the pages; else a temporary one"
+    )
     options = parser.parse_args()
     here = Path(__file__).parents[1]
     with tempfile.TemporaryDirectory() as temporary:
@@ -63,14 +71,21 @@ def main() -> None:
             run_command(checkout, "report", *runs, "--data", folder / "set", "--out", page)
             made = round(time.perf_counter() - start, 1)
             size = round(page.stat().st_size / 1e6, 1)
-            print(json.dumps({"checkout": str(checkout), "made_s": made, "size_mb": size, **measure(page)}), flush=True)
+            print(
+                json.dumps(
+                    {"checkout": str(checkout), "made_s": made, "size_mb": size, **measure(page)}
+                ),
+                flush=True,
+            )
 
 
 def run_command(checkout: Path, *words: Any) -> None:
     """Run a command of a checkout."""
     environment = {**os.environ, "PYTHONPATH": str(checkout), "PYTHONSAFEPATH": "1"}
     command = (sys.executable, "-c", "from infthor_eval.cli import main; main()", *map(str, words))
-    subprocess.run(command, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    subprocess.run(
+        command, env=environment, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
 
 
 def make_runs(folder: Path, n_records: int, n_words: int) -> list[Path]:
@@ -78,10 +93,21 @@ def make_runs(folder: Path, n_records: int, n_words: int) -> list[Path]:
     small = packaged_folder("sets/nieh_mini")
     output = folder / "small"
     run_command(
-        Path(__file__).parents[1], "--model", ",".join(_MODELS), "--tasks", _TASK, "--data", small, "--output", output
+        Path(__file__).parents[1],
+        "--model",
+        ",".join(_MODELS),
+        "--tasks",
+        _TASK,
+        "--data",
+        small,
+        "--output",
+        output,
     )
     large = copy_set(small, folder / "set", n_records)
-    return [copy_run(next((output / model).iterdir()), folder / model, large, n_words) for model in _MODELS]
+    return [
+        copy_run(next((output / model).iterdir()), folder / model, large, n_words)
+        for model in _MODELS
+    ]
 
 
 def copy_set(small: Path, folder: Path, n_questions: int) -> NiehSet:
@@ -90,7 +116,10 @@ def copy_set(small: Path, folder: Path, n_questions: int) -> NiehSet:
     (folder / "metadata").symlink_to(small / "metadata")
     shutil.copy(small / "set.json", folder)
     (file,) = small.glob("qa_set*.csv")
-    with file.open(encoding="utf-8", newline="") as source, (folder / "qa_set.csv").open("w", newline="") as target:
+    with (
+        file.open(encoding="utf-8", newline="") as source,
+        (folder / "qa_set.csv").open("w", newline="") as target,
+    ):
         rows = list(csv.DictReader(source))
         writer = csv.DictWriter(target, list(rows[0]))
         writer.writeheader()
@@ -131,7 +160,10 @@ def measure(page: Path) -> dict[str, Any]:
             tab.goto(page.as_uri())
             tab.wait_for_selector(".item")
             opened.append(tab.evaluate(_DRAWN) / 1000)
-        times = {name: max(tab.evaluate(_UNTIL_PAINTED, change) for _ in range(_ROUNDS)) for name, change in changes()}
+        times = {
+            name: max(tab.evaluate(_UNTIL_PAINTED, change) for _ in range(_ROUNDS))
+            for name, change in changes()
+        }
         browser.close()
     return {
         "opened_s": round(statistics.median(opened), 2),
@@ -143,12 +175,28 @@ def changes() -> Iterator[tuple[str, str]]:
     """Yield what is changed on the page: a name, and the script that does it."""
     told = "it.dispatchEvent(new Event('input', {bubbles: true}))"
     for text in _SEARCHES:
-        yield f"search {text!r}", f"const it = document.getElementById('search'); it.value = {text!r}; {told}"
-    for name, place in (("outcome", 3), ("outcome", 0), ("kind", 1), ("kind", 0), ("run", 1), ("run", 0)):
-        yield f"{name} {place}", f"const it = document.getElementById('{name}'); it.selectedIndex = {place}; {told}"
+        yield (
+            f"search {text!r}",
+            f"const it = document.getElementById('search'); it.value = {text!r}; {told}",
+        )
+    for name, place in (
+        ("outcome", 3),
+        ("outcome", 0),
+        ("kind", 1),
+        ("kind", 0),
+        ("run", 1),
+        ("run", 0),
+    ):
+        yield (
+            f"{name} {place}",
+            f"const it = document.getElementById('{name}'); it.selectedIndex = {place}; {told}",
+        )
     for name in ("disagree", "differ"):
         yield name, f"document.getElementById('{name}').click()"
-    yield "next sample", "document.dispatchEvent(new KeyboardEvent('keydown', {key: 'j', bubbles: true}))"
+    yield (
+        "next sample",
+        "document.dispatchEvent(new KeyboardEvent('keydown', {key: 'j', bubbles: true}))",
+    )
 
 
 if __name__ == "__main__":

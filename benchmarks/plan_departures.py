@@ -26,10 +26,10 @@ from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans import task as plans_task
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.published_goals import Treated
-from infthor_eval.plans.published_paths import PublishedPaths
-from infthor_eval.plans.published_rewards import PublishedState, PublishedTask, Transition, pose_of
-from infthor_eval.plans.published_script import PublishedReward, PublishedScript
+from infthor_eval.plans.published.goals import Treated
+from infthor_eval.plans.published.paths import PublishedPaths
+from infthor_eval.plans.published.rewards import PublishedState, PublishedTask, Transition, pose_of
+from infthor_eval.plans.published.script import PublishedReward, PublishedScript
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.rewards import StepReward
 from infthor_eval.plans.suite import PlansSuite
@@ -62,7 +62,15 @@ def main() -> None:
 
 def _rewards(out: Path) -> Mapping[str, float]:
     """Run the baselines in this process, where they are patched, and return the sums of their rewards."""
-    words = ["run", "--model", ",".join(_BASELINES), "--tasks", "infthor_plans_mini", "--rewards", "published"]
+    words = [
+        "run",
+        "--model",
+        ",".join(_BASELINES),
+        "--tasks",
+        "infthor_plans_mini",
+        "--rewards",
+        "published",
+    ]
     with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
         command([*words, "--output", str(out)])
     suite, sums = PlansSuite(), {}
@@ -94,7 +102,7 @@ def _steps_pay_once() -> Patch:
 
 
 def _rule(kind: PlanKind, rule: Callable[[PublishedTask, Any], tuple[float, bool]]) -> Patch:
-    from infthor_eval.plans import published_rewards
+    from infthor_eval.plans.published import rewards as published_rewards
 
     return mock.patch.dict(published_rewards._RULES, {kind: rule})
 
@@ -107,10 +115,14 @@ def _goal(task: PublishedTask, index: int) -> Any:
 def _shortest_paths() -> Patch:
     def n_actions(paths: PublishedPaths, pose: Any, goal: Any) -> int:
         graph, start, end = paths._graph.graph, pose[:3], goal[:3]
-        free = nx.subgraph_view(graph, filter_edge=lambda one, other: graph[one][other]["weight"] < 10)
+        free = nx.subgraph_view(
+            graph, filter_edge=lambda one, other: graph[one][other]["weight"] < 10
+        )
         lengths = known.get((id(graph), end))
         if lengths is None:
-            lengths = known[id(graph), end] = nx.single_source_shortest_path_length(free.reverse(copy=False), end)
+            lengths = known[id(graph), end] = nx.single_source_shortest_path_length(
+                free.reverse(copy=False), end
+            )
         return int(lengths.get(start, 10**6)) + math.ceil(abs(pose[3] - goal[3]) / 30)
 
     known: dict[Any, Any] = {}
@@ -132,7 +144,10 @@ def _own_task_from_the_true_start() -> Patch:
 
 def _goal_pays_when_it_begins_to_hold() -> Patch:
     def transition(
-        task: PublishedTask, state: PublishedState, treated: Treated = _NONE, target: int | None = None
+        task: PublishedTask,
+        state: PublishedState,
+        treated: Treated = _NONE,
+        target: int | None = None,
     ) -> Transition:
         held = vars(task).get("held_before")
         if held is None:
@@ -140,7 +155,9 @@ def _goal_pays_when_it_begins_to_hold() -> Patch:
         task.goal_reached = False
         earned = original(task, state, treated, target)
         if held:
-            earned = earned._replace(reward=earned.reward - task.rules.task_done * task.goal_reached)
+            earned = earned._replace(
+                reward=earned.reward - task.rules.task_done * task.goal_reached
+            )
         task.__dict__["held_before"] = held or task.goal_reached
         return earned
 
@@ -161,7 +178,9 @@ def _switches_count() -> Patch:
     def after(plan: PublishedReward, call: Mapping[str, Any], before: Any, view: Any) -> StepReward:
         if not call["action"].startswith("ToggleObject") or not view.success:
             return original(plan, call, before, view)
-        earned = plan._task.transition(PublishedState.of(view, call["action"]), target=plan._sub_goal)
+        earned = plan._task.transition(
+            PublishedState.of(view, call["action"]), target=plan._sub_goal
+        )
         return StepReward(earned.reward, done=earned.plan_done)
 
     original = PublishedReward.after
@@ -170,7 +189,10 @@ def _switches_count() -> Patch:
 
 def _every_plan_by_its_own_rule() -> Patch:
     def transition(
-        task: PublishedTask, state: PublishedState, treated: Treated = _NONE, target: int | None = None
+        task: PublishedTask,
+        state: PublishedState,
+        treated: Treated = _NONE,
+        target: int | None = None,
     ) -> Transition:
         if target == 0:
             task.goal_index = 0
@@ -181,14 +203,20 @@ def _every_plan_by_its_own_rule() -> Patch:
 
 
 def _states_that_the_action_brought() -> Patch:
-    def state_reward(task: PublishedTask, step: Any, kind: PlanKind, is_done: Any) -> tuple[float, bool]:
+    def state_reward(
+        task: PublishedTask, step: Any, kind: PlanKind, is_done: Any
+    ) -> tuple[float, bool]:
         key = task.plan[step.index].planner_action.object_id
         now, was = step.state.objects.get(key), step.before.objects.get(key)
         if kind == PlanKind.TOGGLE:
-            return task._pay(kind, now is not None and was is not None and now.is_toggled != was.is_toggled)
+            return task._pay(
+                kind, now is not None and was is not None and now.is_toggled != was.is_toggled
+            )
         if kind == PlanKind.SLICE and now is None:  # AI2-THOR 5 drops what was cut
             return task._pay(kind, was is not None)
-        return task._pay(kind, now is not None and is_done(now) and not (was is not None and is_done(was)))
+        return task._pay(
+            kind, now is not None and is_done(now) and not (was is not None and is_done(was))
+        )
 
     return mock.patch.object(PublishedTask, "_state_reward", state_reward)
 
@@ -228,14 +256,18 @@ def _alfreds_treatments_and_goals() -> Patch:
     return patches
 
 
-def _treated_with(treatments: Treatments, before: PublishedState, now: PublishedState) -> Treatments:
+def _treated_with(
+    treatments: Treatments, before: PublishedState, now: PublishedState
+) -> Treatments:
     """Return the treatments after an action: whatever was switched on or closed by it acts on what is in it."""
     for key, item in now.objects.items():
         was = before.objects.get(key)
         switched = was is not None and item.is_toggled and not was.is_toggled
         closed = was is not None and was.is_open and not item.is_open
         if switched or closed:
-            treatments = treatments.after("ToggleObjectOn" if switched else "CloseObject", key, vars(now)["view"])
+            treatments = treatments.after(
+                "ToggleObjectOn" if switched else "CloseObject", key, vars(now)["view"]
+            )
     return treatments
 
 

@@ -56,7 +56,9 @@ def main() -> None:
     """Measure with frames and without, and print."""
     options = _arguments()
     with tempfile.TemporaryDirectory() as scratch:
-        trajectory = next(iter_trajectories(options.trajectory or generate_trajectory(Path(scratch))))
+        trajectory = next(
+            iter_trajectories(options.trajectory or generate_trajectory(Path(scratch)))
+        )
         print(f"{trajectory.traj_id}: {len(trajectory.plan.low_actions)} steps; milliseconds")
         for seen in (True, False):
             print(f"\n{'with frames' if seen else 'without rendering'}")
@@ -65,8 +67,12 @@ def main() -> None:
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--trajectory", type=Path, help="a trajectory of many plans, in a procedural scene")
-    parser.add_argument("--plans", type=int, nargs="+", default=[1, 25, 50, 100], help="numbers of plans, from 0")
+    parser.add_argument(
+        "--trajectory", type=Path, help="a trajectory of many plans, in a procedural scene"
+    )
+    parser.add_argument(
+        "--plans", type=int, nargs="+", default=[1, 25, 50, 100], help="numbers of plans, from 0"
+    )
     parser.add_argument("--repeats", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0, help="seed of the random order")
     return parser.parse_args()
@@ -75,7 +81,9 @@ def _arguments() -> argparse.Namespace:
 def generate_trajectory(out: Path) -> Path:
     """Generate a long trajectory and return its folder."""
     with Simulator(embedded_launch()) as simulator:
-        result = generate_set([TrajectorySettings("kitchen-1", 1, 700, 20, max_fail=700)], simulator, out)
+        result = generate_set(
+            [TrajectorySettings("kitchen-1", 1, 700, 20, max_fail=700)], simulator, out
+        )
     if result.failures:
         raise SystemExit(result.failures[0])
     return out
@@ -88,16 +96,30 @@ def prepare(trajectory: Trajectory, seen: bool, options: argparse.Namespace) -> 
         tempfile.TemporaryDirectory() as folder,
         measure_places() as own,
     ):
-        environment = PlanEnvironment(trajectory, simulator, frames=FrameFolder(Path(folder)) if seen else NoFrames())
+        environment = PlanEnvironment(
+            trajectory, simulator, frames=FrameFolder(Path(folder)) if seen else NoFrames()
+        )
         if max(options.plans) >= len(environment.plans):
-            raise SystemExit(f"there are {len(environment.plans)} plans; give a longer trajectory, or --plans")
+            raise SystemExit(
+                f"there are {len(environment.plans)} plans; give a longer trajectory, or --plans"
+            )
         clock = Clock(simulator, own)
         resets, actions = run_episode(environment, clock)
         counts = [plan.low[1] - plan.low[0] for plan in environment.plans]
-        by_action = [{name: ms / n for name, ms in spent.items()} for spent, n in zip(resets, counts, strict=True)]
-        places = {(kind, i): nearest(environment.plans, kind, i) for kind in _KINDS for i in options.plans}
-        in_order = {key: [by_action[at] for at in indices[: options.repeats]] for key, indices in places.items()}
-        again = reset_at_random(environment, clock, {key: indices[0] for key, indices in places.items()}, options)
+        by_action = [
+            {name: ms / n for name, ms in spent.items()}
+            for spent, n in zip(resets, counts, strict=True)
+        ]
+        places = {
+            (kind, i): nearest(environment.plans, kind, i) for kind in _KINDS for i in options.plans
+        }
+        in_order = {
+            key: [by_action[at] for at in indices[: options.repeats]]
+            for key, indices in places.items()
+        }
+        again = reset_at_random(
+            environment, clock, {key: indices[0] for key, indices in places.items()}, options
+        )
     show("in order, for each of the expert's actions", in_order, options.plans)
     show("at random", again, options.plans)
     show_places(again, actions)
@@ -149,7 +171,12 @@ class Clock:
 
     def _now(self) -> Spent:
         there = int(self._path.read_text().split()[0]) / 1e6
-        return {**self._own, "simulator": there, "here": 1e3 * time.process_time(), "clock": 1e3 * time.perf_counter()}
+        return {
+            **self._own,
+            "simulator": there,
+            "here": 1e3 * time.process_time(),
+            "clock": 1e3 * time.perf_counter(),
+        }
 
 
 @contextmanager
@@ -159,7 +186,11 @@ def measure_places() -> Iterator[Spent]:
     with ExitStack() as stack:
         for name, functions in _PLACES.items():
             for owner, function in functions:
-                stack.enter_context(mock.patch.object(owner, function, _timing(getattr(owner, function), spent, name)))
+                stack.enter_context(
+                    mock.patch.object(
+                        owner, function, _timing(getattr(owner, function), spent, name)
+                    )
+                )
         yield spent
 
 
@@ -176,7 +207,9 @@ def _timing(run: Callable[..., Any], spent: Spent, name: str) -> Callable[..., A
 
 def nearest(plans: Sequence[Plan], kind: PlanKind, number: int) -> list[int]:
     """Return the indices of the plans of a kind, those nearest to a number first."""
-    return sorted((plan.index for plan in plans if plan.kind == kind), key=lambda index: abs(index - number))
+    return sorted(
+        (plan.index for plan in plans if plan.kind == kind), key=lambda index: abs(index - number)
+    )
 
 
 def median(times: Sequence[Spent], name: str) -> float:
@@ -186,9 +219,13 @@ def median(times: Sequence[Spent], name: str) -> float:
 
 def show(title: str, times: dict[Any, list[Spent]], numbers: Sequence[int]) -> None:
     """Print a table of kinds by numbers of plans."""
-    print(f"{title:45}" + "".join(f"{f'i = {number}':>18}" for number in numbers) + "   last by first")
+    print(
+        f"{title:45}" + "".join(f"{f'i = {number}':>18}" for number in numbers) + "   last by first"
+    )
     for kind in _KINDS:
-        values = [(median(times[kind, i], "processor"), median(times[kind, i], "clock")) for i in numbers]
+        values = [
+            (median(times[kind, i], "processor"), median(times[kind, i], "clock")) for i in numbers
+        ]
         cells = "".join(f"{processor:9.1f} ({clock:6.1f})" for processor, clock in values)
         print(f"  {kind:43}{cells}   {values[-1][0] / values[0][0]:.2f}")
 

@@ -26,12 +26,16 @@ _BASELINES = ("planner", "random", "scripted", "history")
 def main() -> None:
     """Run the baselines and print the table, sums over trajectories."""
     options = _arguments()
-    print("| | rules | plans done | reward | planner's or most | logged total_reward | logged agent_reward |")
+    print(
+        "| | rules | plans done | reward | planner's or most | logged total_reward | logged agent_reward |"
+    )
     print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as scratch:
         out = options.out or Path(scratch)
         for rules in _RULES:
-            for name, task in run(_BASELINES, rules, out / rules, ["--tasks", "infthor_plans_mini"]):
+            for name, task in run(
+                _BASELINES, rules, out / rules, ["--tasks", "infthor_plans_mini"]
+            ):
                 print(_row(name, rules, task))
         for rules in _RULES if options.more is not None else ():
             scenes = [] if options.scenes is None else ["--scenes", str(options.scenes)]
@@ -46,7 +50,9 @@ def run(
     """Run baselines with the command line and yield the results of each."""
     program = str(Path(sys.executable).with_name("infthor-eval"))
     command = [program, "run", "--model", ",".join(baselines), "--rewards", rules]
-    subprocess.run([*command, *options, "--output", str(out)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [*command, *options, "--output", str(out)], check=True, stdout=subprocess.DEVNULL
+    )
     suite = PlansSuite()
     for name in baselines:
         (folder,) = (out / name).iterdir()
@@ -60,7 +66,14 @@ def _row(name: str, rules: str, task: PlanTaskSummary) -> str:
 
     done = task.endings.get("done", 0)
     logged = (total(task.logged.get(key)) for key in ("total_reward", "agent_reward"))
-    cells = (name, rules, f"{done} of {task.n_plans}", total(task.reward), total(task.max_reward), *logged)
+    cells = (
+        name,
+        rules,
+        f"{done} of {task.n_plans}",
+        total(task.reward),
+        total(task.max_reward),
+        *logged,
+    )
     return f"| {' | '.join(cells)} |"
 
 

@@ -31,7 +31,7 @@ from transformers import DynamicCache, Qwen2_5_VLConfig
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Decoding
-from model_adapters.hf.model import TransformersModel
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 from model_adapters.tiny.twin import TinyAdapter
@@ -50,10 +50,16 @@ def main() -> None:
     torch.set_num_threads(options.threads)
     questions = question_texts(options.questions)
     with tempfile.TemporaryDirectory() as folder:
-        frames = [FrameRef(path) for path in write_frames(Path(folder), options.frames, options.seed)]
+        frames = [
+            FrameRef(path) for path in write_frames(Path(folder), options.frames, options.seed)
+        ]
         sharing = build(options)
-        not_sharing = TransformersModel("plain", sharing._loaded, replace(sharing._options, share_prefix=False))
-        answer_one_by_one(sharing, frames[:1], questions[:1], 2)  # warms up imports, threads and kernels
+        not_sharing = TransformersModel(
+            "plain", sharing._loaded, replace(sharing._options, share_prefix=False)
+        )
+        answer_one_by_one(
+            sharing, frames[:1], questions[:1], 2
+        )  # warms up imports, threads and kernels
         ways = {
             "shared": lambda: answer_one_by_one(sharing, *work),
             "batched": lambda: answer_in_batches(sharing, *work),
@@ -62,7 +68,10 @@ def main() -> None:
         work = frames, questions, options.new_tokens
         measured: dict[str, list[Timed]] = {name: [] for name in ways}
         for _ in range(options.repeats):
-            for name, way in ways.items():  # alternating, so that other work on the machine affects all alike
+            for (
+                name,
+                way,
+            ) in ways.items():  # alternating, so that other work on the machine affects all alike
                 clear_cache(sharing)
                 measured[name].append(_time(way))
         measured["plain"] = [_time(lambda: answer_one_by_one(not_sharing, *work))]
@@ -78,7 +87,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--frames", type=int, default=120)
     parser.add_argument("--questions", type=int, default=24)
     parser.add_argument("--new-tokens", type=int, default=16)
-    parser.add_argument("--repeats", type=int, default=3, help="runs of all ways but plain; the fastest is printed")
+    parser.add_argument(
+        "--repeats", type=int, default=3, help="runs of all ways but plain; the fastest is printed"
+    )
     parser.add_argument("--batch-size", type=int, default=8)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
@@ -87,7 +98,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--attention", default="sdpa", help="attn_implementation")
     parser.add_argument("--chunk-tokens", type=int, default=1024)
     parser.add_argument("--largest", action="store_true", help="find the largest context that fits")
-    parser.add_argument("--json", action="store_true", help="print seconds and factors as one JSON object")
+    parser.add_argument(
+        "--json", action="store_true", help="print seconds and factors as one JSON object"
+    )
     options = parser.parse_args()
     if options.largest and not options.device.startswith("cuda"):
         parser.error("--largest needs --device cuda, as a CPU swaps memory and has no clear limit")
@@ -115,9 +128,18 @@ def _real_shape(ids: Mapping[str, int], vocab_size: int) -> Qwen2_5_VLConfig:  #
     config: Qwen2_5_VLConfig = Qwen25VLTiny.twin.config(ids, 152_064)
     text, vision = config.text_config, config.vision_config
     text.hidden_size, text.intermediate_size, text.num_hidden_layers = 3584, 18_944, 28
-    text.num_attention_heads, text.num_key_value_heads, text.layer_types = 28, 4, ["full_attention"] * 28
+    text.num_attention_heads, text.num_key_value_heads, text.layer_types = (
+        28,
+        4,
+        ["full_attention"] * 28,
+    )
     text.rope_parameters["mrope_section"] = [16, 24, 24]
-    vision.depth, vision.hidden_size, vision.intermediate_size, vision.num_heads = 32, 1280, 3420, 16
+    vision.depth, vision.hidden_size, vision.intermediate_size, vision.num_heads = (
+        32,
+        1280,
+        3420,
+        16,
+    )
     vision.out_hidden_size, vision.fullatt_block_indexes = 3584, [7, 15, 23, 31]
     text.initializer_range = vision.initializer_range = 0.02
     return config
@@ -129,7 +151,9 @@ def clear_cache(model: TransformersModel) -> None:
     model._features.clear()
 
 
-def machine_report(model: TransformersModel, frames: Sequence[FrameRef], options: argparse.Namespace) -> None:
+def machine_report(
+    model: TransformersModel, frames: Sequence[FrameRef], options: argparse.Namespace
+) -> None:
     """Print the speed of encoding and decoding, the peak memory of a GPU, and the largest context that fits."""
     on_gpu = options.device.startswith("cuda")
     if on_gpu:
@@ -147,7 +171,9 @@ def machine_report(model: TransformersModel, frames: Sequence[FrameRef], options
         print(f"largest context  {_largest(model, frames)} tokens (found by doubling)")
 
 
-def _decoding_speed(model: TransformersModel, frames: Sequence[FrameRef], few: int = 2, more: int = 34) -> float:
+def _decoding_speed(
+    model: TransformersModel, frames: Sequence[FrameRef], few: int = 2, more: int = 34
+) -> float:
     """Return the tokens per second of a reply on a short context, from the difference of two replies."""
     times, lengths = [], []
     for new in (few, more):
@@ -179,7 +205,9 @@ def _largest(model: TransformersModel, frames: Sequence[FrameRef]) -> int:
 def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> None:
     """Print the fastest time of each way, the factors, and whether all replies are equal."""
     found = figures(measured)
-    print(f"{options.frames} frames, {options.questions} questions, {options.new_tokens} new tokens each")
+    print(
+        f"{options.frames} frames, {options.questions} questions, {options.new_tokens} new tokens each"
+    )
     for name in measured:
         print(f"{name:8s}{found[name]:9.2f} s")
     for name in ("plain / batched", "plain / shared", "shared / floor"):
@@ -200,7 +228,9 @@ def figures(measured: dict[str, list[Timed]]) -> dict[str, float | bool]:
     }
 
 
-def answer_one_by_one(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:
+def answer_one_by_one(
+    model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int
+) -> Replies:
     """Answer all questions on one prefix, as the NIEH runner does."""
     talk = model.conversation()
     talk.append(*frames)
@@ -213,21 +243,31 @@ def answer_one_by_one(model: Any, frames: Sequence[FrameRef], questions: Sequenc
     return replies
 
 
-def answer_in_batches(model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int) -> Replies:
+def answer_in_batches(
+    model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int
+) -> Replies:
     """Answer all questions on one prefix, several at a time."""
     talk, decoding = model.conversation(), Decoding(max_new_tokens=new_tokens)
     talk.append(*frames)
-    return [reply.token_ids for reply in talk.replies([[PROMPT + text] for text in questions], decoding)]
+    return [
+        reply.token_ids for reply in talk.replies([[PROMPT + text] for text in questions], decoding)
+    ]
 
 
 @torch.inference_mode()
 def answer_with_transformers(
-    model: Any, frames: Sequence[FrameRef], questions: Sequence[str], new_tokens: int, chunk_frames: int = 8
+    model: Any,
+    frames: Sequence[FrameRef],
+    questions: Sequence[str],
+    new_tokens: int,
+    chunk_frames: int = 8,
 ) -> Replies:
     """Answer all questions with the bare model, computing only what is necessary."""
     bare, tokenizer = model._loaded.model, model._loaded.tokenizer
     processor, pad = model._loaded.family._image_processor, bare.config.image_token_id
-    content: list[dict[str, str]] = [{"type": "image"}] * len(frames) + [{"type": "text", "text": "@"}]
+    content: list[dict[str, str]] = [{"type": "image"}] * len(frames) + [
+        {"type": "text", "text": "@"}
+    ]
     text = tokenizer.apply_chat_template(
         [{"role": "user", "content": content}],
         chat_template=model._loaded.template,
@@ -261,7 +301,9 @@ def answer_with_transformers(
     ]
 
 
-def _decode(model: Any, cache: DynamicCache, ids: list[int], position: int, new_tokens: int) -> tuple[int, ...]:
+def _decode(
+    model: Any, cache: DynamicCache, ids: list[int], position: int, new_tokens: int
+) -> tuple[int, ...]:
     bare, ends = model._loaded.model, model._loaded.generation.end_ids
     device = bare.device
     n_prefix = cache.get_seq_length()
@@ -270,7 +312,9 @@ def _decode(model: Any, cache: DynamicCache, ids: list[int], position: int, new_
     while True:
         positions = torch.arange(position, position + len(feed), device=device).expand(3, 1, -1)
         ids_fed = torch.tensor([feed], device=device)
-        output = bare(input_ids=ids_fed, position_ids=positions, past_key_values=cache, logits_to_keep=1)
+        output = bare(
+            input_ids=ids_fed, position_ids=positions, past_key_values=cache, logits_to_keep=1
+        )
         position += len(feed)
         token = int(output.logits[0, -1].argmax())
         if token in ends:

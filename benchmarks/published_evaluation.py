@@ -109,8 +109,12 @@ def main() -> None:
     trajectories = draw(options)
     n_frames = sum(trajectory.n_frames for trajectory in trajectories)
     n_questions = sum(len(trajectory.questions) for trajectory in trajectories)
-    print(f"{len(trajectories)} trajectories, {n_frames} frames, {n_questions} questions, seed {options.seed}")
-    print(f"attention {machine.attention}, {machine.parallel} over a worker's GPUs, {options.price:.2f} USD a GPU-hour")
+    print(
+        f"{len(trajectories)} trajectories, {n_frames} frames, {n_questions} questions, seed {options.seed}"
+    )
+    print(
+        f"attention {machine.attention}, {machine.parallel} over a worker's GPUs, {options.price:.2f} USD a GPU-hour"
+    )
     runs = [
         run(mode, shape, trajectories, rates_of(shape, machine, options), machine, options)
         for mode in modes(options)
@@ -120,7 +124,9 @@ def main() -> None:
     print("\nlargest context by memory, in 1,000 tokens, on 1, 2, 4, 8 GPUs")
     for shape in MODELS:
         fitting = [f"{largest_context(shape, machine, n) / 1000:8,.0f}" for n in (1, 2, 4, 8)]
-        print(f"{shape.name:17s}{''.join(fitting)}{shape.kv_bytes / 1e9 * 1e6:10.0f} GB of keys and values a million")
+        print(
+            f"{shape.name:17s}{''.join(fitting)}{shape.kv_bytes / 1e9 * 1e6:10.0f} GB of keys and values a million"
+        )
 
 
 def _arguments(given: Sequence[str] | None = None) -> argparse.Namespace:
@@ -129,33 +135,82 @@ def _arguments(given: Sequence[str] | None = None) -> argparse.Namespace:
     )
     work = parser.add_argument_group("the work")
     work.add_argument("--trajectories", type=int, default=225, help="published")
-    work.add_argument("--frames", type=float, default=600, help="mean frames of a trajectory; assumed")
-    work.add_argument("--frames-spread", type=float, default=350, help="standard deviation of the frames; assumed")
     work.add_argument(
-        "--frames-least", type=int, default=300, help="minimum frames; published: steps of a generated trajectory"
+        "--frames", type=float, default=600, help="mean frames of a trajectory; assumed"
     )
-    work.add_argument("--frames-most", type=int, default=2287, help="maximum frames; published: the longest trajectory")
     work.add_argument(
-        "--questions", type=float, default=24, help="mean questions of a trajectory; as in our sets, 475/20"
+        "--frames-spread", type=float, default=350, help="standard deviation of the frames; assumed"
     )
-    work.add_argument("--one-clue", type=float, default=0.635, help="share of questions; from the published totals")
-    work.add_argument("--two-clues", type=float, default=0.165, help="share of questions; from the published totals")
     work.add_argument(
-        "--puts", type=float, default=0.5, help="share of two-clue questions with successive clues; assumed"
+        "--frames-least",
+        type=int,
+        default=300,
+        help="minimum frames; published: steps of a generated trajectory",
     )
-    work.add_argument("--most-clues", type=int, default=6, help="maximum clues of a question; assumed")
-    work.add_argument("--text-tokens", type=int, default=60, help="tokens of a question with its instruction; assumed")
-    work.add_argument("--reply-tokens", type=int, default=6, help="mean tokens of a reply, at most 50; assumed")
-    work.add_argument("--step-tokens", type=int, default=20, help="tokens of a plan's step beside its frame; assumed")
+    work.add_argument(
+        "--frames-most",
+        type=int,
+        default=2287,
+        help="maximum frames; published: the longest trajectory",
+    )
+    work.add_argument(
+        "--questions",
+        type=float,
+        default=24,
+        help="mean questions of a trajectory; as in our sets, 475/20",
+    )
+    work.add_argument(
+        "--one-clue",
+        type=float,
+        default=0.635,
+        help="share of questions; from the published totals",
+    )
+    work.add_argument(
+        "--two-clues",
+        type=float,
+        default=0.165,
+        help="share of questions; from the published totals",
+    )
+    work.add_argument(
+        "--puts",
+        type=float,
+        default=0.5,
+        help="share of two-clue questions with successive clues; assumed",
+    )
+    work.add_argument(
+        "--most-clues", type=int, default=6, help="maximum clues of a question; assumed"
+    )
+    work.add_argument(
+        "--text-tokens",
+        type=int,
+        default=60,
+        help="tokens of a question with its instruction; assumed",
+    )
+    work.add_argument(
+        "--reply-tokens", type=int, default=6, help="mean tokens of a reply, at most 50; assumed"
+    )
+    work.add_argument(
+        "--step-tokens",
+        type=int,
+        default=20,
+        help="tokens of a plan's step beside its frame; assumed",
+    )
     work.add_argument(
         "--step-seconds",
         type=float,
         default=0.024,
         help="seconds of a step in the simulator; measured, benchmarks/README.md",
     )
-    work.add_argument("--haystack", default="8,32,128,512,1000", help="sizes in kilo-tokens, as in tasks/nieh/contexts")
     work.add_argument(
-        "--max-context", type=int, default=1_010_000, help="longer contexts are refused; with extended RoPE"
+        "--haystack",
+        default="8,32,128,512,1000",
+        help="sizes in kilo-tokens, as in tasks/nieh/contexts",
+    )
+    work.add_argument(
+        "--max-context",
+        type=int,
+        default=1_010_000,
+        help="longer contexts are refused; with extended RoPE",
     )
     work.add_argument("--seed", type=int, default=0, help="seed of the sampling")
     _machine_arguments(parser.add_argument_group("the machine, one GPU of it"))
@@ -163,22 +218,45 @@ def _arguments(given: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 def _machine_arguments(group: argparse._ArgumentGroup) -> None:
-    group.add_argument("--tflops", type=float, default=400, help="in products; assumed, 40%% of an H100's 989")
+    group.add_argument(
+        "--tflops", type=float, default=400, help="in products; assumed, 40%% of an H100's 989"
+    )
     group.add_argument("--attention-tflops", type=float, default=200, help="in attention; assumed")
-    group.add_argument("--bandwidth", type=float, default=2.0, help="TB/s reached; assumed, 60%% of an H100's 3.35")
-    group.add_argument("--step-overhead", type=float, default=0.02, help="seconds a token; assumed, eager transformers")
-    group.add_argument("--frame-seconds", type=float, help="CPU's work on a frame; else each model's own, measured")
+    group.add_argument(
+        "--bandwidth", type=float, default=2.0, help="TB/s reached; assumed, 60%% of an H100's 3.35"
+    )
+    group.add_argument(
+        "--step-overhead",
+        type=float,
+        default=0.02,
+        help="seconds a token; assumed, eager transformers",
+    )
+    group.add_argument(
+        "--frame-seconds", type=float, help="CPU's work on a frame; else each model's own, measured"
+    )
     group.add_argument("--memory-gb", type=float, default=80, help="of a GPU: an H100's")
     group.add_argument("--usable", type=float, default=0.9, help="share of it; assumed")
     group.add_argument("--gpus-per-node", type=int, default=8, help="most of one worker")
-    group.add_argument("--attention", choices=("sdpa", "flash_attention_2"), default="sdpa", help="for memory")
+    group.add_argument(
+        "--attention", choices=("sdpa", "flash_attention_2"), default="sdpa", help="for memory"
+    )
     group.add_argument("--chunk-tokens", type=int, default=1024, help="the option of that name")
-    group.add_argument("--parallel", choices=("layers", "tensor"), default="layers", help="layers is device_map")
-    group.add_argument("--tensor-efficiency", type=float, default=0.8, help="of tensor parallelism; assumed")
-    group.add_argument("--load-seconds", type=float, default=120, help="until a worker has its model; assumed")
+    group.add_argument(
+        "--parallel", choices=("layers", "tensor"), default="layers", help="layers is device_map"
+    )
+    group.add_argument(
+        "--tensor-efficiency", type=float, default=0.8, help="of tensor parallelism; assumed"
+    )
+    group.add_argument(
+        "--load-seconds", type=float, default=120, help="until a worker has its model; assumed"
+    )
     group.add_argument("--price", type=float, default=3.0, help="USD a GPU-hour; assumed")
-    group.add_argument("--prefill", action="append", default=[], metavar="MODEL=N:RATE,N:RATE", help="measured")
-    group.add_argument("--decode", action="append", default=[], metavar="MODEL=RATE", help="measured, tokens/s")
+    group.add_argument(
+        "--prefill", action="append", default=[], metavar="MODEL=N:RATE,N:RATE", help="measured"
+    )
+    group.add_argument(
+        "--decode", action="append", default=[], metavar="MODEL=RATE", help="measured, tokens/s"
+    )
 
 
 def machine_of(options: argparse.Namespace) -> Machine:
@@ -207,7 +285,9 @@ def rates_of(shape: Shape, machine: Machine, options: argparse.Namespace) -> Rat
     for name, _, text in (given.partition("=") for given in options.prefill):
         if name == shape.name:
             short, long = (point.split(":") for point in text.split(","))
-            rates = rates_from_prefill(rates, (int(short[0]), float(short[1])), (int(long[0]), float(long[1])))
+            rates = rates_from_prefill(
+                rates, (int(short[0]), float(short[1])), (int(long[0]), float(long[1]))
+            )
     for name, _, text in (given.partition("=") for given in options.decode):
         if name == shape.name:
             rates = replace(rates, step=1 / float(text))
@@ -218,11 +298,15 @@ def draw(options: argparse.Namespace) -> list[Trajectory]:
     """Sample trajectories of different lengths (log-normal, clipped), with the clues of their questions."""
     rng = np.random.default_rng(options.seed)
     spread = np.log1p((options.frames_spread / options.frames) ** 2)
-    lengths = rng.lognormal(np.log(options.frames) - spread / 2, np.sqrt(spread), options.trajectories)
+    lengths = rng.lognormal(
+        np.log(options.frames) - spread / 2, np.sqrt(spread), options.trajectories
+    )
     trajectories = []
     for n_frames in lengths.clip(options.frames_least, options.frames_most).astype(int).tolist():
         n_questions = max(1, int(rng.poisson(options.questions)))
-        trajectories.append(Trajectory(n_frames, tuple(_clues(n_frames, rng, options) for _ in range(n_questions))))
+        trajectories.append(
+            Trajectory(n_frames, tuple(_clues(n_frames, rng, options) for _ in range(n_questions)))
+        )
     return trajectories
 
 
@@ -245,18 +329,28 @@ def modes(options: argparse.Namespace) -> list[Mode]:
     sizes = [int(size) for size in options.haystack.split(",")]
     return [
         Mode("nieh_gt", lambda trajectory, _: (list(trajectory.questions), 0)),
-        Mode("nieh_full", lambda trajectory, _: ([tuple(range(trajectory.n_frames))] * len(trajectory.questions), 0)),
+        Mode(
+            "nieh_full",
+            lambda trajectory, _: (
+                [tuple(range(trajectory.n_frames))] * len(trajectory.questions),
+                0,
+            ),
+        ),
         *[Mode(f"nieh_haystack {size}k", _haystack_of(size, options.seed)) for size in sizes],
         Mode("infthor_plans", None, options.step_seconds),
     ]
 
 
-def _haystack_of(size: int, seed: int) -> Callable[[Trajectory, Shape], tuple[list[tuple[int, ...]], int]]:
+def _haystack_of(
+    size: int, seed: int
+) -> Callable[[Trajectory, Shape], tuple[list[tuple[int, ...]], int]]:
     def contexts(trajectory: Trajectory, shape: Shape) -> tuple[list[tuple[int, ...]], int]:
         rng = random.Random(seed)
         n = size * 1000 // shape.frame_tokens
         windows = [
-            _window(clues, trajectory.n_frames, n, depth, rng) for clues in trajectory.questions for depth in range(5)
+            _window(clues, trajectory.n_frames, n, depth, rng)
+            for clues in trajectory.questions
+            for depth in range(5)
         ]
         possible = [window for window in windows if not isinstance(window, str)]
         return possible, len(windows) - len(possible)
@@ -284,7 +378,9 @@ def _n_common(one: Sequence[int], other: Sequence[int]) -> int:
     return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False)))
 
 
-def _plan_requests(trajectory: Trajectory, shape: Shape, options: argparse.Namespace) -> Iterator[Request]:
+def _plan_requests(
+    trajectory: Trajectory, shape: Shape, options: argparse.Namespace
+) -> Iterator[Request]:
     """Yield the requests of an agent: for each step the whole history, which grows by a frame and an action."""
     step = shape.frame_tokens + options.step_tokens
     for number in range(1, trajectory.n_frames + 1):
@@ -305,7 +401,9 @@ def run(
     for trajectory in trajectories:
         group, n_missing = requests(trajectory, mode, shape, options)
         short = [request for request in group if request.context <= options.max_context]
-        fitting = [request for request in short if gpus_for(shape, machine, request.context) is not None]
+        fitting = [
+            request for request in short if gpus_for(shape, machine, request.context) is not None
+        ]
         n_absent, n_long = n_absent + n_missing, n_long + len(group) - len(short)
         n_large += len(short) - len(fitting)
         if fitting:
@@ -315,7 +413,10 @@ def run(
     n_gpus = (gpus_for(shape, machine, largest) or 0) if answered else 0
     jobs = [
         tuple(
-            sum(seconds(request, rates, reuse) / machine.speed(n_gpus) + mode.step_seconds for request in group)
+            sum(
+                seconds(request, rates, reuse) / machine.speed(n_gpus) + mode.step_seconds
+                for request in group
+            )
             for group in groups
         )
         for reuse in (True, False)
@@ -362,7 +463,9 @@ def cost_table(runs: Sequence[Run], load: float, price: float) -> str:
     """Return a line for each run, one for the sum of each model, and one for the sum of all: hours and cost."""
     lines = [_COST]
     for one in runs:
-        lines.append(f"{one.mode:20s}{one.model.name:17s}{one.n_gpus or '-':>5}" + _times([one], load, price))
+        lines.append(
+            f"{one.mode:20s}{one.model.name:17s}{one.n_gpus or '-':>5}" + _times([one], load, price)
+        )
     for name in dict.fromkeys(one.model.name for one in runs):
         of_model = [one for one in runs if one.model.name == name]
         lines.append(f"{'all':20s}{name:17s}{'':5s}" + _times(of_model, load, price))
@@ -375,7 +478,9 @@ def _times(runs: Sequence[Run], load: float, price: float) -> str:
     hours = {n: _sum([one.hours(n, load) for one in runs]) for n in GPUS}
     without = _sum([one.hours(8, load, reuse=False) for one in runs])
     shown = f"{_number(hours[1], 9)}{_number(hours[8], 9)}{_number(hours[64], 8)}"
-    shown += "".join(_number(None if (time := hours[n]) is None else price * n * time, 9, 0) for n in (8, 64))
+    shown += "".join(
+        _number(None if (time := hours[n]) is None else price * n * time, 9, 0) for n in (8, 64)
+    )
     saved = None if without is None or not hours[8] else without / hours[8]
     return shown + _number(without, 20) + _number(saved, 8)
 

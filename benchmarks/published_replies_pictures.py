@@ -17,10 +17,10 @@ from matplotlib.figure import Figure
 from infthor_eval.cli.results import read_run_results
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.published import published_tables
-from infthor_eval.nieh.evidence_tables import short_name
 from infthor_eval.nieh.guessing.audit import audit, groups
 from infthor_eval.nieh.guessing.guessers import GUESSERS
-from infthor_eval.nieh.summary import DISTANCES, SHOWN_CLUES, Cell, NiehSummary, TaskSummary
+from infthor_eval.nieh.results.evidence_tables import short_name
+from infthor_eval.nieh.results.summary import DISTANCES, SHOWN_CLUES, Cell, NiehSummary, TaskSummary
 from infthor_eval.report.figures.style import LEGEND, add_legend, looks_of, save_figure
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -88,15 +88,31 @@ def draw_guessing(data: NiehSet, tasks: Mapping[str, TaskSummary]) -> Figure:
         for _, look, value in rows:
             at -= 1
             axes.plot(value, at, "o", ms=5, color=look.colour)
-            axes.annotate(f"{value:.1f}", (value, at), (7, 0), textcoords="offset points", va="center", fontsize=8)
+            axes.annotate(
+                f"{value:.1f}",
+                (value, at),
+                (7, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=8,
+            )
         for name, task in tasks.items():
             at -= 1
             score = task.by_file[file.name].scores["strict"]
-            axes.hlines(at, 100 * (score.low or 0), 100 * (score.high or 0), color=LOOKS[name].colour, lw=1.3)
+            axes.hlines(
+                at,
+                100 * (score.low or 0),
+                100 * (score.high or 0),
+                color=LOOKS[name].colour,
+                lw=1.3,
+            )
             axes.plot(100 * score.mean, at, "o", ms=5, color=LOOKS[name].colour)
             words = (f"{100 * score.mean:.1f}", (100 * (score.high or 0), at), (5, 0))
             axes.annotate(*words, textcoords="offset points", va="center", fontsize=8)
-        names = [*(row[0] for row in rows), *(f"Qwen2.5-VL 7B, {MODES[name]}, log" for name in tasks)]
+        names = [
+            *(row[0] for row in rows),
+            *(f"Qwen2.5-VL 7B, {MODES[name]}, log" for name in tasks),
+        ]
         axes.set_yticks(range(len(names)), names[::-1])
         axes.set_xlim(0, 100)
         axes.set_xlabel("accuracy, %")
@@ -125,14 +141,24 @@ def draw_above_guessing(tasks: Mapping[str, TaskSummary]) -> Figure:
 def draw_evidence(tasks: Mapping[str, TaskSummary]) -> Figure:
     """Draw accuracy by the clue frames that were shown, of the runs that do not show all of them."""
     hiding = {name: task for name, task in tasks.items() if name != "nieh_published_full"}
-    return _by_file(hiding, SHOWN_CLUES, lambda task, file: task.evidence[file].by_shown_clues, "of the clue frames")
+    return _by_file(
+        hiding,
+        SHOWN_CLUES,
+        lambda task, file: task.evidence[file].by_shown_clues,
+        "of the clue frames",
+    )
 
 
 def draw_distance(tasks: Mapping[str, TaskSummary]) -> Figure:
     """Draw accuracy by the distance of the last clue from the end."""
     used = set().union(*(task.evidence["total"].by_distance for task in tasks.values()))
     names = [name for name in DISTANCES if name in used]
-    return _by_file(tasks, names, lambda task, file: task.evidence[file].by_distance, "frames after the last clue")
+    return _by_file(
+        tasks,
+        names,
+        lambda task, file: task.evidence[file].by_distance,
+        "frames after the last clue",
+    )
 
 
 def _by_file(
@@ -147,11 +173,15 @@ def _by_file(
     for axes, file in zip(panels, files, strict=True):
         for number, (name, task) in enumerate(tasks.items()):
             offset = 0.22 * (number - (len(tasks) - 1) / 2)
-            for at, cell in ((names.index(key), cell) for key, cell in cells_of(task, file).items()):
+            for at, cell in (
+                (names.index(key), cell) for key, cell in cells_of(task, file).items()
+            ):
                 score, colour = cell.scores["strict"], LOOKS[name].colour
                 axes.plot(at + offset, 100 * score.mean, "o", ms=4.5, color=colour, zorder=3)
                 if score.low is not None and score.high is not None:
-                    axes.vlines(at + offset, 100 * score.low, 100 * score.high, color=colour, lw=1.3)
+                    axes.vlines(
+                        at + offset, 100 * score.low, 100 * score.high, color=colour, lw=1.3
+                    )
         axes.set_xticks(range(len(names)), names, fontsize=8)
         axes.set_ylim(0, 100)
         axes.set_xlabel(label)

@@ -14,9 +14,13 @@ from pathlib import Path
 
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.checker import Checker
-from infthor_eval.generation.questions.generate import candidates_of, further_candidates_of, generate_questions
+from infthor_eval.generation.questions.generate import (
+    candidates_of,
+    further_candidates_of,
+    generate_questions,
+)
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
-from infthor_eval.nieh.baselines import BASELINES, Predict
+from infthor_eval.nieh.asking.baselines import BASELINES, Predict
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.scoring import score
 
@@ -33,7 +37,10 @@ def main() -> None:
     options = parser.parse_args()
     check_all(options.set)
     generated = generate_questions(
-        options.set, seed=options.seed, per_trajectory=options.per_trajectory, further=options.further
+        options.set,
+        seed=options.seed,
+        per_trajectory=options.per_trajectory,
+        further=options.further,
     )
     print(
         f"chosen: {len(generated.questions)}, by number of clues {generated.by_clues()}, by type {generated.by_type()}"
@@ -42,30 +49,51 @@ def main() -> None:
     yes_no = [item for item in samples if item.question.answers[0] in _YES_NO]
     for name in ("oracle", "blind", "blind-count"):
         predict = BASELINES[name](0).fit(samples)
-        print(f"{name}, strict: {mean(predict, samples):.3f}; yes/no alone {mean(predict, yes_no):.3f}")
+        print(
+            f"{name}, strict: {mean(predict, samples):.3f}; yes/no alone {mean(predict, yes_no):.3f}"
+        )
 
 
 def check_all(folder: Path) -> None:
     """Print how many candidates the checker confirms, and those that it does not."""
-    histories = [TrajectoryHistory(path.name, read_steps(path)) for path in sorted((folder / "metadata").iterdir())]
+    histories = [
+        TrajectoryHistory(path.name, read_steps(path))
+        for path in sorted((folder / "metadata").iterdir())
+    ]
     vocabulary = frozenset[str]().union(*(history.all_object_types for history in histories))
     counts: Counter[str] = Counter()
     for history in histories:
         checker = Checker(history.steps, DEFAULT_SHARE)
         rng = random.Random(history.traj_id)
-        for candidate in (*candidates_of(history, vocabulary, rng), *further_candidates_of(history, rng)):
+        for candidate in (
+            *candidates_of(history, vocabulary, rng),
+            *further_candidates_of(history, rng),
+        ):
             question = candidate.question(history.traj_id)
             verdict = checker.verdict(question)
-            counts.update(["all", *(name for name in ("right", "sufficient", "minimal") if getattr(verdict, name))])
+            counts.update(
+                [
+                    "all",
+                    *(
+                        name
+                        for name in ("right", "sufficient", "minimal")
+                        if getattr(verdict, name)
+                    ),
+                ]
+            )
             if not verdict.sound:
-                print(f"  {question.traj_id}: {question.text} {question.answers} {question.clues}: {verdict}")
+                print(
+                    f"  {question.traj_id}: {question.text} {question.answers} {question.clues}: {verdict}"
+                )
     shares = ", ".join(f"{name} {counts[name]}" for name in ("right", "sufficient", "minimal"))
     print(f"{len(histories)} trajectories, {counts['all']} candidates: {shares}")
 
 
 def mean(predict: Predict, samples: Sequence[Sample]) -> float:
     """Return the mean of a baseline with the strict scorer."""
-    return sum(score(predict(item), item.question.answers, "strict") for item in samples) / len(samples)
+    return sum(score(predict(item), item.question.answers, "strict") for item in samples) / len(
+        samples
+    )
 
 
 if __name__ == "__main__":

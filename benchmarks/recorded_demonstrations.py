@@ -107,7 +107,9 @@ def _replay(trajectory: Trajectory, simulator: Simulator) -> Iterator[str | None
         yield None if after.success else after.error or "refused without a message"
 
 
-def demonstrations(path: Path, every: int = 1, per_floor_plan: int | None = None) -> list[Trajectory]:
+def demonstrations(
+    path: Path, every: int = 1, per_floor_plan: int | None = None
+) -> list[Trajectory]:
     """Return every so-maniest demonstration of a file, at most some of each floor plan."""
     selection = select([path], per_floor_plan=per_floor_plan)
     for failure in selection.failures:
@@ -129,20 +131,28 @@ def _describe(low: LowAction, error: str) -> str:
 def main() -> None:
     """Replay the chosen demonstrations and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--data", type=Path, required=True, help="folder with alfred/ and thor_scenes/")
+    parser.add_argument(
+        "--data", type=Path, required=True, help="folder with alfred/ and thor_scenes/"
+    )
     parser.add_argument("--split", default="valid_seen", help="valid_seen or train")
     parser.add_argument("--every", type=int, default=1, help="take every so-maniest demonstration")
-    parser.add_argument("--per-floor-plan", type=int, help="demonstrations of one floor plan, at most")
+    parser.add_argument(
+        "--per-floor-plan", type=int, help="demonstrations of one floor plan, at most"
+    )
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     path = options.data / "alfred" / f"{options.split}.jsonl.gz"
-    counts = replay_demonstrations(options.data, demonstrations(path, options.every, options.per_floor_plan))
+    counts = replay_demonstrations(
+        options.data, demonstrations(path, options.every, options.per_floor_plan)
+    )
     if options.json:
         print(json.dumps(counts.document()))
         return
     print(f"{counts.whole} of {counts.demonstrations} demonstrations whole")
     for kind in sorted(counts.tried):
-        print(f"{kind}s: {counts.accepted[kind]} of {counts.tried[kind]} accepted, {counts.share(kind):.2%}")
+        print(
+            f"{kind}s: {counts.accepted[kind]} of {counts.tried[kind]} accepted, {counts.share(kind):.2%}"
+        )
     for receptacle, results in sorted(counts.puts.items(), key=lambda item: -item[1][False]):
         if results[False]:
             print(f"  puts refused, {receptacle}: {results[False]} of {sum(results.values())}")

@@ -41,12 +41,25 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         out = options.out or Path(scratch)
-        scenes = procedural_scenes(options.procedural) + recorded_scenes(options.data, options.recorded)
+        scenes = procedural_scenes(options.procedural) + recorded_scenes(
+            options.data, options.recorded
+        )
         generated = generate_all(scenes, options, out / "trajectories")
-        command = ["replay", out / "trajectories", "--data", options.data, "--out", out / "set", "--json"]
+        command = [
+            "replay",
+            out / "trajectories",
+            "--data",
+            options.data,
+            "--out",
+            out / "set",
+            "--json",
+        ]
         replayed = run(command)
         trajectories = list(iter_trajectories(out / "trajectories"))
-        same = sum(has_same_log(item, out / "set" / "metadata" / folder_name(item.traj_id)) for item in trajectories)
+        same = sum(
+            has_same_log(item, out / "set" / "metadata" / folder_name(item.traj_id))
+            for item in trajectories
+        )
     show(generated, replayed, trajectories, same)
 
 
@@ -57,7 +70,11 @@ def procedural_scenes(number: int) -> list[str]:
 
 def recorded_scenes(data: Path, number: int) -> list[str]:
     """Return the names of this many recorded floor plans without bathrooms, evenly spaced among all."""
-    names = [name for name in floor_plan_names(data) if int(name.removeprefix("FloorPlan")) not in _BATHROOMS]
+    names = [
+        name
+        for name in floor_plan_names(data)
+        if int(name.removeprefix("FloorPlan")) not in _BATHROOMS
+    ]
     return [names[index * len(names) // number] for index in range(number)]
 
 
@@ -69,7 +86,12 @@ def generate_all(scenes: list[str], options: argparse.Namespace, out: Path) -> d
         if not names or not count:
             continue
         words = [word for name in names for word in ("--scene", name)]
-        words += ["--min-steps", str(options.min_steps), "--min-subgoals", str(options.min_subgoals)]
+        words += [
+            "--min-steps",
+            str(options.min_steps),
+            "--min-subgoals",
+            str(options.min_subgoals),
+        ]
         words += ["--count", str(count), "--test-set", "--data", options.data]
         document = run(["generate", *words, "--out", out, "--json"])
         total["failures"] += document["failures"]
@@ -88,11 +110,16 @@ def run(arguments: list[Any]) -> dict[str, Any]:
 
 def has_same_log(trajectory: Trajectory, folder: Path) -> bool:
     """Return True if replay and generation have the same log in every step."""
-    logged = [{key: value for key, value in entry.items() if key != "step"} for entry in trajectory.object_log]
+    logged = [
+        {key: value for key, value in entry.items() if key != "step"}
+        for entry in trajectory.object_log
+    ]
     return logged == [msgspec.to_builtins(step.object_log) for step in read_steps(folder)]
 
 
-def show(generated: dict[str, Any], replayed: dict[str, Any], trajectories: list[Trajectory], same: int) -> None:
+def show(
+    generated: dict[str, Any], replayed: dict[str, Any], trajectories: list[Trajectory], same: int
+) -> None:
     """Print the counts."""
     tried, accepted = Counter[str](), Counter[str]()
     for item in trajectories:
@@ -103,11 +130,25 @@ def show(generated: dict[str, Any], replayed: dict[str, Any], trajectories: list
         print(f"{name:45} {tried[name]:6} {accepted[name]:9} {tried[name] - accepted[name]:8}")
     steps = [len(item.plan.low_actions) for item in trajectories]
     broken = [problem for item in trajectories if (problem := violation(item))]
-    print(f"generated: {len(trajectories)}, {len({item.scene.floor_plan for item in trajectories})} scenes; ", end="")
-    print(f"{min(steps)} to {max(steps)} steps, {sum(steps)} together; not generated: {len(generated['failures'])}")
-    print(f"replayed without a refused action: {replayed['whole']} of {len(trajectories)}; same object log: {same}")
-    print(f"final tasks that satisfy the rule of both ends: {len(trajectories) - len(broken)} of {len(trajectories)}")
-    for line in [*generated["failures"], *broken, *map(str, replayed["diverged"]), *map(str, replayed["failures"])]:
+    print(
+        f"generated: {len(trajectories)}, {len({item.scene.floor_plan for item in trajectories})} scenes; ",
+        end="",
+    )
+    print(
+        f"{min(steps)} to {max(steps)} steps, {sum(steps)} together; not generated: {len(generated['failures'])}"
+    )
+    print(
+        f"replayed without a refused action: {replayed['whole']} of {len(trajectories)}; same object log: {same}"
+    )
+    print(
+        f"final tasks that satisfy the rule of both ends: {len(trajectories) - len(broken)} of {len(trajectories)}"
+    )
+    for line in [
+        *generated["failures"],
+        *broken,
+        *map(str, replayed["diverged"]),
+        *map(str, replayed["failures"]),
+    ]:
         print(f"  {line}")
 
 

@@ -35,13 +35,23 @@ def serve_vllm(
     checkpoint: Path, dtype: str, environment: Mapping[str, str], most_frames: int
 ) -> AbstractContextManager[Served]:
     """Serve a checkpoint in vLLM on a CPU within the context; requests have at most so many frames."""
-    options = ["--model", str(checkpoint), "--dtype", dtype, "--enforce-eager", "--max-model-len", "16384"]
+    options = [
+        "--model",
+        str(checkpoint),
+        "--dtype",
+        dtype,
+        "--enforce-eager",
+        "--max-model-len",
+        "16384",
+    ]
     options += ["--limit-mm-per-prompt", f'{{"image": {most_frames}, "video": 0}}']
     options += ["--mm-processor-kwargs", '{"use_fast": false}', "--enable-prompt-tokens-details"]
     return _serve(["-m", "vllm.entrypoints.openai.api_server", *options], environment)
 
 
-def serve_transformers(dtype: str, environment: Mapping[str, str]) -> AbstractContextManager[Served]:
+def serve_transformers(
+    dtype: str, environment: Mapping[str, str]
+) -> AbstractContextManager[Served]:
     """Serve whatever checkpoints are asked for in transformers on a CPU within the context."""
     start = ["-c", "from transformers.cli.transformers import main; main()", "serve"]
     return _serve([*start, "--device", "cpu", "--dtype", dtype], environment)

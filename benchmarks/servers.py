@@ -23,8 +23,8 @@ from typing import Any
 
 from served import Served, serve_transformers, serve_vllm
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.runs import read_run
+from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.suites import find_suite
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 
@@ -44,8 +44,12 @@ _COMMAND = [sys.executable, "-c", "from infthor_eval.cli import main; main()"]
 def main() -> None:
     """Print for each engine how many replies and plans are equal."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--limit", type=int, help="questions, and trajectories of plans, of each task")
-    parser.add_argument("--pretrained", type=Path, default=packaged_folder(FOLDER), help="folder of a checkpoint")
+    parser.add_argument(
+        "--limit", type=int, help="questions, and trajectories of plans, of each task"
+    )
+    parser.add_argument(
+        "--pretrained", type=Path, default=packaged_folder(FOLDER), help="folder of a checkpoint"
+    )
     parser.add_argument("--adapter", default="qwen2.5-vl", help="its model name here")
     parser.add_argument("--engines", nargs="+", choices=ENGINES, default=ENGINES)
     options = parser.parse_args()
@@ -63,14 +67,18 @@ def main() -> None:
         with serving.get(name, nullcontext)() as served, tempfile.TemporaryDirectory() as output:
             for suite, task in TASKS.items():
                 given = _arguments(name, options.adapter, checkpoint, served, suite)
-                replies, cached = _ask(suite, [*given, "--tasks", task, *more], Path(output) / suite)
+                replies, cached = _ask(
+                    suite, [*given, "--tasks", task, *more], Path(output) / suite
+                )
                 known = expected.setdefault(suite, replies)
                 equal = sum(replies[key] == reply for key, reply in known.items())
                 cells.append(f"{f'{equal} of {len(known)}':>14}{cached:>9.1%}")
         print(f"{name:20}{''.join(cells)}", flush=True)
 
 
-def _arguments(name: str, adapter: str, checkpoint: Path, served: Served | None, suite: str) -> list[str]:
+def _arguments(
+    name: str, adapter: str, checkpoint: Path, served: Served | None, suite: str
+) -> list[str]:
     greedy = ["--greedy"] if suite == "plans" else []
     if served is not None:
         given = f"base_url={served.url},model={checkpoint}"
@@ -80,13 +88,25 @@ def _arguments(name: str, adapter: str, checkpoint: Path, served: Served | None,
     given = f"pretrained={checkpoint},dtype=float32"
     if name == HERE:
         return ["--model", adapter, "--model-args", f"{given},device=cpu,batch_size=1", *greedy]
-    return ["--model", adapter, "--engine", "vllm", "--model-args", f"{given},enforce_eager=true", *greedy]
+    return [
+        "--model",
+        adapter,
+        "--engine",
+        "vllm",
+        "--model-args",
+        f"{given},enforce_eager=true",
+        *greedy,
+    ]
 
 
 def _ask(suite: str, arguments: list[str], output: Path) -> tuple[dict[Any, Any], float]:
     """Return the reply, or the steps of a plan, by unit, and the share of cached tokens."""
     process = subprocess.run(
-        [*_COMMAND, *arguments, "--output", str(output)], env=ENVIRONMENT, capture_output=True, text=True, check=False
+        [*_COMMAND, *arguments, "--output", str(output)],
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if process.returncode not in (0, 1):  # 1: some units failed, which shows in the count
         sys.exit(process.stderr[-3000:])
@@ -94,7 +114,9 @@ def _ask(suite: str, arguments: list[str], output: Path) -> tuple[dict[Any, Any]
     _, records = read_run(results.parent, find_suite(suite).records)
     read = sum(record.tokens.context or 0 for record in records)
     cached = sum(record.tokens.cached or 0 for record in records)
-    return {record.key: record.failure or record.payload for record in records}, cached / max(read, 1)
+    return {record.key: record.failure or record.payload for record in records}, cached / max(
+        read, 1
+    )
 
 
 if __name__ == "__main__":

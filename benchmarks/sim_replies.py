@@ -21,22 +21,38 @@ from typing import Any
 import numpy as np
 
 _ROOMS = ("kitchen-21", "living-room-22", "bedroom-23", "bathroom-24")
-_WALK = ("MoveAhead", "RotateRight", "MoveAhead", "RotateLeft", "MoveRight", "LookDown", "MoveBack", "LookUp", "Pass")
+_WALK = (
+    "MoveAhead",
+    "RotateRight",
+    "MoveAhead",
+    "RotateLeft",
+    "MoveRight",
+    "LookDown",
+    "MoveBack",
+    "LookUp",
+    "Pass",
+)
 
 
-def next_action(step: int, objects: list[dict[str, Any]], random: np.random.Generator) -> dict[str, Any]:
+def next_action(
+    step: int, objects: list[dict[str, Any]], random: np.random.Generator
+) -> dict[str, Any]:
     """Return the next action of the script, by what is in view."""
     if step % 3:
         return {"action": str(random.choice(_WALK))}
     seen = [o for o in objects if o["visible"]]
     held = any(o["isPickedUp"] for o in objects)
-    choices: list[dict[str, Any]] = [{"action": str(random.choice(("Crouch", "Stand", "RotateRight", "RotateLeft")))}]
+    choices: list[dict[str, Any]] = [
+        {"action": str(random.choice(("Crouch", "Stand", "RotateRight", "RotateLeft")))}
+    ]
     for item in seen:
         name = {"objectId": item["objectId"], "forceAction": bool(random.random() < 0.3)}
         if item["openable"]:
             choices.append({"action": "CloseObject" if item["isOpen"] else "OpenObject", **name})
         if item["toggleable"]:
-            choices.append({"action": "ToggleObjectOff" if item["isToggled"] else "ToggleObjectOn", **name})
+            choices.append(
+                {"action": "ToggleObjectOff" if item["isToggled"] else "ToggleObjectOn", **name}
+            )
         if item["sliceable"] and random.random() < 0.2:
             choices.append({"action": "SliceObject", **name})
         if held and item["receptacle"]:
@@ -50,17 +66,22 @@ def digests(steps: int) -> dict[str, Any]:
     """Return the digests of each room and the number of actions by name and success."""
     import msgpack
 
-    from infthor_eval.sim.fifo import FieldType
-    from infthor_eval.sim.scenes.catalogue import Catalogue
-    from infthor_eval.sim.server import SimulatorServer
-    from infthor_eval.sim.simulation import Simulation
+    from infthor_sim.player.fifo import FieldType
+    from infthor_sim.player.server import SimulatorServer
+    from infthor_sim.scenes.catalogue import Catalogue
+    from infthor_sim.simulation import Simulation
 
     result: dict[str, Any] = {}
     done = Counter[str]()
     for room in _ROOMS:
         server, random = SimulatorServer(Simulation(Catalogue())), np.random.default_rng(7)
         server.run({"action": "Reset", "sceneName": room})
-        init = {"gridSize": 0.25, "visibilityDistance": 1.5, "fieldOfView": 60, "fastActionEmit": False}
+        init = {
+            "gridSize": 0.25,
+            "visibilityDistance": 1.5,
+            "fieldOfView": 60,
+            "fastActionEmit": False,
+        }
         images = {"renderInstanceSegmentation": True, "renderDepthImage": True}
         replies = list(server.answer({"action": "Initialize", **init, **images}))
         metadata, pixels = hashlib.sha256(), hashlib.sha256()
@@ -78,16 +99,22 @@ def digests(steps: int) -> dict[str, Any]:
 
 def main() -> None:
     """Parse the arguments and print the digests."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--steps", type=int, default=2000)
-    parser.add_argument("--against", metavar="CHECKOUT", help="compare with the replies of another checkout")
+    parser.add_argument(
+        "--against", metavar="CHECKOUT", help="compare with the replies of another checkout"
+    )
     options = parser.parse_args()
     ours = digests(options.steps)
     print(json.dumps(ours, indent=1))
     if options.against:
         command = [sys.executable, __file__, "--steps", str(options.steps)]
         environment = {**os.environ, "PYTHONPATH": str(Path(options.against).resolve())}
-        other = json.loads(subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout)
+        other = json.loads(
+            subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE).stdout
+        )
         print("equal" if ours == other else f"differs: {json.dumps(other, indent=1)}")
         sys.exit(ours != other)
 

@@ -22,7 +22,17 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-_MOVES = ("RotateRight", "MoveAhead", "MoveAhead", "LookDown", "MoveLeft", "LookUp", "RotateLeft", "MoveBack", "Pass")
+_MOVES = (
+    "RotateRight",
+    "MoveAhead",
+    "MoveAhead",
+    "LookDown",
+    "MoveLeft",
+    "LookUp",
+    "RotateLeft",
+    "MoveBack",
+    "Pass",
+)
 _FULL = {"renderInstanceSegmentation": True, "renderDepthImage": True}
 
 
@@ -55,10 +65,10 @@ def memory(client: Any) -> float:
 
 def echo(scene: str, full: bool) -> None:
     """Answer every action with one prepared reply, to measure transport and client alone."""
-    from infthor_eval.sim.fifo import FifoPipes
-    from infthor_eval.sim.scenes.catalogue import Catalogue
-    from infthor_eval.sim.server import SimulatorServer
-    from infthor_eval.sim.simulation import Simulation
+    from infthor_sim.player.fifo import FifoPipes
+    from infthor_sim.player.server import SimulatorServer
+    from infthor_sim.scenes.catalogue import Catalogue
+    from infthor_sim.simulation import Simulation
 
     peer = SimulatorServer(Simulation(Catalogue()))
     peer.run({"action": "Reset", "sceneName": scene})
@@ -67,7 +77,9 @@ def echo(scene: str, full: bool) -> None:
     head, metadata = replies[1][0]
     marker = b"\xaasequenceId\x01"
     assert bytes(metadata).count(marker) == 1
-    server, client = (Path(os.environ[f"AI2THOR_FIFO_{side}_PIPE_PATH"]) for side in ("SERVER", "CLIENT"))
+    server, client = (
+        Path(os.environ[f"AI2THOR_FIFO_{side}_PIPE_PATH"]) for side in ("SERVER", "CLIENT")
+    )
     with closing(FifoPipes(server, client)) as pipes:
         pipes.send(replies[0])
         while (message := pipes.receive()) is not None:
@@ -84,7 +96,7 @@ def measure(scene: str, steps: int) -> dict[str, Any]:
     result: dict[str, Any] = {"scene": scene, "steps": steps}
     for name, init in (("rgb", {}), ("rgb_ids_depth", _FULL)):
         start = time.perf_counter()
-        client = controller(f"{python} -m infthor_eval.sim", scene, **init)
+        client = controller(f"{python} -m infthor_sim", scene, **init)
         result[f"{name}_seconds_to_first_frame"] = round(time.perf_counter() - start, 2)
         result["objects"] = len(client.last_event.metadata["objects"])
         result[f"{name}_megabytes_at_start"] = round(memory(client), 1)
@@ -92,7 +104,9 @@ def measure(scene: str, steps: int) -> dict[str, Any]:
         result[f"{name}_megabytes_at_end"] = round(memory(client), 1)
         client.stop()
         load = "full" if init else "rgb"
-        client = controller(f"{python} {shlex.quote(__file__)} --echo {load} --scene {scene}", scene, **init)
+        client = controller(
+            f"{python} {shlex.quote(__file__)} --echo {load} --scene {scene}", scene, **init
+        )
         result[f"{name}_transport_steps_per_second"] = round(rate(client, steps), 1)
         client.stop()
     return result
@@ -108,19 +122,29 @@ def processor_time(client: Any) -> float:
 def compare(scene: str, steps: int, other: str) -> dict[str, Any]:
     """Compare this simulator with that of another checkout, see the module's docstring."""
     python, here = shlex.quote(sys.executable), str(Path(__file__).parents[1])
-    os.environ["PYTHONSAFEPATH"] = "1"  # else the folder that this is run in would come before PYTHONPATH
+    os.environ["PYTHONSAFEPATH"] = (
+        "1"  # else the folder that this is run in would come before PYTHONPATH
+    )
     result: dict[str, Any] = {"scene": scene, "rounds": 8}
     for load, init in (("rgb", {}), ("rgb_ids_depth", _FULL)):
         clients = {}
-        for name, root, more in (("other", other, {}), ("ours", here, {}), ("ours_low", here, {"quality": "Low"})):
+        for name, root, more in (
+            ("other", other, {}),
+            ("ours", here, {}),
+            ("ours_low", here, {"quality": "Low"}),
+        ):
             os.environ["PYTHONPATH"] = root
-            clients[name] = controller(f"{python} -m infthor_eval.sim", scene, **init, **more)
+            clients[name] = controller(f"{python} -m infthor_sim", scene, **init, **more)
         before = {name: processor_time(client) for name, client in clients.items()}
-        rates = [{name: rate(client, steps // 8) for name, client in clients.items()} for _ in range(8)]
+        rates = [
+            {name: rate(client, steps // 8) for name, client in clients.items()} for _ in range(8)
+        ]
         n_steps = 8 * (steps // 8 + 20)
         result[load] = {
             name: {
-                "steps_per_second": round(statistics.median(round_rates[name] for round_rates in rates), 1),
+                "steps_per_second": round(
+                    statistics.median(round_rates[name] for round_rates in rates), 1
+                ),
                 "processor_ms_a_step": round((processor_time(client) - before[name]) / n_steps, 2),
             }
             for name, client in clients.items()
@@ -132,10 +156,14 @@ def compare(scene: str, steps: int, other: str) -> dict[str, Any]:
 
 def main() -> None:
     """Parse the arguments and print the numbers."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--scene", default="kitchen-1")
     parser.add_argument("--steps", type=int, default=600)
-    parser.add_argument("--against", metavar="CHECKOUT", help="compare with the simulator of another checkout")
+    parser.add_argument(
+        "--against", metavar="CHECKOUT", help="compare with the simulator of another checkout"
+    )
     parser.add_argument("--echo", choices=("rgb", "full"), help=argparse.SUPPRESS)
     options, _ = parser.parse_known_args()
     if options.echo:

@@ -44,25 +44,49 @@ def main() -> None:
         out = options.out or Path(scratch)
         out.mkdir(parents=True, exist_ok=True)
         with _Server(options.every) as server:
-            model = f"base_url={server.url},model=m,timeout_s={_STALL_S / 2},retries=8,max_in_flight=1"
-            words = ["--model", "openai", "--model-args", model, "--tasks", "nieh_gt", "--data", str(options.questions)]
+            model = (
+                f"base_url={server.url},model=m,timeout_s={_STALL_S / 2},retries=8,max_in_flight=1"
+            )
+            words = [
+                "--model",
+                "openai",
+                "--model-args",
+                model,
+                "--tasks",
+                "nieh_gt",
+                "--data",
+                str(options.questions),
+            ]
             words += ["--limit", str(options.n_questions)]
             soak("questions", words, ("worker", "cut", "worker", "garble"), out, options, server)
         pick_ups = out / "trajectories.jsonl"
         pick_ups.write_bytes(b"".join(_with_pick_ups(options.trajectories, options.n_episodes)))
-        words = ["--model", "planner-arm", "--tasks", "manipulathor_pickup", "--data", str(pick_ups)]
-        words += ["--limit", str(options.n_episodes)] + (["--scenes", str(options.data)] if options.data else [])
+        words = [
+            "--model",
+            "planner-arm",
+            "--tasks",
+            "manipulathor_pickup",
+            "--data",
+            str(pick_ups),
+        ]
+        words += ["--limit", str(options.n_episodes)] + (
+            ["--scenes", str(options.data)] if options.data else []
+        )
         soak("episodes", words, ("simulator", "worker", "simulator", "cut"), out, options)
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--questions", type=Path, required=True, help="an NIEH set")
-    parser.add_argument("--trajectories", type=Path, required=True, help="folder of generated trajectories")
+    parser.add_argument(
+        "--trajectories", type=Path, required=True, help="folder of generated trajectories"
+    )
     parser.add_argument("--data", type=Path, help="folder of recorded floor plans")
     parser.add_argument("--n-questions", type=int, default=2000)
     parser.add_argument("--n-episodes", type=int, default=300)
-    parser.add_argument("--every", type=int, default=20, help="units, and requests, between two faults")
+    parser.add_argument(
+        "--every", type=int, default=20, help="units, and requests, between two faults"
+    )
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, help="folder of the results; default: temporary")
     return parser.parse_args()
@@ -73,7 +97,9 @@ def _with_pick_ups(folder: Path, n: int) -> Iterator[bytes]:
     for source in iter_sources(folder):
         if n_found >= n:
             return
-        n_found += sum(episode.kind is ManipulationKind.PICKUP for episode in arm_episodes(source.read()))
+        n_found += sum(
+            episode.kind is ManipulationKind.PICKUP for episode in arm_episodes(source.read())
+        )
         yield source.raw.replace(b"\n", b" ").strip() + b"\n"
 
 
@@ -93,8 +119,12 @@ def soak(
     calm_seconds, began = time.monotonic() - began, time.monotonic()
     if server is not None:
         server.disturbing = True
-    harsh = _Run([*words, "--workers", "2", "--output", str(out / name / "harsh")], out / name / "harsh")
-    injected = _run_disturbed(harsh, itertools.cycle(faults), options.every, random.Random(options.seed))
+    harsh = _Run(
+        [*words, "--workers", "2", "--output", str(out / name / "harsh")], out / name / "harsh"
+    )
+    injected = _run_disturbed(
+        harsh, itertools.cycle(faults), options.every, random.Random(options.seed)
+    )
     if server is not None:
         injected += server.injected
     one, other = calm.units(), harsh.units()
@@ -112,10 +142,16 @@ def soak(
 
 def _plain(record: dict[str, Any]) -> dict[str, Any]:
     """Return what must be equal: all fields but times, attempts, faults and cached tokens."""
-    return {name: value for name, value in record.items() if name not in ("seconds", "attempt", "faults", "tokens")}
+    return {
+        name: value
+        for name, value in record.items()
+        if name not in ("seconds", "attempt", "faults", "tokens")
+    }
 
 
-def _run_disturbed(run: "_Run", faults: Iterator[str], every: int, draw: random.Random) -> Counter[str]:
+def _run_disturbed(
+    run: "_Run", faults: Iterator[str], every: int, draw: random.Random
+) -> Counter[str]:
     """Finish a run with a fault every `every` units; returns the injected faults."""
     injected: Counter[str] = Counter()
     threshold = every
@@ -149,7 +185,12 @@ class _Run:
     process: "subprocess.Popen[bytes] | None" = field(default=None)
 
     def start(self, more: str | None = None) -> None:
-        command = [Path(sys.executable).with_name("infthor-eval"), "run", *self.words, *([more] if more else [])]
+        command = [
+            Path(sys.executable).with_name("infthor-eval"),
+            "run",
+            *self.words,
+            *([more] if more else []),
+        ]
         self.output.mkdir(parents=True, exist_ok=True)
         with (self.output / "output.txt").open("ab") as log:
             self.process = subprocess.Popen(list(map(str, command)), stdout=log, stderr=log)
@@ -186,7 +227,9 @@ class _Run:
             for line in path.read_bytes().splitlines():
                 record = json.loads(line)
                 key = (record.get("task", ""), record.get("id", ""), record.get("variant", ""))
-                if record["type"] == "unit" and record.get("attempt", 1) >= units.get(key, {}).get("attempt", 1):
+                if record["type"] == "unit" and record.get("attempt", 1) >= units.get(key, {}).get(
+                    "attempt", 1
+                ):
                     units[key] = record
         return units
 
@@ -198,7 +241,7 @@ class _Run:
     def kill(self, kind: str, draw: random.Random) -> bool:
         """Kill a worker of the run, or a simulator."""
         assert self.process is not None
-        mark = {"worker": b"multiprocessing.spawn", "simulator": b"infthor_eval.sim"}[kind]
+        mark = {"worker": b"multiprocessing.spawn", "simulator": b"infthor_sim"}[kind]
         pids = [pid for pid in _descendants(self.process.pid) if mark in _command(pid)]
         if not pids:
             return False
@@ -316,8 +359,16 @@ class _Server:
             return
         drawn = hashlib.sha256(body).digest()
         text = ("yes", "no", "Fridge", "CounterTop", "2", "Mug")[drawn[0] % 6]
-        choice = {"index": 0, "message": {"role": "assistant", "content": text}, "finish_reason": "stop"}
-        usage = {"prompt_tokens": len(body) // 1000, "completion_tokens": 2, "total_tokens": len(body) // 1000 + 2}
+        choice = {
+            "index": 0,
+            "message": {"role": "assistant", "content": text},
+            "finish_reason": "stop",
+        }
+        usage = {
+            "prompt_tokens": len(body) // 1000,
+            "completion_tokens": 2,
+            "total_tokens": len(body) // 1000 + 2,
+        }
         reply = {"id": "c", "object": "chat.completion", "created": 0, "model": "m"}
         self._send(handler, 200, reply | {"choices": [choice], "usage": usage})
 

@@ -38,7 +38,7 @@ _COMMANDS: dict[str, tuple[str, ...]] = {
     "ls tasks": ("ls", "tasks"),
     "show": ("show",),
 }
-_ANSWERING = "infthor_eval.nieh.answering"
+_ANSWERING = "infthor_eval.nieh.asking.answering"
 
 
 class _Stopwatch(MetaPathFinder, Loader):
@@ -47,7 +47,9 @@ class _Stopwatch(MetaPathFinder, Loader):
     def __init__(self) -> None:
         self.times: dict[str, tuple[float, float]] = {}
 
-    def find_spec(self, name: str, path: Any, target: ModuleType | None = None) -> ModuleSpec | None:
+    def find_spec(
+        self, name: str, path: Any, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
         """Take over the import of the answerers' module."""
         if name != _ANSWERING:
             return None
@@ -122,7 +124,9 @@ def measure(checkout: Path, name: str, output: Path, shown: Path) -> dict[str, f
 
 def compare(checkouts: dict[str, Path], names: list[str], rounds: int) -> dict[str, Any]:
     """Return the medians of each command and checkout; all are run by turns."""
-    taken: dict[str, dict[str, list[dict[str, float]]]] = {name: {at: [] for at in checkouts} for name in names}
+    taken: dict[str, dict[str, list[dict[str, float]]]] = {
+        name: {at: [] for at in checkouts} for name in names
+    }
     with tempfile.TemporaryDirectory() as folder:
         output, shown = Path(folder), Path(folder, "shown")
         subprocess.run(
@@ -138,7 +142,10 @@ def compare(checkouts: dict[str, Path], names: list[str], rounds: int) -> dict[s
                         taken[name][at].append(times)
     return {
         name: {
-            at: {event: round(statistics.median(times[event] for times in all_times), 2) for event in all_times[0]}
+            at: {
+                event: round(statistics.median(times[event] for times in all_times), 2)
+                for event in all_times[0]
+            }
             for at, all_times in by_checkout.items()
         }
         for name, by_checkout in taken.items()
@@ -147,10 +154,14 @@ def compare(checkouts: dict[str, Path], names: list[str], rounds: int) -> dict[s
 
 def main() -> None:
     """Measure all commands."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--against", type=Path, metavar="CHECKOUT")
-    parser.add_argument("--only", nargs="+", choices=_COMMANDS, default=list(_COMMANDS), metavar="NAME")
+    parser.add_argument(
+        "--only", nargs="+", choices=_COMMANDS, default=list(_COMMANDS), metavar="NAME"
+    )
     given = parser.parse_args()
     checkouts = {"this": Path(__file__).parents[1]}
     if given.against:

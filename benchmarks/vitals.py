@@ -80,7 +80,10 @@ class Outcome(msgspec.Struct):
         """Whether it is farther from its committed value than noise takes it, or could not be measured."""
         if self.now is None:
             return bool(self.problem)
-        return self.figure.value is None or abs(self.now - self.figure.value) > self.figure.noise + 1e-9
+        return (
+            self.figure.value is None
+            or abs(self.now - self.figure.value) > self.figure.noise + 1e-9
+        )
 
     def line(self) -> str:
         """Return its line of the table."""
@@ -140,7 +143,11 @@ def measure_all(measurements: Sequence[Measurement], data: Path | None) -> Itera
 def commit(outcomes: Iterable[Outcome], why: str) -> None:
     """Set the values that have moved to what was measured now."""
     revision = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, check=True, capture_output=True, text=True
+        ["git", "rev-parse", "--short", "HEAD"],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
     ).stdout.strip()
     for outcome in outcomes:
         if outcome.now is not None and outcome.has_moved:
@@ -151,7 +158,11 @@ def commit(outcomes: Iterable[Outcome], why: str) -> None:
 
 def _words(command: Sequence[str], folders: dict[str, str]) -> list[str]:
     """Return a command as it is run: by this environment's programs, and with folders for the names of such."""
-    program = sys.executable if command[0] == "python" else str(Path(sys.executable).with_name(command[0]))
+    program = (
+        sys.executable
+        if command[0] == "python"
+        else str(Path(sys.executable).with_name(command[0]))
+    )
     return [program, *(folders.get(word, word) for word in command[1:])]
 
 
@@ -164,7 +175,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, help="folder of recorded data")
     parser.add_argument("--only", nargs="+", help="figures whose name has one of these words")
-    parser.add_argument("--commit", metavar="WHY", help="write the values that have moved into vitals.json")
+    parser.add_argument(
+        "--commit", metavar="WHY", help="write the values that have moved into vitals.json"
+    )
     parser.add_argument("--file", type=Path, default=FILE, help=argparse.SUPPRESS)
     options = parser.parse_args()
     measurements = msgspec.json.decode(options.file.read_bytes(), type=list[Measurement])
@@ -177,10 +190,14 @@ def main() -> int:
         print(outcome.line(), flush=True)
     if options.commit:
         commit(outcomes, options.commit)
-        options.file.write_bytes(msgspec.json.format(msgspec.json.encode(measurements), indent=1) + b"\n")
+        options.file.write_bytes(
+            msgspec.json.format(msgspec.json.encode(measurements), indent=1) + b"\n"
+        )
     moved = sum(outcome.has_moved for outcome in outcomes)
     if moved:
-        print(f"{moved} moved: mend the change, or, if it is meant so: python benchmarks/vitals.py --commit WHY")
+        print(
+            f"{moved} moved: mend the change, or, if it is meant so: python benchmarks/vitals.py --commit WHY"
+        )
     return 1 if moved and not options.commit else 0
 
 

@@ -40,10 +40,18 @@ def _all(parent: click.Context) -> Iterator[click.Context]:
 def _section(context: click.Context) -> str:
     command = context.command
     usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
-    rows = [record for option in command.get_params(context) if (record := option.get_help_record(context))]
+    rows = [
+        record
+        for option in command.get_params(context)
+        if (record := option.get_help_record(context))
+    ]
     table = [f"| `{names}` | {_cell(help_text)} |" for names, help_text in rows]
     text = inspect.cleandoc(command.help or "")
-    example = ["```", command.example, "```", ""] if isinstance(command, ExampleCommand | ExampleGroup) else []
+    example = (
+        ["```", command.example, "```", ""]
+        if isinstance(command, ExampleCommand | ExampleGroup)
+        else []
+    )
     head = [f"## {context.command_path}", *example, f"`{usage}`", "", text, ""]
     return "\n".join([*head, "| option | |", "|---|---|", *table])
 

@@ -37,7 +37,9 @@ def on_files(files: Any, config: Any) -> Any:
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     """Turn links between files of the repository into links between pages of the site."""
     place = page.file.src_uri
-    source = next((source for source, target in _OUTSIDE.items() if target == place), f"{_DOCS}{place}")
+    source = next(
+        (source for source, target in _OUTSIDE.items() if target == place), f"{_DOCS}{place}"
+    )
     return _LINK.sub(lambda link: _in_site(link[1], source, place), markdown)
 
 

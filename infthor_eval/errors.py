@@ -26,8 +26,14 @@ __all__ = [
 ]
 
 _LONGEST = 200  # characters of another library's message
-_LONGEST_MESSAGE, _HEAD, _TAIL = 1000, 650, 300  # characters of a message of ours, and of its ends if it is longer
-_LINE_BREAKS = {ord(letter): repr(letter)[1:-1] for letter in "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"}
+_LONGEST_MESSAGE, _HEAD, _TAIL = (
+    1000,
+    650,
+    300,
+)  # characters of a message of ours, and of its ends if it is longer
+_LINE_BREAKS = {
+    ord(letter): repr(letter)[1:-1] for letter in "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
+}
 
 
 class InfthorError(Exception):
@@ -41,7 +47,9 @@ class InfthorError(Exception):
 
     def __init__(self, message: str) -> None:
         line = message.translate(_LINE_BREAKS)
-        super().__init__(line if len(line) <= _LONGEST_MESSAGE else f"{line[:_HEAD]} [...] {line[-_TAIL:]}")
+        super().__init__(
+            line if len(line) <= _LONGEST_MESSAGE else f"{line[:_HEAD]} [...] {line[-_TAIL:]}"
+        )
 
 
 class UsageError(InfthorError):

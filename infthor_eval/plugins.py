@@ -62,10 +62,15 @@ class PluginTable:
             raise UsageError(f"{problem} ({in_one_line(error)}); {hint}") from error
         except Exception as error:  # its module is anybody's code
             raise UsageError(f"{problem} ({describe_exception(error)}); {hint}") from error
-        members = [*protocol.__annotations__, *(member for member in vars(protocol) if not member.startswith("_"))]
+        members = [
+            *protocol.__annotations__,
+            *(member for member in vars(protocol) if not member.startswith("_")),
+        ]
         missing = [member for member in members if not hasattr(loaded, member)]
         if missing:
-            raise UsageError(f"the {self.kind} {name} of another package lacks {', '.join(missing)}; see {self.docs}")
+            raise UsageError(
+                f"the {self.kind} {name} of another package lacks {', '.join(missing)}; see {self.docs}"
+            )
         return loaded
 
 

@@ -13,7 +13,14 @@ from infthor_eval.tables import TableCell, interval_cell
 if TYPE_CHECKING:
     from infthor_eval.statistics import MeanEstimate
 
-__all__ = ["Rate", "clustered_rate", "format_number", "format_percent", "paired_rate", "rate_over_clusters"]
+__all__ = [
+    "Rate",
+    "clustered_rate",
+    "format_number",
+    "format_percent",
+    "paired_rate",
+    "rate_over_clusters",
+]
 
 
 class Rate(msgspec.Struct, frozen=True):
@@ -39,7 +46,9 @@ def rate_over_clusters(values: Sequence[float]) -> Rate | None:
     return _rate(mean_over_clusters(values)) if values else None
 
 
-def paired_rate(first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]) -> Rate | None:
+def paired_rate(
+    first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]
+) -> Rate | None:
     """Return the mean difference of paired values, second minus first (see `paired_difference`); None without any."""
     from infthor_eval.statistics import paired_difference
 

@@ -29,5 +29,7 @@ def _merge(reasons: list[str]) -> str:
 
 
 def _range(numbers: tuple[str, ...]) -> str:
-    least, most = (choose(numbers, key=lambda text: float(text.replace(",", ""))) for choose in (min, max))
+    least, most = (
+        choose(numbers, key=lambda text: float(text.replace(",", ""))) for choose in (min, max)
+    )
     return least if least == most else f"{least} to {most}"

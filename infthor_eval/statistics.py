@@ -157,33 +157,45 @@ def bootstrap_interval(
     return float(low), float(high)
 
 
-def paired_difference(first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]) -> Difference:
+def paired_difference(
+    first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]
+) -> Difference:
     """Return the mean difference of the scores of two runs on the same questions in the same order, second minus first.
 
     Raises:
         DataError: the runs differ in length, or as in `clustered_mean`.
     """
     if len(first) != len(second):
-        raise DataError(f"{len(first)} and {len(second)} scores cannot be paired; compare runs on the same questions")
+        raise DataError(
+            f"{len(first)} and {len(second)} scores cannot be paired; compare runs on the same questions"
+        )
     totals, sizes = _partition([b - a for a, b in zip(first, second, strict=True)], clusters)
     estimate = _with_t_interval(totals, sizes)
     if estimate.stderr is None:
         return Difference(estimate, None)
-    if estimate.stderr == 0:  # every question differs by the same amount: either by nothing, or never by chance
+    if (
+        estimate.stderr == 0
+    ):  # every question differs by the same amount: either by nothing, or never by chance
         return Difference(estimate, 1.0 if estimate.mean == 0 else 0.0)
     t = abs(estimate.mean / estimate.stderr)
     return Difference(estimate, float(2 * scipy.special.stdtr(estimate.n_clusters - 1, -t)))
 
 
-def _partition(scores: Sequence[float], clusters: Sequence[Hashable]) -> tuple[np.ndarray, np.ndarray]:
+def _partition(
+    scores: Sequence[float], clusters: Sequence[Hashable]
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the sum of scores and the number of questions per cluster, from which all else here is computed."""
     if not scores:
         raise DataError("there is no score to take the mean of")
     if len(scores) != len(clusters):
-        raise DataError(f"{len(scores)} scores but {len(clusters)} trajectories; each score needs its trajectory")
+        raise DataError(
+            f"{len(scores)} scores but {len(clusters)} trajectories; each score needs its trajectory"
+        )
     for index, cluster in enumerate(clusters):
         if cluster is None or cluster == "":
             raise DataError(f"score {index} has no trajectory; intervals cluster by it")
     indices = {cluster: index for index, cluster in enumerate(dict.fromkeys(clusters))}
     cluster_of = np.array([indices[cluster] for cluster in clusters])
-    return np.bincount(cluster_of, weights=np.asarray(scores, dtype=float)), np.bincount(cluster_of).astype(float)
+    return np.bincount(cluster_of, weights=np.asarray(scores, dtype=float)), np.bincount(
+        cluster_of
+    ).astype(float)

@@ -26,7 +26,9 @@ if TYPE_CHECKING:
     from infthor_eval.runs import Suite, TaskFile
 
     # mypy holds the built-in suites to the protocol here: `find_suite`, which imports them by name, cannot.
-    _PROTOCOL: tuple[Suite[NiehUnit, NiehAnswer], Suite[ArmUnit, ArmRecord], Suite[PlanUnit, PlanRecord]]
+    _PROTOCOL: tuple[
+        Suite[NiehUnit, NiehAnswer], Suite[ArmUnit, ArmRecord], Suite[PlanUnit, PlanRecord]
+    ]
     _PROTOCOL = NiehSuite(), ManipulationSuite(), PlansSuite()
 
 __all__ = [
@@ -75,12 +77,20 @@ _BUILT_IN = {
     ),
 }
 _DOCS = "docs/own-tasks.md"
-_SUITES = PluginTable("suite", "infthor_eval.suites", {name: item.suite for name, item in _BUILT_IN.items()}, _DOCS)
+_SUITES = PluginTable(
+    "suite", "infthor_eval.suites", {name: item.suite for name, item in _BUILT_IN.items()}, _DOCS
+)
 _PRESENTERS = PluginTable(
-    "presenter", "infthor_eval.presenters", {name: item.presenter for name, item in _BUILT_IN.items()}, _DOCS
+    "presenter",
+    "infthor_eval.presenters",
+    {name: item.presenter for name, item in _BUILT_IN.items()},
+    _DOCS,
 )
 _REQUESTS = PluginTable(
-    "lm-eval adapter of suite", "infthor_eval.lm_eval", {name: item.requests for name, item in _BUILT_IN.items()}, _DOCS
+    "lm-eval adapter of suite",
+    "infthor_eval.lm_eval",
+    {name: item.requests for name, item in _BUILT_IN.items()},
+    _DOCS,
 )
 
 
@@ -99,7 +109,9 @@ def find_suite(name: str) -> "Suite[Any, Any]":
 
     suite_class = _SUITES.load(name, Suite)
     if suite_class.name != name:
-        raise UsageError(f"the suite {name} of another package calls itself {suite_class.name!r}; give it one name")
+        raise UsageError(
+            f"the suite {name} of another package calls itself {suite_class.name!r}; give it one name"
+        )
     return suite_class()
 
 
@@ -150,7 +162,9 @@ def baseline_suites() -> dict[str, tuple[str, ...]]:
     """Return the suites of each baseline, by its name."""
     suites: dict[str, tuple[str, ...]] = {}
     for name in suite_names():
-        for baseline in _BUILT_IN[name].baselines if name in _BUILT_IN else find_suite(name).baselines:
+        for baseline in (
+            _BUILT_IN[name].baselines if name in _BUILT_IN else find_suite(name).baselines
+        ):
             suites[baseline] = (*suites.get(baseline, ()), name)
     return suites
 

@@ -29,7 +29,9 @@ class TableCell(str):
         return cell
 
 
-def interval_cell(low: float | None, high: float | None, form: str = ".1f", pattern: str = "[{}, {}]") -> TableCell:
+def interval_cell(
+    low: float | None, high: float | None, form: str = ".1f", pattern: str = "[{}, {}]"
+) -> TableCell:
     """Return a cell with an interval, its ends formatted and in the places of the pattern; `-` if there is none."""
     if low is None or high is None:
         return TableCell("-", {"low": "", "high": ""})
@@ -78,7 +80,13 @@ def left_out_notes(runs: Sequence[Sequence[tuple[Reasons, Reasons]]]) -> list[st
     reasons: Counter[str] = Counter()
     for tasks in runs:
         excluded = sum((Counter(of_task) for of_task, _ in tasks), Counter[str]())
-        reasons |= excluded | Counter({reason: n for _, skipped in tasks for reason, n in skipped.items()})
+        reasons |= excluded | Counter(
+            {reason: n for _, skipped in tasks for reason, n in skipped.items()}
+        )
     counts = sorted(reasons.items())
-    more = [f"{len(counts) - _N_REASONS} more reasons to leave out"] if len(counts) > _N_REASONS else []
+    more = (
+        [f"{len(counts) - _N_REASONS} more reasons to leave out"]
+        if len(counts) > _N_REASONS
+        else []
+    )
     return [f"{n} left out: {reason}" for reason, n in counts[:_N_REASONS]] + more

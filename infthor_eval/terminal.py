@@ -12,10 +12,24 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-__all__ = ["PlainConsole", "console", "error_console", "print_error", "print_line", "printable", "progress_bar"]
+__all__ = [
+    "PlainConsole",
+    "console",
+    "error_console",
+    "print_error",
+    "print_line",
+    "printable",
+    "progress_bar",
+]
 
 _KEPT = "\n\t"
-_HIDDEN = {"Cc", "Cf", "Cs", "Zl", "Zp"}  # control, reordering or hiding, lone surrogates, line separators
+_HIDDEN = {
+    "Cc",
+    "Cf",
+    "Cs",
+    "Zl",
+    "Zp",
+}  # control, reordering or hiding, lone surrogates, line separators
 
 
 def printable(text: str) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import ModelError
-from infthor_eval.formats.digests import digest_of_file, fingerprint
+from infthor_eval.storage.digests import digest_of_file, fingerprint
 
 __all__ = ["package_identity"]
 
@@ -25,7 +25,9 @@ def package_identity(point: EntryPoint) -> dict[str, Any]:
     try:
         source = fingerprint({name: digest_of_file(path) for name, path in _source_files(package)})
     except (OSError, ValueError) as error:
-        raise ModelError(f"{point.name}: the source of {package} cannot be read ({error})") from error
+        raise ModelError(
+            f"{point.name}: the source of {package} cannot be read ({error})"
+        ) from error
     return {
         "package": point.dist.name if point.dist else package,
         "version": point.dist.version if point.dist else None,

@@ -14,7 +14,11 @@ def server_address(option: str, url: str) -> SplitResult:
     """
     try:
         parts = urlsplit(url)
-        is_valid = parts.scheme in ("http", "https") and bool(parts.hostname) and (parts.port is None or parts.port > 0)
+        is_valid = (
+            parts.scheme in ("http", "https")
+            and bool(parts.hostname)
+            and (parts.port is None or parts.port > 0)
+        )
     except ValueError:  # not chained: its text would repeat what may be a password
         is_valid = False
     if not is_valid:

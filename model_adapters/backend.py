@@ -30,7 +30,9 @@ class Backend(Protocol):
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         """Answer a conversation; see `Conversation.reply`."""
 
-    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+    def answer_each(
+        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
+    ) -> list[Reply]:
         """Answer several conversations independently; see `Conversation.replies`."""
 
 
@@ -59,7 +61,9 @@ class BackendConversation(Transcript):
     def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
         """Return the replies to several continuations; see `Conversation.replies`."""
         check_decoding(self._backend.name, self._backend.capabilities, decoding)
-        return self._backend.answer_each([self._checked_turns(parts) for parts in continuations], decoding)
+        return self._backend.answer_each(
+            [self._checked_turns(parts) for parts in continuations], decoding
+        )
 
     def _checked_turns(self, continuation: Sequence[Part] = ()) -> tuple[Turn, ...]:
         turns = self.turns_with(continuation)

@@ -35,14 +35,24 @@ def _locate(adapter: str, options: str, description: str = "") -> BuiltIn:
 
 
 BUILT_IN = {
-    "deepseek-vl": _locate("hf.families.deepseek_vl:DeepseekVL", "options.families:DeepseekVLOptions"),
-    "deepseek-vl-tiny": _locate("tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM),
+    "deepseek-vl": _locate(
+        "hf.families.deepseek_vl:DeepseekVL", "options.families:DeepseekVLOptions"
+    ),
+    "deepseek-vl-tiny": _locate(
+        "tiny.deepseek_vl:DeepseekVLTiny", "options.tiny:TinyOptions", _RANDOM
+    ),
     "hf-vlm": _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions"),
     "hf-vlm@vllm": _locate("vllm.adapter:HfVlmOnVllm", "vllm.options:HfVlmOnVllmOptions"),
     "human": _locate("human.adapter:Human", "human.options:HumanOptions", _PERSON),
-    "llava-onevision": _locate("hf.families.llava_onevision:LlavaOnevision", "options.families:LlavaOnevisionOptions"),
-    "llava-onevision@vllm": _locate("vllm.adapter:LlavaOnevisionOnVllm", "vllm.options:LlavaOnevisionOnVllmOptions"),
-    "llava-onevision-tiny": _locate("tiny.llava_onevision:LlavaOnevisionTiny", "options.tiny:TinyOptions", _RANDOM),
+    "llava-onevision": _locate(
+        "hf.families.llava_onevision:LlavaOnevision", "options.families:LlavaOnevisionOptions"
+    ),
+    "llava-onevision@vllm": _locate(
+        "vllm.adapter:LlavaOnevisionOnVllm", "vllm.options:LlavaOnevisionOnVllmOptions"
+    ),
+    "llava-onevision-tiny": _locate(
+        "tiny.llava_onevision:LlavaOnevisionTiny", "options.tiny:TinyOptions", _RANDOM
+    ),
     "openai": _locate("openai.adapter:OpenAI", "openai.options:OpenAIOptions"),
     "openvla": _locate("policies.openvla.adapter:OpenVLA", "options.policies:OpenVLAOptions"),
     "openvla@vllm": _locate("vllm.openvla:OpenVLAOnVllm", "vllm.options:OpenVLAOnVllmOptions"),
@@ -52,9 +62,17 @@ BUILT_IN = {
     "pixtral-tiny": _locate("tiny.pixtral:PixtralTiny", "options.tiny:TinyOptions", _RANDOM),
     "qwen2.5-vl": _locate("hf.families.qwen2_5_vl:Qwen25VL", "options.families:Qwen25VLOptions"),
     "qwen2.5-vl@vllm": _locate("vllm.adapter:Qwen25VLOnVllm", "vllm.options:Qwen25VLOnVllmOptions"),
-    "qwen2.5-vl-nano": _locate("tiny.qwen2_5_vl_nano:Qwen25VLNano", "options.families:Qwen25VLNanoOptions", _NANO),
-    "qwen2.5-vl-tiny": _locate("tiny.qwen2_5_vl:Qwen25VLTiny", "options.tiny:Qwen25VLTinyOptions", _RANDOM),
-    "spatialvla": _locate("policies.spatialvla.adapter:SpatialVLA", "options.policies:SpatialVLACheckpointOptions"),
-    "spatialvla-tiny": _locate("tiny.spatialvla:SpatialVLATiny", "options.tiny:SpatialVLATinyOptions", _RANDOM),
+    "qwen2.5-vl-nano": _locate(
+        "tiny.qwen2_5_vl_nano:Qwen25VLNano", "options.families:Qwen25VLNanoOptions", _NANO
+    ),
+    "qwen2.5-vl-tiny": _locate(
+        "tiny.qwen2_5_vl:Qwen25VLTiny", "options.tiny:Qwen25VLTinyOptions", _RANDOM
+    ),
+    "spatialvla": _locate(
+        "policies.spatialvla.adapter:SpatialVLA", "options.policies:SpatialVLACheckpointOptions"
+    ),
+    "spatialvla-tiny": _locate(
+        "tiny.spatialvla:SpatialVLATiny", "options.tiny:SpatialVLATinyOptions", _RANDOM
+    ),
     "vla-http": _locate("policies.http.adapter:VlaHttp", "options.policies:VlaHttpOptions"),
 }

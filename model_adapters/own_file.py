@@ -8,8 +8,8 @@ from types import ModuleType
 from typing import Any
 
 from infthor_eval.errors import ModelError, wrap_errors
-from infthor_eval.formats.digests import digest
 from infthor_eval.plugins import collecting_no_garbage
+from infthor_eval.storage.digests import digest
 
 __all__ = ["file_identity", "load_from_file", "name_in_file", "names_a_file"]
 
@@ -40,7 +40,9 @@ def load_from_file(name: str, kind: str = "class") -> Any:
     module = _module(path, _source(path))
     found = getattr(module, name_in_file(name), None)
     if found is None:
-        raise ModelError(f"{path} has no {kind} {name_in_file(name)}; write FILE.py:NAME with a {kind} in it")
+        raise ModelError(
+            f"{path} has no {kind} {name_in_file(name)}; write FILE.py:NAME with a {kind} in it"
+        )
     return found
 
 
@@ -57,7 +59,9 @@ def file_identity(name: str) -> dict[str, Any]:
 def _path(name: str) -> Path:
     path = Path(name.rpartition(":")[0]).resolve()
     if not path.is_file():
-        raise ModelError(f"{path}: there is no such file; write FILE.py:NAME with a file of your own")
+        raise ModelError(
+            f"{path}: there is no such file; write FILE.py:NAME with a file of your own"
+        )
     return path
 
 
@@ -73,7 +77,9 @@ def _module(path: Path, source: bytes) -> ModuleType:
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses resolve annotations through it
     with (
-        wrap_errors(f"{path}: fails when it is imported", "fix it", catch=Exception, raise_as=ModelError),
+        wrap_errors(
+            f"{path}: fails when it is imported", "fix it", catch=Exception, raise_as=ModelError
+        ),
         collecting_no_garbage(),
     ):
         exec(compile(source, path, "exec"), vars(module))

@@ -83,7 +83,9 @@ class Decoding:
         if self.repetition_penalty is not None and not 0 < self.repetition_penalty < float("inf"):
             raise UsageError(f"repetition_penalty must be above 0, not {self.repetition_penalty}")
         if "" in self.stop or "" in self.choices:
-            raise UsageError("an empty text can neither stop a reply nor be one of its choices; leave it out")
+            raise UsageError(
+                "an empty text can neither stop a reply nor be one of its choices; leave it out"
+            )
 
     @property
     def greedy(self) -> bool:
@@ -93,7 +95,10 @@ class Decoding:
     def document(self) -> dict[str, Any]:
         """Return all settings as JSON values, for fingerprints; a penalty that is the checkpoint's own is left out."""
         given = {name: value for name, value in asdict(self).items() if value is not None}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in given.items()}
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in given.items()
+        }
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,9 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
             f"{name} decodes greedily only, not at temperature {decoding.temperature}; ask at temperature 0"
         )
     if decoding.choices and not capabilities.choices:
-        raise ModelError(f"{name} does not support choices ({len(decoding.choices)} given); ask without choices")
+        raise ModelError(
+            f"{name} does not support choices ({len(decoding.choices)} given); ask without choices"
+        )
 
 
 def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) -> None:
@@ -33,7 +35,9 @@ def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) ->
     if not turns or turns[-1].role != "user":
         state = f"the last turn is the {turns[-1].role}'s" if turns else "the conversation is empty"
         raise ModelError(f"{name} has nothing to reply to: {state}; append a user turn")
-    if not capabilities.video_input and any(isinstance(part, Video) for turn in turns for part in turn.parts):
+    if not capabilities.video_input and any(
+        isinstance(part, Video) for turn in turns for part in turn.parts
+    ):
         raise ModelError(f"{name} has no video input; give it the video's frames as images")
 
 
@@ -54,7 +58,9 @@ def wrap_adapter_errors(problem: str) -> Iterator[None]:
     except InfthorError:
         raise
     except Exception as error:  # an adapter may be anybody's code and raise anything
-        raise AdapterError(f"{problem} ({describe_exception(error)}); fix the adapter, or report it") from error
+        raise AdapterError(
+            f"{problem} ({describe_exception(error)}); fix the adapter, or report it"
+        ) from error
 
 
 def wrap_request_errors(name: str) -> AbstractContextManager[None]:

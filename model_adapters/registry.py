@@ -69,7 +69,9 @@ def name_on_engine(name: str, engine: str) -> str:
         raise UsageError(f"{name} names its engine, and it is not {engine}; leave one of them out")
     if engine == _TRANSFORMERS:
         return name
-    supported = [known.removesuffix(f"@{engine}") for known in names() if known.endswith(f"@{engine}")]
+    supported = [
+        known.removesuffix(f"@{engine}") for known in names() if known.endswith(f"@{engine}")
+    ]
     if model not in supported:
         raise UsageError(f"{model} does not run on {engine}; these do: {', '.join(supported)}")
     return f"{model}@{engine}"
@@ -176,7 +178,9 @@ def label(name: str, options: Mapping[str, str]) -> str:
     if not checkpoint:
         return _as_component(name)
     revision = options.get("revision")
-    return _as_component(_last_component(checkpoint) + (f"@{revision}" if revision else "")) or _as_component(name)
+    return _as_component(
+        _last_component(checkpoint) + (f"@{revision}" if revision else "")
+    ) or _as_component(name)
 
 
 def _last_component(pretrained: str) -> str:

@@ -26,7 +26,11 @@ MARKERS = {
 }
 _IN_WORDS = {"Here is my response:"}  # which may be a part of any answer
 # Around the answer behind the thoughts (GLM-4.1V, Hunyuan, models trained like R1).
-_WRAPPERS = (("<answer>", "</answer>"), ("<response>", "</response>"), ("<|begin_of_box|>", "<|end_of_box|>"))
+_WRAPPERS = (
+    ("<answer>", "</answer>"),
+    ("<response>", "</response>"),
+    ("<|begin_of_box|>", "<|end_of_box|>"),
+)
 
 
 class Thought(NamedTuple):
@@ -72,7 +76,9 @@ def _without(thinking: str, before: str) -> str:
 def _unwrapped(answer: str) -> str:
     """Return what stands between the markers of an answer, if there are any."""
     for before, behind in _WRAPPERS:
-        found = re.search(f"{re.escape(before)}(.*?)(?:{re.escape(behind)}|$)", answer, flags=re.DOTALL)
+        found = re.search(
+            f"{re.escape(before)}(.*?)(?:{re.escape(behind)}|$)", answer, flags=re.DOTALL
+        )
         if found is not None:
             return found[1].strip()
     return answer

@@ -58,11 +58,15 @@ class Transcript:
             ValueError: the mark belongs to another conversation, or to a part that was dropped by a rewind.
         """
         if mark not in self._marks:
-            raise ValueError("the mark belongs to another conversation or to a part that was rewound")
+            raise ValueError(
+                "the mark belongs to another conversation or to a part that was rewound"
+            )
         del self._items[mark.n_parts :]
         del self._marks[self._marks.index(mark) + 1 :]
 
-    def replies(self: Conversation, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+    def replies(
+        self: Conversation, continuations: Sequence[Sequence[Part]], decoding: Decoding
+    ) -> list[Reply]:
         """Append, reply and rewind, one continuation after the other; see `Conversation.replies`."""
         here = self.mark()
         replies = []

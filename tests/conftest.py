@@ -31,7 +31,13 @@ hypothesis.settings.load_profile("unhurried")
 
 QUESTIONS = (
     Question("traj_a", "Is there a mug?", (1,), ("yes",), "object_presence"),
-    Question("traj_a", "Where was the mug before you put it?", (1, 3), ("CounterTop",), "object_location_tracing"),
+    Question(
+        "traj_a",
+        "Where was the mug before you put it?",
+        (1, 3),
+        ("CounterTop",),
+        "object_location_tracing",
+    ),
     Question("traj_a", "What did you put on the table?", (0, 2, 4), ("Mug", "Plate"), "put_action"),
     Question("traj_b", "Is there a fridge?", (2,), ("no",), "object_presence"),
     Question("traj_b", "Is there a sink?", (0,), ("no",), "object_presence"),
@@ -56,7 +62,12 @@ def no_published_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def make_nieh_set(tmp_path: Path) -> Callable[..., Path]:
     """Writes an NIEH set of plain-coloured frames and returns its folder."""
 
-    def make(questions: Sequence[Question] = QUESTIONS, n_frames: int = 6, size: int = 300, name: str = "set") -> Path:
+    def make(
+        questions: Sequence[Question] = QUESTIONS,
+        n_frames: int = 6,
+        size: int = 300,
+        name: str = "set",
+    ) -> Path:
         root = tmp_path / name
         for number, traj_id in enumerate(sorted({question.traj_id for question in questions})):
             images = root / "metadata" / traj_id / "img"
@@ -66,7 +77,9 @@ def make_nieh_set(tmp_path: Path) -> Callable[..., Path]:
                 filename = f"{index:09d}.png"
                 shade = (40 * index % 256, 90 * number % 256, (17 * index + 60) % 256)
                 Image.new("RGB", (size, size), shade).save(images / filename)
-                entries.append({"img_idx": index, "img_filename": filename, "step": index, "object_log": {}})
+                entries.append(
+                    {"img_idx": index, "img_filename": filename, "step": index, "object_log": {}}
+                )
             (root / "metadata" / traj_id / "metadata.json").write_text(json.dumps(entries))
         write_questions(root / "qa_set_test.csv", questions)
         return root
@@ -96,7 +109,16 @@ def scripted_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def scripted_run(tmp_path_factory: pytest.TempPathFactory, scripted_data: Path) -> Path:
     """The folder of a run of plans: the baseline `scripted` in one trajectory."""
     output = tmp_path_factory.mktemp("scripted")
-    words = ("--model", "scripted", "--tasks", "infthor_plans", "--data", scripted_data, "--output", output)
+    words = (
+        "--model",
+        "scripted",
+        "--tasks",
+        "infthor_plans",
+        "--data",
+        scripted_data,
+        "--output",
+        output,
+    )
     with pytest.raises(SystemExit) as ended:
         main([str(word) for word in words])
     assert ended.value.code == 0
@@ -127,14 +149,26 @@ def make_clip(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
 
         folder = tmp_path_factory.mktemp("clip")
         begin, end = "<|startoftext|>", "<|endoftext|>"
-        tokenizer = train_tokenizer([begin, end], begin=begin, end=end, pad=end, named={}, n_merged=300)
+        tokenizer = train_tokenizer(
+            [begin, end], begin=begin, end=end, pad=end, named={}, n_merged=300
+        )
         tokenizer.backend_tokenizer.post_processor = TemplateProcessing(
             single=f"{begin} $A {end}", special_tokens=[(begin, 300), (end, 301)]
         )
         tokenizer.save_pretrained(folder)
         CLIPImageProcessorPil(size={"shortest_edge": 32}, crop_size=32).save_pretrained(folder)
-        tower = {"hidden_size": 32, "intermediate_size": 64, "num_hidden_layers": 2, "num_attention_heads": 2}
-        ids = {"bos_token_id": 300, "eos_token_id": 301, "pad_token_id": 301, "max_position_embeddings": 77}
+        tower = {
+            "hidden_size": 32,
+            "intermediate_size": 64,
+            "num_hidden_layers": 2,
+            "num_attention_heads": 2,
+        }
+        ids = {
+            "bos_token_id": 300,
+            "eos_token_id": 301,
+            "pad_token_id": 301,
+            "max_position_embeddings": 77,
+        }
         config = CLIPConfig(
             text_config={**tower, **ids, "vocab_size": len(tokenizer)},
             vision_config={**tower, "image_size": 32, "patch_size": 8},

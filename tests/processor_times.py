@@ -25,23 +25,23 @@ KEPT = (
     "tests/nieh/test_suite.py::test_the_tiny_model_runs_through_and_shares_prefixes",
     "tests/model_adapters/hf/test_conversation.py::test_sharing_changes_no_reply",
     "tests/manipulation/test_episodes.py::test_the_planner_picks_up_all_and_puts_nearly_all",
-    "tests/runs/test_driver.py::test_a_killed_command_goes_on_and_shows_progress_table_results_and_export",
+    "tests/runs/work/test_driver.py::test_a_killed_command_goes_on_and_shows_progress_table_results_and_export",
     "tests/docs/test_commands.py::test_the_commands_of_a_page_run_one_after_the_other[docs/tutorial.md-2]",
     "tests/test_statistics.py::test_the_interval_covers_the_truth_as_often_as_it_says",
     "tests/formats/test_qa_csv.py::test_what_is_written_is_read_back",
     "tests/docs/test_commands.py::test_the_commands_of_a_page_run_one_after_the_other[docs/own-models.md-0]",
-    "tests/runs/test_worker_executor.py::test_tracebacks_of_workers_are_kept_too",
+    "tests/runs/work/test_worker_executor.py::test_tracebacks_of_workers_are_kept_too",
     "tests/model_adapters/policies/test_adapters.py::test_the_twins_keep_the_contract[openvla-tiny]",
-    "tests/plans/test_models.py::test_the_experts_own_words_carry_every_plan_out",
-    "tests/nieh/test_notebook.py::test_a_note_is_what_the_model_says_to_its_window_alone",
+    "tests/plans/actors/test_model.py::test_the_experts_own_words_carry_every_plan_out",
+    "tests/nieh/asking/test_notebook.py::test_a_note_is_what_the_model_says_to_its_window_alone",
     "tests/training/test_fine_tuning.py::test_adapters_are_trained_and_merged",
     "tests/harness/test_host.py::test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own",
     "tests/cli/commands/test_data_commands.py::test_the_three_commands_make_a_set",
-    "tests/plans/test_planner.py::test_every_plan_is_carried_out[bedroom-2-seed7]",
+    "tests/plans/actors/test_planner.py::test_every_plan_is_carried_out[bedroom-2-seed7]",
     "tests/report/test_figures.py::test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each",
     "tests/report/web/test_browser.py::test_it_opens_without_errors_and_fetches_nothing",
     "tests/examples/test_sums.py::test_its_results_are_shown_and_exported",
-    "tests/runs/test_worker_executor.py::test_workers_that_are_killed_lose_nothing_that_was_finished",
+    "tests/runs/work/test_worker_executor.py::test_workers_that_are_killed_lose_nothing_that_was_finished",
 )
 _ROOT = Path(__file__).parents[1]
 _LIST = Path(__file__).with_name("slow_tests.txt")
@@ -88,7 +88,9 @@ def main() -> None:
     lines = [f"{seconds[test]:7.1f} {test}" for test in slow]
     _LIST.write_text(_HEAD.format(limit=LIMIT_S) + "\n".join(lines) + "\n")
     of_slow = sum(seconds[test] for test in slow)
-    print(f"{len(slow)} slow tests: {of_slow:.0f} s of processor time; others: {seconds.total() - of_slow:.0f} s")
+    print(
+        f"{len(slow)} slow tests: {of_slow:.0f} s of processor time; others: {seconds.total() - of_slow:.0f} s"
+    )
 
 
 if __name__ == "__main__":

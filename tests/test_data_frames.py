@@ -19,8 +19,8 @@ from infthor_eval.report.sample_table import ENVELOPE, encode_samples, sample_ta
 from infthor_eval.report.suites.episode_columns import ARM_COLUMNS, PLAN_COLUMNS
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.runs import RunHeader, UnitRecord
-from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.run_search import read_results
+from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.stored.search import read_results
 from infthor_eval.suites import find_presenter, find_suite
 from tests.nieh.made import identity, record
 
@@ -40,7 +40,18 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folders = {}
     for suite, (model, task, limit) in TASKS.items():
         with pytest.raises(SystemExit) as ended:
-            main(["--model", model, "--tasks", task, "--limit", limit, "--output", str(output / suite)])
+            main(
+                [
+                    "--model",
+                    model,
+                    "--tasks",
+                    task,
+                    "--limit",
+                    limit,
+                    "--output",
+                    str(output / suite),
+                ]
+            )
         assert ended.value.code == 0
         (folders[suite],) = (output / suite / model).iterdir()
     return folders
@@ -63,7 +74,9 @@ def test_the_means_of_a_frame_are_those_of_the_run(suite: str, runs: dict[str, P
 def test_numbers_are_numbers_and_texts_are_texts(suite: str, runs: dict[str, Path]) -> None:
     frame = infthor_eval.load_run(str(runs[suite]))
     for name, form, _ in (*ENVELOPE, *COLUMNS[suite]):
-        is_right = {str: pandas.api.types.is_string_dtype, bool: is_bool_dtype}.get(form, is_numeric_dtype)
+        is_right = {str: pandas.api.types.is_string_dtype, bool: is_bool_dtype}.get(
+            form, is_numeric_dtype
+        )
         assert is_right(frame[name]), name
     assert all(is_numeric_dtype(frame[name]) for name in frame if name.startswith("score_"))
     assert (frame["seconds"] > 0).any()
@@ -73,8 +86,17 @@ def test_every_column_is_documented() -> None:
     page = (ROOT / "docs/formats.md").read_text()
     documented = page[page.index("## Samples as a table") :]
     names = {column.name for columns in (ENVELOPE, *COLUMNS.values()) for column in columns}
-    guesses = {name for name in names if name.startswith(("guess_", "above_guessing_"))}  # one for each scorer
-    wanted = {"run", "suite", "score_METRIC", "guess_SCORER", "above_guessing_SCORER", *(names - guesses)}
+    guesses = {
+        name for name in names if name.startswith(("guess_", "above_guessing_"))
+    }  # one for each scorer
+    wanted = {
+        "run",
+        "suite",
+        "score_METRIC",
+        "guess_SCORER",
+        "above_guessing_SCORER",
+        *(names - guesses),
+    }
     assert sorted(name for name in wanted if f"`{name}`" not in documented) == []
 
 
@@ -84,7 +106,9 @@ def make_run(tmp_path: Path):
 
     def make_run(*records: UnitRecord) -> Path:
         config = identity(model="m", checkpoint=None, n_parameters=None)
-        with Journal(tmp_path / "run", RunHeader(suite="nieh", name="m", config=config), RECORDS) as journal:
+        with Journal(
+            tmp_path / "run", RunHeader(suite="nieh", name="m", config=config), RECORDS
+        ) as journal:
             for item in records:
                 journal.append(item)
         return tmp_path / "run"
@@ -93,9 +117,13 @@ def make_run(tmp_path: Path):
 
 
 def test_a_failed_sample_counts_as_wrong_and_an_excluded_one_not_at_all(make_run) -> None:
-    excluded = msgspec.structs.replace(record(2, None, ("Bed",), failure="x"), failure=None, excluded="no frame")
+    excluded = msgspec.structs.replace(
+        record(2, None, ("Bed",), failure="x"), failure=None, excluded="no frame"
+    )
     frame = infthor_eval.load_run(
-        make_run(record(0, "Bed", ("Bed",)), record(1, None, ("Bed",), failure="it fails"), excluded)
+        make_run(
+            record(0, "Bed", ("Bed",)), record(1, None, ("Bed",), failure="it fails"), excluded
+        )
     )
     frame = frame.set_index("id").sort_index()
     assert frame["score_strict"].fillna(-1).tolist() == [1.0, 0.0, -1.0]
@@ -110,7 +138,14 @@ def test_a_run_that_has_no_sample_yet_is_an_empty_frame(make_run) -> None:
 
 
 def test_csv_is_safe_to_open_and_parquet_is_exact(make_run) -> None:
-    replies = ['=HYPERLINK("http://x")', "\x1b[31mred\x07", 'two\nlines, "quoted"', "-1", "'", "naïve ∞"]
+    replies = [
+        '=HYPERLINK("http://x")',
+        "\x1b[31mred\x07",
+        'two\nlines, "quoted"',
+        "-1",
+        "'",
+        "naïve ∞",
+    ]
     folder = make_run(*(record(place, reply, ("Bed",)) for place, reply in enumerate(replies)))
     table = sample_table(read_report_runs([folder], find_suite, find_presenter))
     exact = pandas.read_parquet(io.BytesIO(encode_samples(table, "parquet")))
@@ -130,5 +165,7 @@ def test_a_folder_without_a_run_is_named(tmp_path: Path) -> None:
 
 def test_the_package_is_imported_without_pandas() -> None:
     code = "import infthor_eval, sys; print(*{'pandas', 'pyarrow', 'numpy', 'click'}.intersection(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=600)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=600
+    )
     assert done.stdout.split() == []

@@ -37,7 +37,9 @@ def _thawed() -> Iterator[None]:
 pytestmark = pytest.mark.usefixtures("_thawed")
 
 
-def test_nothing_is_collected_during_an_import_and_its_objects_are_passed_over_later(own_module: str) -> None:
+def test_nothing_is_collected_during_an_import_and_its_objects_are_passed_over_later(
+    own_module: str,
+) -> None:
     gc.unfreeze()
     assert import_target(f"{own_module}:is_collecting") is False
     assert gc.isenabled()

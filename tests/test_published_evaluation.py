@@ -57,7 +57,9 @@ def test_rates_give_back_what_was_measured(costs: Any) -> None:
         assert n / costs.seconds(costs.Request(n, 0, 0), found) == pytest.approx(rate)
 
 
-@pytest.mark.parametrize("points", [((10, 1.0), (5, 0.5)), ((10, 1.0), (20, 2.0)), ((10, 1.0), (20, 0.1))])
+@pytest.mark.parametrize(
+    "points", [((10, 1.0), (5, 0.5)), ((10, 1.0), (20, 2.0)), ((10, 1.0), (20, 0.1))]
+)
 def test_measurements_that_cannot_be_are_refused(costs: Any, points: Any) -> None:
     with pytest.raises(UsageError, match=r"must come second|measure a shorter"):
         costs.rates_from_prefill(costs.Rates(0, 0, 0, 0), *points)
@@ -68,9 +70,19 @@ def test_memory_is_weights_and_what_each_token_takes(costs: Any, shape: Any, mac
     small = replace(machine, memory=100, usable=0.9, gpus_per_node=4, attention="flash_attention_2")
     # 90 usable: 70 beside the weights; of two GPUs 160; of four 340.
     assert [costs.largest_context(shape, small, n) for n in (1, 2, 4)] == [4, 10, 21]
-    assert [costs.gpus_for(shape, small, n) for n in (4, 5, 10, 11, 21, 22)] == [1, 2, 2, 4, 4, None]
+    assert [costs.gpus_for(shape, small, n) for n in (4, 5, 10, 11, 21, 22)] == [
+        1,
+        2,
+        2,
+        4,
+        4,
+        None,
+    ]
     # SDPA repeats keys and values for 4 heads (32 bytes) and has a mask of 3 bytes for each token of a chunk.
-    assert costs.context_bytes(shape, replace(small, attention="sdpa", chunk_tokens=12)) == 16 + 32 + 36
+    assert (
+        costs.context_bytes(shape, replace(small, attention="sdpa", chunk_tokens=12))
+        == 16 + 32 + 36
+    )
 
 
 def test_published_shapes_take_the_memory_that_is_known_of_them(costs: Any) -> None:
@@ -88,23 +100,37 @@ def test_the_longest_goes_first_to_whoever_is_free(costs: Any) -> None:
     assert costs.makespan([1, 2, 3], 1) == 6
 
 
-def test_a_trajectory_is_encoded_once_and_windows_by_what_they_share(simulation: Any, shape: Any) -> None:
-    options = simulation._arguments(["--text-tokens", "5", "--reply-tokens", "2", "--step-tokens", "0"])
+def test_a_trajectory_is_encoded_once_and_windows_by_what_they_share(
+    simulation: Any, shape: Any
+) -> None:
+    options = simulation._arguments(
+        ["--text-tokens", "5", "--reply-tokens", "2", "--step-tokens", "0"]
+    )
     trajectory = simulation.Trajectory(20, ((3,), (12,), (3,)))
     gt, full, *_, plans = simulation.modes(options)
     found, _ = simulation.requests(trajectory, full, shape, options)
-    assert [(request.context, request.cached) for request in found] == [(205, 0), (205, 200), (205, 200)]
+    assert [(request.context, request.cached) for request in found] == [
+        (205, 0),
+        (205, 200),
+        (205, 200),
+    ]
     found, _ = simulation.requests(trajectory, gt, shape, options)
     assert [(request.context, request.cached) for request in found] == [(15, 0), (15, 10), (15, 0)]
     found, _ = simulation.requests(trajectory, plans, shape, options)
-    assert [(request.context, request.cached) for request in found[:3]] == [(10, 0), (20, 10), (30, 20)]
+    assert [(request.context, request.cached) for request in found[:3]] == [
+        (10, 0),
+        (20, 10),
+        (30, 20),
+    ]
     assert len(found) == 20
 
 
 def test_the_haystack_is_the_harness_own(simulation: Any, shape: Any) -> None:
     options = simulation._arguments(["--text-tokens", "0"])
     mode = simulation.Mode("haystack", simulation._haystack_of(1, 0))
-    wide = replace(shape, frame_tokens=100)  # windows of 10 frames, which begin 0, 2, 4, 6, 8 before the clue
+    wide = replace(
+        shape, frame_tokens=100
+    )  # windows of 10 frames, which begin 0, 2, 4, 6, 8 before the clue
     trajectory = simulation.Trajectory(15, ((5,), (5,)))
     found, n_missing = simulation.requests(trajectory, mode, wide, options)
     assert n_missing == 4  # two begin before the trajectory, for each of the two questions
@@ -114,24 +140,38 @@ def test_the_haystack_is_the_harness_own(simulation: Any, shape: Any) -> None:
 def test_a_run_counts_what_is_too_long_and_what_no_node_has_room_for(
     simulation: Any, costs: Any, shape: Any, machine: Any
 ) -> None:
-    options = simulation._arguments(["--text-tokens", "0", "--reply-tokens", "0", "--max-context", "250"])
-    small = replace(machine, memory=100, usable=1.0, gpus_per_node=32, attention="flash_attention_2")
+    options = simulation._arguments(
+        ["--text-tokens", "0", "--reply-tokens", "0", "--max-context", "250"]
+    )
+    small = replace(
+        machine, memory=100, usable=1.0, gpus_per_node=32, attention="flash_attention_2"
+    )
     trajectories = [
         simulation.Trajectory(n, ((0,), (1,))) for n in (10, 19, 20, 30)
     ]  # 198 tokens fit on 32 GPUs, 98 on 16
     rates = costs.Rates(token=36.0, pair=0.0, step=0.0, cached_token=0.0)
     full = simulation.modes(options)[1]
     one = simulation.run(full, shape, trajectories[:2], rates, small, options)
-    assert (one.n_requests, one.n_skipped, one.n_gpus, one.tokens, one.encoded) == (4, (0, 0, 0), 32, 580, 290)
+    assert (one.n_requests, one.n_skipped, one.n_gpus, one.tokens, one.encoded) == (
+        4,
+        (0, 0, 0),
+        32,
+        580,
+        290,
+    )
     assert one.jobs == ((3600.0, 6840.0), (7200.0, 13680.0))
     assert [one.hours(n, 0) for n in (8, 32, 64)] == [None, 2.9, 1.9]
     assert one.hours(64, 360, reuse=False) == pytest.approx(3.9)
-    less = simulation.run(full, shape, trajectories, rates, replace(small, gpus_per_node=16), options)
+    less = simulation.run(
+        full, shape, trajectories, rates, replace(small, gpus_per_node=16), options
+    )
     assert (less.n_requests, less.n_skipped) == (0, (0, 2, 6))
     assert (less.hours(64, 0), less.n_gpus) == (0, 0)
 
 
-def test_the_same_seed_gives_the_same_table(simulation: Any, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_same_seed_gives_the_same_table(
+    simulation: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
     given = [
         "--trajectories",
         "3",

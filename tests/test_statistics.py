@@ -6,11 +6,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError
-from infthor_eval.statistics import bootstrap_interval, clustered_mean, mean_over_clusters, paired_difference
+from infthor_eval.statistics import (
+    bootstrap_interval,
+    clustered_mean,
+    mean_over_clusters,
+    paired_difference,
+)
 
 from .benchmarks import load_benchmark
 
-scores = st.lists(st.tuples(st.sampled_from([0.0, 0.5, 1.0]), st.integers(0, 6)), min_size=2, max_size=60)
+scores = st.lists(
+    st.tuples(st.sampled_from([0.0, 0.5, 1.0]), st.integers(0, 6)), min_size=2, max_size=60
+)
 
 
 @given(scores)
@@ -52,9 +59,15 @@ def test_no_right_answer_on_eight_trajectories_gives_wilsons_textbook_interval()
 @given(scores)
 def test_the_interval_of_wrong_answers_mirrors_that_of_right_ones(pairs):
     values, clusters = [value for value, _ in pairs], [cluster for _, cluster in pairs]
-    right, wrong = clustered_mean(values, clusters), clustered_mean([1 - value for value in values], clusters)
+    right, wrong = (
+        clustered_mean(values, clusters),
+        clustered_mean([1 - value for value in values], clusters),
+    )
     if right.stderr is not None:
-        assert (wrong.low, wrong.high) == (pytest.approx(1 - right.high), pytest.approx(1 - right.low))
+        assert (wrong.low, wrong.high) == (
+            pytest.approx(1 - right.high),
+            pytest.approx(1 - right.low),
+        )
 
 
 def test_the_ends_of_an_interval_of_shares_solve_wilsons_equation():
@@ -62,7 +75,9 @@ def test_the_ends_of_an_interval_of_shares_solve_wilsons_equation():
     estimate = clustered_mean([1.0] * 3 + [0.0] * 7, list(range(10)))
     design_effect = (3 * 10 / 9 * (t / z) ** 2 + 1) / (3 + 1)
     for end in (estimate.low, estimate.high):
-        assert (end - 0.3) ** 2 == pytest.approx(z**2 * end * (1 - end) * design_effect / 10, rel=1e-5)
+        assert (end - 0.3) ** 2 == pytest.approx(
+            z**2 * end * (1 - end) * design_effect / 10, rel=1e-5
+        )
     assert estimate.low < 0.3 < estimate.high
 
 
@@ -86,7 +101,11 @@ def test_one_trajectory_gives_no_interval():
 
 @pytest.mark.parametrize(
     ("values", "clusters", "said"),
-    [([], [], "no score"), ([1.0], [], "1 scores but 0"), ([1.0, 0.0], ["t", ""], "score 1 has no trajectory")],
+    [
+        ([], [], "no score"),
+        ([1.0], [], "1 scores but 0"),
+        ([1.0, 0.0], ["t", ""], "score 1 has no trajectory"),
+    ],
 )
 def test_scores_that_cannot_be_clustered_are_refused(values, clusters, said):
     with pytest.raises(DataError, match=said):
@@ -132,7 +151,10 @@ def test_the_interval_covers_the_truth_as_often_as_it_says():
 def test_a_mean_over_clusters_takes_no_number_for_a_share():
     estimate = mean_over_clusters([0.0, 1.0])
     assert (estimate.mean, estimate.stderr, estimate.n_clusters) == (0.5, 0.5, 2)
-    assert (estimate.low, estimate.high) == (pytest.approx(-5.8531, abs=1e-4), pytest.approx(6.8531, abs=1e-4))
+    assert (estimate.low, estimate.high) == (
+        pytest.approx(-5.8531, abs=1e-4),
+        pytest.approx(6.8531, abs=1e-4),
+    )
     assert mean_over_clusters([3.0]).low is None
     with pytest.raises(DataError):
         mean_over_clusters([])

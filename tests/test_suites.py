@@ -66,7 +66,17 @@ def command(package, *arguments):
 
 
 def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
-    done = command(package, "--model", "adder", "--tasks", "sums", "--abacus", "bone", "--output", package / "out")
+    done = command(
+        package,
+        "--model",
+        "adder",
+        "--tasks",
+        "sums",
+        "--abacus",
+        "bone",
+        "--output",
+        package / "out",
+    )
     assert done.returncode == 1, done.stderr  # two of its sums cannot be done
     assert "the abacus is broken" in done.stderr
     (results,) = (package / "out").rglob("results.json")
@@ -107,7 +117,9 @@ def point(package, monkeypatch):
     def point(target, group="infthor_eval.suites"):
         found = [EntryPoint("sums", target, group)]
         for module in ("infthor_eval.plugins", "infthor_eval.runs.catalog"):
-            monkeypatch.setattr(f"{module}.entry_points", lambda group: [one for one in found if one.group == group])
+            monkeypatch.setattr(
+                f"{module}.entry_points", lambda group: [one for one in found if one.group == group]
+            )
 
     return point
 
@@ -139,7 +151,9 @@ def test_a_fault_in_the_module_of_a_suite_is_told_with_its_place(point, package)
     )
 
 
-def test_a_suite_without_a_presenter_has_the_plain_one_and_a_package_may_bring_one(package, add_presenter):
+def test_a_suite_without_a_presenter_has_the_plain_one_and_a_package_may_bring_one(
+    package, add_presenter
+):
     assert type(find_presenter("sums")) is PlainPresenter
     assert find_presenter("nieh").title == "Questions"
     add_presenter("sums_suite:Shown")
@@ -179,5 +193,7 @@ def test_an_option_that_every_run_has_is_refused(package):
 
 
 def test_no_package_can_take_a_built_in_name(monkeypatch):
-    monkeypatch.setattr("infthor_eval.plugins.entry_points", lambda group: [EntryPoint("nieh", "json:loads", group)])
+    monkeypatch.setattr(
+        "infthor_eval.plugins.entry_points", lambda group: [EntryPoint("nieh", "json:loads", group)]
+    )
     assert type(find_suite("nieh")).__name__ == "NiehSuite"

@@ -24,13 +24,18 @@ def vitals(tmp_path: Path, *words: str, command=("python", "-c", PRINTS), **fiel
     if not file.exists():
         file.write_text(json.dumps([{"command": list(command), "figures": [figure(**fields)]}]))
     done = subprocess.run(
-        [sys.executable, FOLDER / "vitals.py", "--file", file, *words], capture_output=True, text=True, check=False
+        [sys.executable, FOLDER / "vitals.py", "--file", file, *words],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert not done.stderr
     return done.returncode, done.stdout, json.loads(file.read_text())[0]["figures"][0]
 
 
-@pytest.mark.parametrize(("value", "moved"), [(4.5, False), (4.7, False), (4.3, False), (4.71, True), (4.2, True)])
+@pytest.mark.parametrize(
+    ("value", "moved"), [(4.5, False), (4.7, False), (4.3, False), (4.71, True), (4.2, True)]
+)
 def test_what_is_within_the_noise_has_not_moved(tmp_path, value, moved):
     code, shown, _ = vitals(tmp_path, value=value)
     assert (code, "MOVED" in shown) == ((1, True) if moved else (0, False))
@@ -86,7 +91,9 @@ def test_numbers_are_found_by_their_path():
 
 
 def test_each_committed_figure_has_a_value_an_aim_and_a_script():
-    measurements = msgspec.json.decode((FOLDER / "vitals.json").read_bytes(), type=list[VITALS.Measurement])
+    measurements = msgspec.json.decode(
+        (FOLDER / "vitals.json").read_bytes(), type=list[VITALS.Measurement]
+    )
     names = [figure.name for measurement in measurements for figure in measurement.figures]
     assert len(names) == len(set(names))
     for measurement in measurements:

@@ -33,7 +33,12 @@ def command(installed, tmp_path):
         env = {**os.environ, "PYTHONPATH": str(installed)}
         script = installed / "bin" / "infthor-eval"
         done = subprocess.run(
-            [sys.executable, script, *words], check=False, cwd=tmp_path, env=env, capture_output=True, text=True
+            [sys.executable, script, *words],
+            check=False,
+            cwd=tmp_path,
+            env=env,
+            capture_output=True,
+            text=True,
         )
         assert done.returncode == 0, done.stderr
         return done.stdout
@@ -44,26 +49,44 @@ def command(installed, tmp_path):
 def test_all_data_of_the_packages_is_in_it(wheel):
     packed = set(zipfile.ZipFile(wheel).namelist())
     root = BUILDING.ROOT
-    files = [path for name in BUILDING.SOURCES for path in (root / name).rglob("*") if path.is_file()]
+    files = [
+        path for name in BUILDING.SOURCES for path in (root / name).rglob("*") if path.is_file()
+    ]
     ours = {str(path.relative_to(root)) for path in files}
-    moved = {f"infthor_eval/{path}" if path.startswith(("tasks/", "results/")) else path for path in ours}
+    moved = {
+        f"infthor_eval/{path}" if path.startswith(("tasks/", "results/")) else path for path in ours
+    }
     missing = {path for path in moved - packed if "__pycache__" not in path}
     assert missing == set()
 
 
 def test_what_runs_is_the_installed_code(installed, tmp_path):
-    code = "import infthor_eval, model_adapters as other; print(infthor_eval.__file__, other.__file__)"
+    code = (
+        "import infthor_eval, model_adapters as other; print(infthor_eval.__file__, other.__file__)"
+    )
     env = {**os.environ, "PYTHONPATH": str(installed)}
-    found = subprocess.check_output([sys.executable, "-c", code], cwd=tmp_path, env=env, text=True).split()
+    found = subprocess.check_output(
+        [sys.executable, "-c", code], cwd=tmp_path, env=env, text=True
+    ).split()
     assert all(Path(path).is_relative_to(installed) for path in found)
 
 
 def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert "nieh_haystack_128k" in command("ls", "tasks")
-    asked = ("--model", "blind,oracle,qwen2.5-vl-nano", "--tasks", "nieh_mini_gt", "--limit", "20", "--full")
+    asked = (
+        "--model",
+        "blind,oracle,qwen2.5-vl-nano",
+        "--tasks",
+        "nieh_mini_gt",
+        "--limit",
+        "20",
+        "--full",
+    )
     table = command(*asked)
     assert "Qwen2.5-VL 7B" in table  # the published numbers came with it
-    assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {"results"}  # the first: $XDG_CACHE_HOME
+    assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {
+        "results"
+    }  # the first: $XDG_CACHE_HOME
 
 
 def test_plans_and_scenes_run_too(command, tmp_path):

@@ -10,7 +10,9 @@ __all__ = ["PATIENCE_S", "wait_until"]
 PATIENCE_S = 600.0  # a guard against hangs, never a measure of speed
 
 
-def wait_until(condition: Callable[[], object], process: "subprocess.Popen[Any] | None" = None) -> None:
+def wait_until(
+    condition: Callable[[], object], process: "subprocess.Popen[Any] | None" = None
+) -> None:
     """Return once the condition holds.
 
     Args:

@@ -43,7 +43,10 @@ class LongMemEval:
         recalled = []
         for item in self.memory.query(query.text, query_image=str(query.present.frame.path)):
             recalled.append(item["value"] if item["type"] == "text" else by_path[item["value"]])
-            if budget is not None and tokens_of(recalled, self.facts.tokens_per_frame or 0) > budget:
+            if (
+                budget is not None
+                and tokens_of(recalled, self.facts.tokens_per_frame or 0) > budget
+            ):
                 return recalled[:-1]  # their harness cuts off what is beyond the budget, too
         return recalled
 
@@ -61,7 +64,13 @@ class LongMemEval:
             for number, (step, action) in enumerate(zip(self.steps, actions, strict=True))
         ]
         goal = next((step.goal for step in reversed(self.steps) if step.goal), "")
-        return {"id": self.facts.name, "goal": goal, "outcome": None, "start_url": states[0]["url"], "states": states}
+        return {
+            "id": self.facts.name,
+            "goal": goal,
+            "outcome": None,
+            "start_url": states[0]["url"],
+            "states": states,
+        }
 
 
 class Nothing:

@@ -84,7 +84,9 @@ class _Commands(ExampleGroup):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and args[0] not in _NAMES and not ctx.resilient_parsing:  # completion asks for parts of names
+        if (
+            args and args[0] not in _NAMES and not ctx.resilient_parsing
+        ):  # completion asks for parts of names
             raise unknown_name("command", args[0], _NAMES)
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None:
@@ -100,7 +102,9 @@ class _Commands(ExampleGroup):
         run = self.get_command(ctx, _DEFAULT)
         assert run is not None
         with formatter.section("Options of a run"):
-            formatter.write_dl([record for option in run.params if (record := option.get_help_record(ctx))])
+            formatter.write_dl(
+                [record for option in run.params if (record := option.get_help_record(ctx))]
+            )
 
 
 @click.group(
@@ -121,7 +125,9 @@ def main(args: list[str] | None = None) -> None:
     """Run the command line; errors meant for people are printed as one line on standard error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # no name in the data may end a run, whatever the encoding
+            stream.reconfigure(
+                errors="backslashreplace"
+            )  # no name in the data may end a run, whatever the encoding
     try:
         with handle_signal(signal.SIGTERM, _raise_terminated):
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
@@ -146,7 +152,10 @@ def main(args: list[str] | None = None) -> None:
     except OSError as error:  # that no command expects: a full disk, a file removed during the work
         _discard_output()
         place = error.filename if error.filename is not None else "standard output or a file"
-        _exit(f"{place}: cannot be read or written ({in_one_line(error)}); fix that and run the same command again", 2)
+        _exit(
+            f"{place}: cannot be read or written ({in_one_line(error)}); fix that and run the same command again",
+            2,
+        )
     else:
         sys.exit(code if isinstance(code, int) else 0)
 
@@ -172,7 +181,9 @@ def _discard_output() -> None:
 
 def _unknown_option(error: click.NoSuchOption) -> str:
     assert error.ctx is not None
-    options = {name for option in error.ctx.command.params for name in option.opts if name.startswith("--")}
+    options = {
+        name for option in error.ctx.command.params for name in option.opts if name.startswith("--")
+    }
     near = difflib.get_close_matches(error.option_name, options, n=1)
     hint = f"did you mean {near[0]}?" if near else f"see `{error.ctx.command_path} --help`"
     return f"unknown option {error.option_name}; {hint}"

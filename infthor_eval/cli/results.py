@@ -13,10 +13,10 @@ from infthor_eval.cli.options.show import ShowOptions
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunSummary, Suite, Usage, read_header
+from infthor_eval.runs.journals.shards import read_shards
 from infthor_eval.runs.results import results_document
-from infthor_eval.runs.run_labels import label_runs
-from infthor_eval.runs.run_search import read_results
-from infthor_eval.runs.shards import read_shards
+from infthor_eval.runs.stored.labels import label_runs
+from infthor_eval.runs.stored.search import read_results
 from infthor_eval.suites import find_suite
 from infthor_eval.tables import Table
 from infthor_eval.terminal import print_line
@@ -73,7 +73,10 @@ def print_results(runs: Sequence[RunResults], options: ShowOptions) -> None:
 
 def _print_json(runs: Sequence[RunResults]) -> None:
     documents = [
-        {"folder": str(run.folder), **results_document(run.summary, run.suite, run.n_missing, run.usage)}
+        {
+            "folder": str(run.folder),
+            **results_document(run.summary, run.suite, run.n_missing, run.usage),
+        }
         for run in runs
     ]
     click.echo(msgspec.json.format(msgspec.json.encode(documents, order="sorted"), indent=2))
@@ -83,7 +86,12 @@ def _with_labels(runs: Sequence[RunResults]) -> list[RunResults]:
     """The runs with labels for names, which tell those of one name apart."""
     labels = label_runs([(run.folder, run.summary.header) for run in runs], _SHOWN_BY_TABLES)
     return [
-        replace(run, summary=replace(run.summary, header=msgspec.structs.replace(run.summary.header, name=label)))
+        replace(
+            run,
+            summary=replace(
+                run.summary, header=msgspec.structs.replace(run.summary.header, name=label)
+            ),
+        )
         for run, label in zip(runs, labels, strict=True)
     ]
 
@@ -94,7 +102,9 @@ def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
     for _, group in groupby(sorted(runs, key=suite_name), key=suite_name):
         same_suite = list(group)
         suite = same_suite[0].suite
-        tables += (suite.tables if options.full else suite.overview)([run.summary for run in same_suite])
+        tables += (suite.tables if options.full else suite.overview)(
+            [run.summary for run in same_suite]
+        )
     if options.form is not None:
         click.echo(export_tables(tables, options.form))
         return

@@ -51,7 +51,9 @@ def _questions(contents: SetContents) -> Iterator[Check]:
         yield Check(f"questions {name}", "ok", f"{by_type.total():,}: {types}")
     if contents.malformed:
         detail = f"{contents.malformed.total():,} are no question: {_in_words(contents.malformed)}"
-        yield Check("rows", "optional", detail, "correct them in the question file, or leave them out")
+        yield Check(
+            "rows", "optional", detail, "correct them in the question file, or leave them out"
+        )
     if contents.left_out:
         detail = f"{contents.left_out.total():,} questions: {_in_words(contents.left_out)}"
         yield Check("left out", "optional", detail, "they are counted in every result")
@@ -65,12 +67,21 @@ def _trajectories(contents: SetContents) -> Iterator[Check]:
         if contents.n_unasked:
             detail += f"; {contents.n_unasked:,} more without a question"
         yield Check("trajectories", "ok", detail)
-        sizes = Counter({f"{width}x{height}": number for (width, height), number in contents.image_sizes.items()})
-        yield Check("pictures", "ok", f"in {_counted(contents.image_folders)}; {_counted(sizes)} pixels")
+        sizes = Counter(
+            {
+                f"{width}x{height}": number
+                for (width, height), number in contents.image_sizes.items()
+            }
+        )
+        yield Check(
+            "pictures", "ok", f"in {_counted(contents.image_folders)}; {_counted(sizes)} pixels"
+        )
         yield Check("step logs", "ok", _counted(contents.layouts))
     if contents.unreadable:
         more = len(contents.unreadable) - _SHOWN
-        shown = "; ".join(contents.unreadable[:_SHOWN]) + (f"; and {more:,} more" if more > 0 else "")
+        shown = "; ".join(contents.unreadable[:_SHOWN]) + (
+            f"; and {more:,} more" if more > 0 else ""
+        )
         detail = f"{len(contents.unreadable):,} cannot be read"
         yield Check("unreadable trajectories", "optional", detail, shown)
 

@@ -12,7 +12,7 @@ import numpy as np
 from infthor_eval.episodes.recorded_runs import RecordedRun
 from infthor_eval.episodes.records import P
 from infthor_eval.episodes.shared_units import SharedUnits
-from infthor_eval.runs.records import UnitRecord
+from infthor_eval.runs.journals.records import UnitRecord
 from infthor_eval.statistics import MeanEstimate, mean_over_clusters
 
 __all__ = [
@@ -44,7 +44,9 @@ class StepFunction:
     values: tuple[float, ...]
 
     @classmethod
-    def of(cls, units: Sequence[tuple[float | None, float]], start: float | None = None) -> "StepFunction":
+    def of(
+        cls, units: Sequence[tuple[float | None, float]], start: float | None = None
+    ) -> "StepFunction":
         """Sum up the rewards of episodes in time order.
 
         Args:
@@ -142,7 +144,9 @@ class RewardCurves:
         return next(iter(self.facets))
 
 
-Earned = Sequence[tuple[UnitRecord[P], float]]  # the episodes of a trajectory in time order, and their rewards
+Earned = Sequence[
+    tuple[UnitRecord[P], float]
+]  # the episodes of a trajectory in time order, and their rewards
 Functions = Mapping[str, Sequence[StepFunction]]  # by facet, one of each trajectory
 
 
@@ -157,7 +161,9 @@ class _Drawn(Generic[P]):
     counts: Mapping[str, int]
 
     def curves(self, grids: Mapping[str, np.ndarray], *, is_bound: bool) -> RunCurves:
-        means = {name: _mean_curve(of_facet, grids[name]) for name, of_facet in self.functions.items()}
+        means = {
+            name: _mean_curve(of_facet, grids[name]) for name, of_facet in self.functions.items()
+        }
         return RunCurves(self.label, is_bound, self.is_embedded, means, self.counts)
 
 
@@ -181,7 +187,10 @@ def compute_curves(
         functions_of: returns the step functions of a run's trajectories, by facet.
         count: returns the counts of some episodes by description, the number of all first.
     """
-    drawn = [_drawn_run(run, of_run, functions_of, count) for run, of_run in zip(runs, shared.records, strict=True)]
+    drawn = [
+        _drawn_run(run, of_run, functions_of, count)
+        for run, of_run in zip(runs, shared.records, strict=True)
+    ]
     notes = list(shared.notes)
     planners = [number for number, run in enumerate(runs) if run.is_planner]
     if len(planners) == 1:
@@ -190,13 +199,22 @@ def compute_curves(
         bound, n_unknown = _highest_possible(drawn, shared.records, facets, functions_of)
         if n_unknown:
             what = next(iter(bound.counts))
-            notes.append(f"{what} that no run attempted, which add nothing to {AT_MOST!r}: {n_unknown}")
-    if lent := [name for name in facets if name not in bound.functions and any(name in it.functions for it in drawn)]:
+            notes.append(
+                f"{what} that no run attempted, which add nothing to {AT_MOST!r}: {n_unknown}"
+            )
+    if lent := [
+        name
+        for name in facets
+        if name not in bound.functions and any(name in it.functions for it in drawn)
+    ]:
         bound = _on_lent_places(bound, lent, shared.records, functions_of)
         notes += _lent_notes(bound, [facets[name] for name in lent])
     everything = [*drawn, bound]
     notes += _missing_notes(everything if len(planners) == 1 else drawn, facets)
-    grids = {name: _grid([it.functions[name] for it in everything if name in it.functions]) for name in facets}
+    grids = {
+        name: _grid([it.functions[name] for it in everything if name in it.functions])
+        for name in facets
+    }
     return RewardCurves(
         task=" and ".join(shared.tasks),
         facets=facets,
@@ -212,7 +230,10 @@ def _drawn_run(
     functions_of: Callable[[Sequence[Earned[P]]], Functions],
     count: Callable[[Sequence[UnitRecord[P]]], dict[str, int]],
 ) -> _Drawn[P]:
-    earned = [[(r, 0.0 if r.failure is not None else r.payload.reward) for r in records] for records in of_run]
+    earned = [
+        [(r, 0.0 if r.failure is not None else r.payload.reward) for r in records]
+        for records in of_run
+    ]
     counts = count([record for records in of_run for record in records])
     return _Drawn(run.label, run.is_embedded, earned, functions_of(earned), counts)
 
@@ -227,9 +248,13 @@ def _highest_possible(
     most = [list(_highest_rewards(of_runs)) for of_runs in zip(*records, strict=True)]
     earned = [[(record, reward or 0.0) for record, reward in units] for units in most]
     functions = {name: it for name, it in functions_of(earned).items() if facets[name].has_bound}
-    counts = {what: n if number == 0 else 0 for number, (what, n) in enumerate(drawn[0].counts.items())}
+    counts = {
+        what: n if number == 0 else 0 for number, (what, n) in enumerate(drawn[0].counts.items())
+    }
     n_unknown = sum(reward is None for units in most for _, reward in units)
-    return _Drawn(AT_MOST, all(it.is_embedded for it in drawn), earned, functions, counts), n_unknown
+    return _Drawn(
+        AT_MOST, all(it.is_embedded for it in drawn), earned, functions, counts
+    ), n_unknown
 
 
 def _on_lent_places(
@@ -247,7 +272,10 @@ def _on_lent_places(
     functions = dict(bound.functions)
     for facet in lent:
         first = [
-            [min(same, key=lambda record: place(record, facet)) for same in zip(*of_runs, strict=True)]
+            [
+                min(same, key=lambda record: place(record, facet))
+                for same in zip(*of_runs, strict=True)
+            ]
             for of_runs in zip(*records, strict=True)
         ]
         earned = [
@@ -258,10 +286,14 @@ def _on_lent_places(
     return replace(bound, functions=functions)
 
 
-def _highest_rewards(of_runs: Sequence[Sequence[UnitRecord[P]]]) -> Iterator[tuple[UnitRecord[P], float | None]]:
+def _highest_rewards(
+    of_runs: Sequence[Sequence[UnitRecord[P]]],
+) -> Iterator[tuple[UnitRecord[P], float | None]]:
     """Yield the episodes of a trajectory with the highest possible reward that any run recorded; None if none did."""
     for same in zip(*of_runs, strict=True):
-        recorded = [record.payload.max_reward for record in same if record.payload.max_reward is not None]
+        recorded = [
+            record.payload.max_reward for record in same if record.payload.max_reward is not None
+        ]
         yield same[0], max(recorded, default=None)
 
 
@@ -286,4 +318,7 @@ def _mean_curve(functions: Sequence[StepFunction], grid: np.ndarray) -> Curve:
     """Return the mean of a run's functions, one of each trajectory, up to the end of the longest."""
     last = max(item.places[-1] for item in functions)
     places = tuple(float(place) for place in grid if place <= last)
-    return Curve(places, tuple(mean_over_clusters([item.at(place) for item in functions]) for place in places))
+    return Curve(
+        places,
+        tuple(mean_over_clusters([item.at(place) for item in functions]) for place in places),
+    )

@@ -14,9 +14,19 @@ from infthor_eval.episodes.records import P
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
-from infthor_eval.formats.digests import fingerprint
 from infthor_eval.formats.floor_plans import floor_plans_digest
-from infthor_eval.runs import Group, Session, Skipped, TaskFile, TaskRequest, Unit, UnitKey, UnitRecord, Workload
+from infthor_eval.runs import (
+    Group,
+    Session,
+    Skipped,
+    TaskFile,
+    TaskRequest,
+    Unit,
+    UnitKey,
+    UnitRecord,
+    Workload,
+)
+from infthor_eval.storage.digests import fingerprint
 
 __all__ = ["BoundEpisodes", "EpisodeEvaluation", "EpisodeUnit"]
 
@@ -25,7 +35,10 @@ E = TypeVar("E")
 K = TypeVar("K", bound=EpisodeTask[Any, Any])
 Options = TypeVar("Options", bound=SimulatorOptions)
 
-_OF_ALL_TRAJECTORIES = ("trajectories", "broken")  # parts of a task's config that one episode does not depend on
+_OF_ALL_TRAJECTORIES = (
+    "trajectories",
+    "broken",
+)  # parts of a task's config that one episode does not depend on
 
 
 @dataclass(frozen=True)
@@ -53,7 +66,11 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
             plans of the simulators depend on --limit.
     """
 
-    def __init__(self, request: TaskRequest[Options], read_task: Callable[[TaskFile, TaskRequest[Options]], K]) -> None:
+    def __init__(
+        self,
+        request: TaskRequest[Options],
+        read_task: Callable[[TaskFile, TaskRequest[Options]], K],
+    ) -> None:
         """Read the tasks and their trajectories.
 
         Raises:
@@ -61,10 +78,16 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
             DataError: a task file is malformed, or none of its trajectories can be used.
         """
         self.seed, self.options = request.seed, request.options
-        self.tasks: Mapping[str, K] = {file.name: read_task(file, request) for file in request.tasks}
+        self.tasks: Mapping[str, K] = {
+            file.name: read_task(file, request) for file in request.tasks
+        }
         self._scenes = Path(self.options.scenes) if self.options.scenes is not None else None
         self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
-        by_name = {item.traj_id: item.data for task in self.tasks.values() for item in task.trajectories.trajectories}
+        by_name = {
+            item.traj_id: item.data
+            for task in self.tasks.values()
+            for item in task.trajectories.trajectories
+        }
         self.trajectories = list(by_name.values())
 
     @property
@@ -76,7 +99,10 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
         """Return the workload, given the episodes in groups and the suite's own settings."""
         listed = [list(units) for units in groups]
         return Workload(
-            groups=[Group(units, frames=len(units[0].trajectory.data.plan.low_actions)) for units in listed],
+            groups=[
+                Group(units, frames=len(units[0].trajectory.data.plan.low_actions))
+                for units in listed
+            ],
             skipped=[
                 Skipped(UnitKey(name, place), reason)
                 for name, task in self.tasks.items()
@@ -101,12 +127,21 @@ class BoundEpisodes(Generic[U, P]):
     """Episodes for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
     def __init__(
-        self, evaluation: EpisodeEvaluation[Any, Any, U], workload: Workload[U], simulators: Iterable[Simulators]
+        self,
+        evaluation: EpisodeEvaluation[Any, Any, U],
+        workload: Workload[U],
+        simulators: Iterable[Simulators],
     ) -> None:
         """Take the work, and the simulators that it is done in, which are closed with this."""
-        self.workload, self.seed, self._simulators_to_close = workload, evaluation.seed, list(simulators)
+        self.workload, self.seed, self._simulators_to_close = (
+            workload,
+            evaluation.seed,
+            list(simulators),
+        )
         by_task = groupby(evaluation.units, key=lambda unit: unit.key.task)
-        self._numbers = {unit.key: number for _, of_task in by_task for number, unit in enumerate(of_task)}
+        self._numbers = {
+            unit.key: number for _, of_task in by_task for number, unit in enumerate(of_task)
+        }
 
     def close(self) -> None:
         """See `infthor_eval.runs.BoundEvaluation.close`."""
@@ -121,7 +156,9 @@ class BoundEpisodes(Generic[U, P]):
         return fingerprint(
             {
                 **config,
-                "task": {name: value for name, value in of_task if name not in _OF_ALL_TRAJECTORIES},
+                "task": {
+                    name: value for name, value in of_task if name not in _OF_ALL_TRAJECTORIES
+                },
                 "trajectory": unit.trajectory.digest,
                 "index": unit.payload.index,
                 "seed": self.seed,
@@ -133,4 +170,6 @@ class BoundEpisodes(Generic[U, P]):
     ) -> tuple[dict[UnitKey, str], dict[UnitKey, UnitRecord[P] | None]]:
         """Return the fingerprints of a group's units, and the records of those that have a result already."""
         fingerprints = {unit.key: self._fingerprint(unit) for unit in group.units}
-        return fingerprints, {unit.key: session.find_record(unit, fingerprints[unit.key]) for unit in group.units}
+        return fingerprints, {
+            unit.key: session.find_record(unit, fingerprints[unit.key]) for unit in group.units
+        }

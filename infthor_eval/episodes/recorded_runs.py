@@ -52,7 +52,9 @@ class RecordedRun(Generic[P, T]):
     suite: ClassVar[str]
     record_types: ClassVar[RecordTypes]
     task_config: ClassVar[type[TaskConfig]]
-    planner: ClassVar[str]  # the baseline that is an upper bound; its own module would import the simulator
+    planner: ClassVar[
+        str
+    ]  # the baseline that is an upper bound; its own module would import the simulator
 
     @classmethod
     def read(cls, folder: Path, label: str | None = None) -> Self:
@@ -64,7 +66,9 @@ class RecordedRun(Generic[P, T]):
     def config(self) -> RunConfig[T]:
         """The run's config; raises DataError if it is not that of a run of this suite."""
         problem = f"{self.label}: not the config of a run of {self.suite}"
-        with wrap_errors(problem, "start the run again with --fresh", catch=msgspec.ValidationError):
+        with wrap_errors(
+            problem, "start the run again with --fresh", catch=msgspec.ValidationError
+        ):
             config: RunConfig[T] = msgspec.convert(self.header.config, RunConfig[self.task_config])  # type: ignore[name-defined]
         return config
 
@@ -78,7 +82,9 @@ class RecordedRun(Generic[P, T]):
         """Whether the run used the embedded simulator."""
         return self.config.simulator == _EMBEDDED
 
-    def by_trajectory(self, tasks: Collection[str]) -> dict[str, dict[tuple[int, str], UnitRecord[P]]]:
+    def by_trajectory(
+        self, tasks: Collection[str]
+    ) -> dict[str, dict[tuple[int, str], UnitRecord[P]]]:
         """Return the records of some tasks by trajectory, then by place in it and task."""
         records: dict[str, dict[tuple[int, str], UnitRecord[P]]] = {}
         for record in self.records:
@@ -88,4 +94,8 @@ class RecordedRun(Generic[P, T]):
 
     def digests(self, tasks: Sequence[str]) -> dict[str, str]:
         """Return the digests of some tasks' trajectories, by name."""
-        return {name: digest for task in tasks for name, digest in self.config.tasks[task].trajectories.items()}
+        return {
+            name: digest
+            for task in tasks
+            for name, digest in self.config.tasks[task].trajectories.items()
+        }

@@ -20,7 +20,7 @@ from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory, find_recorded_trajectory
 from infthor_eval.errors import DataError
 from infthor_eval.formats.trajectory import TrajectorySource
-from infthor_eval.runs.records import UnitRecord
+from infthor_eval.runs.journals.records import UnitRecord
 from infthor_eval.thor.simulator import Simulator
 
 __all__ = [
@@ -89,13 +89,17 @@ def restore_trajectory(
     task = recorded.records[0].task
     config = recorded.run.config.tasks[task]
     digest, bundled = config.trajectories.get(recorded.trajectory), config.settings.get("bundled")
-    available, trajectory = find_recorded_trajectory(task, recorded.trajectory, digest, data, bundled, read)
+    available, trajectory = find_recorded_trajectory(
+        task, recorded.trajectory, digest, data, bundled, read
+    )
     with ExitStack() as stack:
 
         def start_simulator(**options: Any) -> Simulator:
             # With all trajectories, as in the run: the embedded simulator completes floor plans from each of them.
             every = [item.data for item in available.trajectories]
-            simulators = Simulators(recorded.run.config.simulator, scenes, every, instances=False, **options)
+            simulators = Simulators(
+                recorded.run.config.simulator, scenes, every, instances=False, **options
+            )
             stack.callback(simulators.close)
             return stack.enter_context(simulators.one())
 
@@ -152,7 +156,9 @@ class EpisodeReplay(ABC, Generic[P, F]):
         for number, step in enumerate(steps, 1):
             difference = episode.repeat(step, is_last=number == len(steps))
             # Once the worlds differ all later steps may differ too, so the first difference alone is noted.
-            note = f"{self._place(record, number)}: {difference}" if difference and not differs else ""
+            note = (
+                f"{self._place(record, number)}: {difference}" if difference and not differs else ""
+            )
             differs = differs or bool(difference)
             yield self._frame(record, number, episode.observe(), note)
 

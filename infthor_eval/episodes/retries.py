@@ -12,7 +12,9 @@ T = TypeVar("T")
 _MAX_TRIES = 3
 
 
-def with_retries(simulator: Simulator, do: Callable[[], T], reset: Callable[[], None]) -> tuple[T, tuple[str, ...]]:
+def with_retries(
+    simulator: Simulator, do: Callable[[], T], reset: Callable[[], None]
+) -> tuple[T, tuple[str, ...]]:
     """Do something, and retry it in a fresh process if the simulator fails.
 
     The simulator itself survives the loss of its process by repeating the actions since the last mark. It gives up if

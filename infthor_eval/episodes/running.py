@@ -55,7 +55,11 @@ class EpisodeRunner(Generic[E, P]):
         return self._environment
 
     def record(
-        self, unit: Unit[P], fingerprint: str, run: Callable[[], EpisodeResult[P]], session: Session[P]
+        self,
+        unit: Unit[P],
+        fingerprint: str,
+        run: Callable[[], EpisodeResult[P]],
+        session: Session[P],
     ) -> UnitRecord[P]:
         """Run an episode and return its record, also of an error; `run` is repeated if the simulator fails for good."""
         self.begun, self.usage = None, NOTHING
@@ -66,7 +70,9 @@ class EpisodeRunner(Generic[E, P]):
             return unit.record_exclusion(str(error), fingerprint)
         except InfthorError as error:
             begun = unit if self.begun is None else replace(unit, payload=self.begun)
-            return begun.record_failure(session.describe_failure(unit, error), fingerprint, usage=self.usage)
+            return begun.record_failure(
+                session.describe_failure(unit, error), fingerprint, usage=self.usage
+            )
         return unit.record(
             fingerprint,
             result.payload,

@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeVar
 from infthor_eval.episodes.recorded_runs import RecordedRun, TaskConfig
 from infthor_eval.episodes.records import P
 from infthor_eval.errors import DataError, UsageError, unknown_name
-from infthor_eval.runs.records import UnitRecord
+from infthor_eval.runs.journals.records import UnitRecord
 
 __all__ = ["SharedUnits", "difference_notes", "only_name", "shared_tasks", "shared_units"]
 
@@ -40,8 +40,13 @@ def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | 
     first = runs[0]
     shared = [name for name in first.config.tasks if all(name in run.config.tasks for run in runs)]
     if not shared:
-        other = next((run for run in runs if not run.config.tasks.keys() & first.config.tasks.keys()), runs[-1])
-        raise UsageError(f"{first.label} and {other.label} share no task; draw runs of the same task")
+        other = next(
+            (run for run in runs if not run.config.tasks.keys() & first.config.tasks.keys()),
+            runs[-1],
+        )
+        raise UsageError(
+            f"{first.label} and {other.label} share no task; draw runs of the same task"
+        )
     for name in chosen or ():
         if name not in shared:
             raise unknown_name("task of all these runs", name, shared)
@@ -49,7 +54,10 @@ def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | 
 
 
 def shared_units(
-    runs: Sequence[RecordedRun[P, T]], tasks: Sequence[str], excluded: str, differences: Iterable[str] = ()
+    runs: Sequence[RecordedRun[P, T]],
+    tasks: Sequence[str],
+    excluded: str,
+    differences: Iterable[str] = (),
 ) -> SharedUnits[P]:
     """Find the episodes of trajectories that all runs (at least one) have in full, in tasks that all have.
 
@@ -62,24 +70,40 @@ def shared_units(
     """
     units = [run.by_trajectory(tasks) for run in runs]
     digests = [run.digests(tasks) for run in runs]
-    names = sorted({*(name for known in digests for name in known), *(name for item in units for name in item)})
+    names = sorted(
+        {*(name for known in digests for name in known), *(name for item in units for name in item)}
+    )
     left_out = {
-        name: {place for item in units for place, record in item.get(name, {}).items() if record.excluded is not None}
+        name: {
+            place
+            for item in units
+            for place, record in item.get(name, {}).items()
+            if record.excluded is not None
+        }
         for name in names
     }
-    shared = [name for name in names if _is_shared(name, digests, units) and units[0][name].keys() - left_out[name]]
+    shared = [
+        name
+        for name in names
+        if _is_shared(name, digests, units) and units[0][name].keys() - left_out[name]
+    ]
     if not shared:
         which = " and ".join(tasks)
         raise DataError(
             f"the runs share no trajectory of {which} that all of them have in full; draw runs on the same data"
         )
     records = tuple(
-        tuple(tuple(item[name][place] for place in sorted(item[name].keys() - left_out[name])) for name in shared)
+        tuple(
+            tuple(item[name][place] for place in sorted(item[name].keys() - left_out[name]))
+            for name in shared
+        )
         for item in units
     )
     notes = []
     if len(shared) < len(names):
-        notes.append(f"{len(shared)} of {len(names)} trajectories are drawn: those that all of these runs have in full")
+        notes.append(
+            f"{len(shared)} of {len(names)} trajectories are drawn: those that all of these runs have in full"
+        )
     if len(shared) == 1:
         notes.append("a mean over one trajectory has no interval")
     if n_excluded := sum(len(left_out[name]) for name in shared):
@@ -88,7 +112,9 @@ def shared_units(
     return SharedUnits(tuple(tasks), tuple(shared), records, (*notes, *differences))
 
 
-def difference_notes(setting: str, runs: Sequence[RecordedRun[Any, Any]], values: Sequence[object]) -> list[str]:
+def difference_notes(
+    setting: str, runs: Sequence[RecordedRun[Any, Any]], values: Sequence[object]
+) -> list[str]:
     """Return a line with each run's value of a setting if they differ; else nothing."""
     if len({str(value) for value in values}) < 2:
         return []
@@ -103,7 +129,9 @@ def only_name(what: str, option: str, name: str | None, known: Sequence[str]) ->
         UsageError: the run has nothing of that name, or no name is given and there are several.
     """
     if name is None and len(known) > 1:
-        raise UsageError(f"the run has more than one {what}; give one of them with {option}: {', '.join(known)}")
+        raise UsageError(
+            f"the run has more than one {what}; give one of them with {option}: {', '.join(known)}"
+        )
     if name is not None and name not in known:
         raise unknown_name(f"{what} of this run", name, known)
     return name or known[0]

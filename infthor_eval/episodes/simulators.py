@@ -20,7 +20,9 @@ _COPIES = 512  # of the simulator's state: one for each plan of a long trajector
 class Simulators:
     """Starts simulators as they are needed. They are stopped by `close`, or when nobody holds this any more."""
 
-    def __init__(self, name: str, scenes: Path | None, trajectories: Sequence[Trajectory], **options: Any) -> None:
+    def __init__(
+        self, name: str, scenes: Path | None, trajectories: Sequence[Trajectory], **options: Any
+    ) -> None:
         """Describe the simulators.
 
         Args:
@@ -32,7 +34,9 @@ class Simulators:
         self._open = ExitStack()
         weakref.finalize(self, self._open.close)
         self._idle: SimpleQueue[Simulator] = SimpleQueue()
-        supplement = self._open.enter_context(supplement_file(trajectories)) if scenes is not None else None
+        supplement = (
+            self._open.enter_context(supplement_file(trajectories)) if scenes is not None else None
+        )
         if name == "embedded":
             self._launch = launch.embedded_launch(scenes, supplement)
         else:

@@ -81,7 +81,9 @@ def common_results(config: Mapping[str, Any], records: Sequence[UnitRecord[P]]) 
 
 def success_rate(records: Sequence[UnitRecord[P]]) -> Rate | None:
     """Return the share of successes, clustered by trajectory; None if there are no records."""
-    return clustered_rate([float(record.payload.done) for record in records], [record.cluster for record in records])
+    return clustered_rate(
+        [float(record.payload.done) for record in records], [record.cluster for record in records]
+    )
 
 
 def _count(items: Iterable[str]) -> dict[str, int]:

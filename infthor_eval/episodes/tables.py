@@ -29,13 +29,22 @@ def named_tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, Any]]:
 
 
 def endings_table(
-    title: str, tasks: Sequence[tuple[str, str, T]], column: str = "", value: Callable[[T], Any] = str
+    title: str,
+    tasks: Sequence[tuple[str, str, T]],
+    column: str = "",
+    value: Callable[[T], Any] = str,
 ) -> Table:
     """Return the table of how episodes ended, with a further column for a value of each task if it has a heading."""
     endings = list(dict.fromkeys(ending for _, _, task in tasks for ending in task.endings))
     further = [column] if column else []
     rows = [
-        Row((*names, *(str(task.endings.get(ending, 0)) for ending in endings), *(str(value(task)) for _ in further)))
+        Row(
+            (
+                *names,
+                *(str(task.endings.get(ending, 0)) for ending in endings),
+                *(str(value(task)) for _ in further),
+            )
+        )
         for *names, task in tasks
     ]
     return Table(title, (*NAME_COLUMNS, *map(Column, (*endings, *further))), tuple(rows))
@@ -44,5 +53,7 @@ def endings_table(
 def result_notes(runs: Sequence[RunSummary]) -> tuple[str, ...]:
     """Return the notes below tables of results: on the embedded simulator, and on what was left out."""
     notes = [_EMBEDDED] if any(run.summary.simulator == "embedded" for run in runs) else []
-    left_out = left_out_notes([[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs])
+    left_out = left_out_notes(
+        [[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs]
+    )
     return (*notes, *left_out)

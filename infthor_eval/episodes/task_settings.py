@@ -20,7 +20,10 @@ _TYPES: dict[type, str] = {
 
 
 def task_settings(
-    file: TaskFile, kind: type[T], given: Mapping[str, Any], choices: Mapping[str, Sequence[str]] | None = None
+    file: TaskFile,
+    kind: type[T],
+    given: Mapping[str, Any],
+    choices: Mapping[str, Sequence[str]] | None = None,
 ) -> T:
     """Return the settings of a task file, with those that are given instead.
 
@@ -48,7 +51,9 @@ def task_settings(
         allowed = (choices or {}).get(str(key), (value,))
         if value not in allowed:
             raise DataError(f"{where} is {value!r:.60}; there are {', '.join(allowed)}")
-    return kind(**{**settings, **{name: value for name, value in given.items() if value is not None}})
+    return kind(
+        **{**settings, **{name: value for name, value in given.items() if value is not None}}
+    )
 
 
 def _fits(value: object, expected: type) -> bool:

@@ -24,7 +24,11 @@ class EpisodeTask(ABC, Generic[S, T]):
     """A task file that was read, its trajectories, and its settings with what the command line gives instead."""
 
     def __init__(
-        self, file: TaskFile, request: TaskRequest[Any], settings: S, read: Callable[[TrajectorySource], T]
+        self,
+        file: TaskFile,
+        request: TaskRequest[Any],
+        settings: S,
+        read: Callable[[TrajectorySource], T],
     ) -> None:
         """Find the trajectories of a task file.
 
@@ -33,7 +37,9 @@ class EpisodeTask(ABC, Generic[S, T]):
             DataError: none of them can be used.
         """
         self.file, self.name, self.settings = file, file.name, settings
-        self.trajectories: TrajectorySet[T] = find_trajectories(request.data, settings.bundled, read)
+        self.trajectories: TrajectorySet[T] = find_trajectories(
+            request.data, settings.bundled, read
+        )
 
     @abstractmethod
     def config(self) -> dict[str, Any]:

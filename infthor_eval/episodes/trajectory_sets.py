@@ -6,8 +6,13 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.formats.packaged import packaged_folder
-from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_sources, trajectory_files
+from infthor_eval.formats.trajectory import (
+    Trajectory,
+    TrajectorySource,
+    iter_sources,
+    trajectory_files,
+)
+from infthor_eval.storage.packaged import packaged_folder
 
 __all__ = ["TaskTrajectory", "TrajectorySet", "find_recorded_trajectory", "find_trajectories"]
 
@@ -58,7 +63,9 @@ def find_trajectories(
         DataError: there is no trajectory that can be used, or two have one name.
     """
     if bundled is None and data is None:
-        raise UsageError("this task has no trajectories of its own; give them as --data FILE or FOLDER")
+        raise UsageError(
+            "this task has no trajectories of its own; give them as --data FILE or FOLDER"
+        )
     root = packaged_folder(f"sets/{bundled}") if bundled is not None else Path(str(data))
     if not root.exists():
         raise UsageError(f"--data {root}: there is no such file or folder")
@@ -71,7 +78,9 @@ def find_trajectories(
             broken.append((source.place, str(error)))
             continue
         if trajectory.traj_id in by_name:
-            raise DataError(f"{source.place}: {trajectory.traj_id} is the name of another trajectory too; rename one")
+            raise DataError(
+                f"{source.place}: {trajectory.traj_id} is the name of another trajectory too; rename one"
+            )
         by_name[trajectory.traj_id] = trajectory
     if not by_name:
         why = broken[0][1] if broken else "no trajectory there"
@@ -108,7 +117,9 @@ def find_recorded_trajectory(
     trajectory = next((item for item in available.trajectories if item.traj_id == name), None)
     if trajectory is None:
         names = ", ".join(item.traj_id for item in available.trajectories)
-        raise DataError(f"{name}: not among the trajectories of --data ({names:.200}); give those of the run")
+        raise DataError(
+            f"{name}: not among the trajectories of --data ({names:.200}); give those of the run"
+        )
     if trajectory.digest != digest:
         raise DataError(f"{name}: changed since the run; give the run's own trajectories as --data")
     return available, trajectory

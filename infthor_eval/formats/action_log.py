@@ -34,7 +34,9 @@ def read_action_log(path: Path, places: Mapping[str, int]) -> dict[int, tuple[in
     """
     log = read_json(path, _HINT, _Log)
     with wrap_errors(f"{path}: not a log of actions and their frames", _HINT, catch=KeyError):
-        return _by_action((image.low_idx, places[Path(image.image_name).stem]) for image in log.images)
+        return _by_action(
+            (image.low_idx, places[Path(image.image_name).stem]) for image in log.images
+        )
 
 
 def logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError, wrap_errors
-from infthor_eval.formats.files import write_atomically
+from infthor_eval.storage.files import write_atomically
 
 __all__ = ["ANIMATION_FORMATS", "require_animation_name", "write_animation"]
 
@@ -54,7 +54,9 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
         write_atomically(path) as partial,
         tempfile.TemporaryDirectory(dir=path.parent, prefix=".recording-") as folder,
     ):
-        file = Path(folder) / f"animation{path.suffix.lower()}"  # OpenCV chooses by the suffix, which `partial` lacks
+        file = (
+            Path(folder) / f"animation{path.suffix.lower()}"
+        )  # OpenCV chooses by the suffix, which `partial` lacks
         n_pictures = write(file, pictures, per_second)
         file.replace(partial)
     return n_pictures
@@ -64,14 +66,20 @@ def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -
     """Write a GIF whose pictures share one palette: with one each, what does not move would change its colours."""
     counts = np.zeros((4, _SHADES**3))
     kept = []
-    for number, picture in enumerate(pictures):  # all of them are needed before the first is written
+    for number, picture in enumerate(
+        pictures
+    ):  # all of them are needed before the first is written
         counts += _count_colours(picture)
         kept.append(path.with_name(f"{number}.png"))
         picture.save(kept[-1], compress_level=1)
     palette = _choose_palette(counts)
     quantized = (_in_palette(file, palette) for file in kept)
-    duration = max(20, round(100 / per_second) * 10)  # GIF has hundredths of a second; viewers take 10 ms for 100 ms
-    next(quantized).save(path, save_all=True, append_images=quantized, duration=duration, loop=0, optimize=False)
+    duration = max(
+        20, round(100 / per_second) * 10
+    )  # GIF has hundredths of a second; viewers take 10 ms for 100 ms
+    next(quantized).save(
+        path, save_all=True, append_images=quantized, duration=duration, loop=0, optimize=False
+    )
     return len(kept)
 
 
@@ -80,7 +88,9 @@ def _count_colours(picture: Image.Image) -> NDArray[np.float64]:
     pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(np.int64)
     cubes = pixels * _SHADES // 256 @ (_SHADES**2, _SHADES, 1)
     weights = (None, *pixels.T)
-    return np.stack([np.bincount(cubes, weight, _SHADES**3).astype(np.float64) for weight in weights])
+    return np.stack(
+        [np.bincount(cubes, weight, _SHADES**3).astype(np.float64) for weight in weights]
+    )
 
 
 def _choose_palette(counts: NDArray[np.float64]) -> Image.Image:
@@ -94,7 +104,9 @@ def _choose_palette(counts: NDArray[np.float64]) -> Image.Image:
 
 def _in_palette(file: Path, palette: Image.Image) -> Image.Image:
     with Image.open(file) as picture:
-        return picture.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)  # noise makes files larger
+        return picture.convert("RGB").quantize(
+            palette=palette, dither=Image.Dither.NONE
+        )  # noise makes files larger
 
 
 def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
@@ -115,7 +127,9 @@ def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -
     finally:
         cv2.utils.logging.setLogLevel(level)
     if n_written != n_pictures:  # OpenCV does not report a full disk
-        raise DataError(f"{path.parent}: only {n_written} of {n_pictures} pictures could be written; {_HINT}")
+        raise DataError(
+            f"{path.parent}: only {n_written} of {n_pictures} pictures could be written; {_HINT}"
+        )
     return n_pictures
 
 

@@ -42,7 +42,9 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
     require_file(archive, "fetch it again")
     damaged = (tarfile.TarError, gzip.BadGzipFile, *DAMAGED)
     with (
-        wrap_errors(f"{archive}: cannot be unpacked to {target}", "make room, or fetch the archive again"),
+        wrap_errors(
+            f"{archive}: cannot be unpacked to {target}", "make room, or fetch the archive again"
+        ),
         wrap_errors(f"{archive}: a damaged archive", "delete it and fetch it again", catch=damaged),
     ):
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -50,7 +52,9 @@ def unpack_tar(archive: Path, target: Path, max_bytes: int = 500 * 2**30) -> Non
             tarfile.open(archive, tarinfo=_BoundedInfo) as tar,
             tempfile.TemporaryDirectory(dir=target.parent, prefix=".unpacking-") as scratch,
         ):
-            members = _check_members(tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free))
+            members = _check_members(
+                tar, archive, target.name, min(max_bytes, shutil.disk_usage(target.parent).free)
+            )
             tar.extractall(scratch, members=members, filter="data")
             (Path(scratch) / target.name).rename(target)
 
@@ -76,7 +80,9 @@ def _check_end(tar: tarfile.TarFile) -> None:
         pass  # to the end, where compressed files have a checksum
 
 
-def _check_members(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int) -> list[tarfile.TarInfo]:
+def _check_members(
+    tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int
+) -> list[tarfile.TarInfo]:
     """Return the members of an archive, all of which are safe to unpack."""
     members, total = [], 0
     seen: set[PurePosixPath] = set()
@@ -86,15 +92,23 @@ def _check_members(tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int
             raise DataError(f"{archive}: contains {member.name!r} twice; do not use this archive")
         seen.add(path)
         if path.is_absolute() or ".." in path.parts:
-            raise DataError(f"{archive}: {member.name!r} points outside the folder; do not use this archive")
+            raise DataError(
+                f"{archive}: {member.name!r} points outside the folder; do not use this archive"
+            )
         if not (member.isfile() or member.isdir()):
-            raise DataError(f"{archive}: {member.name!r} is a link or device; do not use this archive")
+            raise DataError(
+                f"{archive}: {member.name!r} is a link or device; do not use this archive"
+            )
         if path.parts and path.parts[0] != top:
-            raise DataError(f"{archive}: {member.name!r} is not below {top}/; this is another archive")
+            raise DataError(
+                f"{archive}: {member.name!r} is not below {top}/; this is another archive"
+            )
         total += member.size
         members.append(member)
         if member.size > _MAX_FILE_BYTES or total > max_bytes or len(members) > _MAX_FILES:
-            raise DataError(f"{archive}: unpacks to more than the limit or the free disk; make room or check the file")
+            raise DataError(
+                f"{archive}: unpacks to more than the limit or the free disk; make room or check the file"
+            )
     _check_end(tar)
     if not members:
         raise DataError(f"{archive}: empty archive; delete it and fetch it again")

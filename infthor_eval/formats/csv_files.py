@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import read_text
+from infthor_eval.storage.files import write_atomically
 
 __all__ = ["CsvRow", "read_rows", "shield", "unshield", "write_sheet"]
 
@@ -31,7 +31,9 @@ class CsvRow:
     problem: str | None
 
 
-def read_rows(path: Path, columns: Sequence[str], hint: str, *, line_breaks: bool = False) -> Iterator[CsvRow]:
+def read_rows(
+    path: Path, columns: Sequence[str], hint: str, *, line_breaks: bool = False
+) -> Iterator[CsvRow]:
     """Yield the rows of a CSV file.
 
     Args:
@@ -52,7 +54,9 @@ def read_rows(path: Path, columns: Sequence[str], hint: str, *, line_breaks: boo
             if not cells:
                 continue
             row, problem = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False)), None
-            broken = next((name for name, cell in row.items() if "\n" in cell or "\r" in cell), None)
+            broken = next(
+                (name for name, cell in row.items() if "\n" in cell or "\r" in cell), None
+            )
             if len(cells) > len(header):
                 problem = f"has {len(cells)} cells for {len(header)} columns; {hint}"
             elif broken is not None and not line_breaks:
@@ -83,7 +87,9 @@ def write_sheet(path: Path, columns: Sequence[str], rows: Iterable[Sequence[obje
 
 def unshield(cell: str) -> str:
     """Return the text that `shield` was given."""
-    return cell[1:] if cell.startswith(_SHIELD) and cell[1:].startswith((*_FORMULA, _SHIELD)) else cell
+    return (
+        cell[1:] if cell.startswith(_SHIELD) and cell[1:].startswith((*_FORMULA, _SHIELD)) else cell
+    )
 
 
 def shield(cell: str) -> str:

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.digests import digest_of_files
-from infthor_eval.formats.files import OVERWRITE_HINT, refuse_overwrite, write_atomically
 from infthor_eval.formats.reading import json_lines_of
+from infthor_eval.storage.digests import digest_of_files
+from infthor_eval.storage.files import OVERWRITE_HINT, refuse_overwrite, write_atomically
 
 __all__ = ["floor_plan_names", "floor_plans_digest", "write_floor_plan"]
 
@@ -69,7 +69,9 @@ def write_floor_plan(
     layout = _layout_files(root, scene, objects, cells)
     if not overwrite:
         if recorded.get(scene, line) != line:
-            raise DataError(f"{path}: has a different recording of {scene} already; {OVERWRITE_HINT}")
+            raise DataError(
+                f"{path}: has a different recording of {scene} already; {OVERWRITE_HINT}"
+            )
         for file, content in layout.items():
             refuse_overwrite(file, content)
     others = [other for name, other in recorded.items() if name != scene]
@@ -79,7 +81,10 @@ def write_floor_plan(
             with write_atomically(file) as partial:
                 partial.write_bytes(content)
         path.parent.mkdir(parents=True, exist_ok=True)
-        with write_atomically(path) as partial, gzip.open(partial, "wt", encoding="utf-8") as packed:
+        with (
+            write_atomically(path) as partial,
+            gzip.open(partial, "wt", encoding="utf-8") as packed,
+        ):
             packed.writelines(f"{text}\n" for text in [*others, line])
 
 
@@ -102,7 +107,9 @@ def _read_scenes(path: Path) -> Iterator[tuple[str, str]]:
     for entry in json_lines_of(path, "give a folder of recorded floor plans with --data"):
         scene = entry.get("scene")
         if not isinstance(scene, str):
-            raise DataError(f"{path}: a line has no scene name; give a folder of recorded floor plans with --data")
+            raise DataError(
+                f"{path}: a line has no scene name; give a folder of recorded floor plans with --data"
+            )
         yield scene, json.dumps(entry)
 
 

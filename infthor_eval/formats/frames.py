@@ -15,9 +15,9 @@ from pathlib import Path
 from PIL import Image, UnidentifiedImageError
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.digests import digest_of_file
-from infthor_eval.formats.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 from infthor_eval.formats.reading import file_problem, require_file
+from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.limits import IMAGE_ASPECT, IMAGE_MEGAPIXELS
 
 __all__ = ["FrameRef"]
 
@@ -111,7 +111,9 @@ class FrameRef:
         try:
             return Image.open(self.path, formats=("PNG", "JPEG"))
         except UnidentifiedImageError as error:  # its message is the path
-            raise DataError(f"{self.path}: not a readable image (neither PNG nor JPEG); {_HINT}") from error
+            raise DataError(
+                f"{self.path}: not a readable image (neither PNG nor JPEG); {_HINT}"
+            ) from error
 
     def _wrong_size(self, width: int, height: int) -> str | None:
         """Return why an image of this size is refused: it would fill the memory, or no image processor accepts it."""

@@ -33,7 +33,9 @@ K = TypeVar("K")
 _LONGEST = 40  # characters of a name in a message
 _HINT = "unpack the trajectory again"
 _NO_FRAMES = "has no metadata/ with frames; unpack the set's metadata.tar there"
-_GIVE_A_SET = "give the folder of an NIEH set, or download the published one with `infthor-eval fetch nieh`"
+_GIVE_A_SET = (
+    "give the folder of an NIEH set, or download the published one with `infthor-eval fetch nieh`"
+)
 _IMAGE_FOLDERS = ("img", "img_768")
 _IMAGE_SUFFIXES = {".png", ".jpg", ".jpeg"}
 
@@ -50,7 +52,9 @@ class NiehSet:
         simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does not say.
     """
 
-    def __init__(self, root: Path, trajectories: Path | None = None, *, needs_questions: bool = True) -> None:
+    def __init__(
+        self, root: Path, trajectories: Path | None = None, *, needs_questions: bool = True
+    ) -> None:
         """Read the questions of the set in `root`, which may have none if they are not needed.
 
         Raises:
@@ -63,12 +67,16 @@ class NiehSet:
         self._folder = root if root.is_dir() else root.parent
         self._files = sorted(root.glob("qa_set*.csv")) if root.is_dir() else [root]
         if needs_questions and not self._files:
-            raise DataError(f"{root}: has no qa_set*.csv, as an NIEH set has beside metadata/; {_GIVE_A_SET}")
+            raise DataError(
+                f"{root}: has no qa_set*.csv, as an NIEH set has beside metadata/; {_GIVE_A_SET}"
+            )
         self.has_frames = (self._folder / "metadata").is_dir()
         if not self.has_frames and not needs_questions:
             raise DataError(f"{root}: {_NO_FRAMES}")
         if trajectories is not None and not trajectories.is_dir():
-            raise DataError(f"{trajectories}: no such folder; give the folder of the trajectories with --trajectories")
+            raise DataError(
+                f"{trajectories}: no such folder; give the folder of the trajectories with --trajectories"
+            )
         self.trajectories = trajectories
         self.simulator = simulator_of(self._folder)
         self.files = {file.stem: self._read_file(file) for file in self._files}
@@ -96,7 +104,11 @@ class NiehSet:
     @property
     def malformed(self) -> list[SkippedQuestion]:
         """Rows of the question files that are no question, in the order of the files."""
-        return [row for row in chain.from_iterable(self.files.values()) if isinstance(row, SkippedQuestion)]
+        return [
+            row
+            for row in chain.from_iterable(self.files.values())
+            if isinstance(row, SkippedQuestion)
+        ]
 
     @cached_property
     def skipped(self) -> tuple[SkippedQuestion, ...]:
@@ -124,7 +136,8 @@ class NiehSet:
     def _read_file(self, file: Path) -> tuple[Question | SkippedQuestion, ...]:
         name = file.stem if len(self._files) > 1 else ""
         return tuple(
-            row if isinstance(row, SkippedQuestion) else replace(row, file=name) for row in read_questions(file)
+            row if isinstance(row, SkippedQuestion) else replace(row, file=name)
+            for row in read_questions(file)
         )
 
     def reasons(self) -> Counter[str]:
@@ -141,7 +154,9 @@ class NiehSet:
         Raises:
             DataError: the trajectory is not in the set, or its frames do not match its metadata.
         """
-        return _read_once(self._all_frames, traj_id, lambda: tuple(self._trajectory(traj_id).values()))
+        return _read_once(
+            self._all_frames, traj_id, lambda: tuple(self._trajectory(traj_id).values())
+        )
 
     def clue_frames(self, question: Question) -> tuple[FrameRef, ...]:
         """Return the frames with a question's evidence, in the order of its clues."""
@@ -162,7 +177,11 @@ class NiehSet:
             DataError: the file is not a trajectory.
         """
         path = self.outline_file(traj_id)
-        return None if path is None else _read_once(self._outlines, traj_id, lambda: read_outline(path))
+        return (
+            None
+            if path is None
+            else _read_once(self._outlines, traj_id, lambda: read_outline(path))
+        )
 
     @property
     def missing_outline(self) -> str:
@@ -185,7 +204,9 @@ class NiehSet:
     def _read_action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
         path = self.folder(traj_id) / "expert_log.json"
         if not path.exists():
-            logged = logged_action_frames(sorted(read_steps(self.folder(traj_id)), key=lambda step: step.img_idx))
+            logged = logged_action_frames(
+                sorted(read_steps(self.folder(traj_id)), key=lambda step: step.img_idx)
+            )
             if logged is not None:
                 return logged
         places = {frame.path.stem: place for place, frame in enumerate(self.frames(traj_id))}
@@ -200,7 +221,9 @@ class NiehSet:
             DataError: the file is malformed.
         """
         outline = self.outline(traj_id)
-        return (outline and outline.state_summary) or read_states(self.folder(traj_id) / "state_summary.json")
+        return (outline and outline.state_summary) or read_states(
+            self.folder(traj_id) / "state_summary.json"
+        )
 
     def video(self, traj_id: str) -> Path | None:
         """Return the trajectory's video, or None if it has none."""
@@ -213,7 +236,9 @@ class NiehSet:
         Raises:
             DataError: the video is missing or cannot be decoded.
         """
-        return _read_once(self._videos, (traj_id, fps), lambda: read_video(self._video_path(traj_id), fps))
+        return _read_once(
+            self._videos, (traj_id, fps), lambda: read_video(self._video_path(traj_id), fps)
+        )
 
     def _video_path(self, traj_id: str) -> Path:
         return self.folder(traj_id) / f"{traj_id}_10fps.mp4"
@@ -232,7 +257,9 @@ class NiehSet:
             return str(error)
         outside = [index for index in question.clues if index not in frames]
         if outside:
-            return f"clue {outside[0]} is outside trajectory {question.traj_id} ({len(frames)} frames)"
+            return (
+                f"clue {outside[0]} is outside trajectory {question.traj_id} ({len(frames)} frames)"
+            )
         return next(filter(None, (frames[index].problem() for index in question.clues)), None)
 
     def _trajectory(self, traj_id: str) -> dict[int, FrameRef]:
@@ -269,9 +296,14 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
     # By stem: published sets of other sizes (img_768) keep the names and change the suffix.
     names = [Path(step.img_filename).stem for step in steps]
     numbers = [step.img_idx for step in steps]
-    for duplicate, what in ((_first_duplicate(names), "img_filename"), (_first_duplicate(numbers), "img_idx")):
+    for duplicate, what in (
+        (_first_duplicate(names), "img_filename"),
+        (_first_duplicate(numbers), "img_idx"),
+    ):
         if duplicate is not None:
-            raise DataError(f"trajectory {folder.name}: two entries of metadata.json have {what} {duplicate}; {_HINT}")
+            raise DataError(
+                f"trajectory {folder.name}: two entries of metadata.json have {what} {duplicate}; {_HINT}"
+            )
     by_stem = _images(home)
     unknown = sorted(by_stem.keys() - set(names))
     # Only a surplus of files is an error of the trajectory. A renamed frame is one unknown and one missing file.
@@ -291,7 +323,9 @@ def _images(folder: Path) -> dict[str, Path]:
     images = sorted(path for path in folder.iterdir() if path.suffix.lower() in _IMAGE_SUFFIXES)
     duplicate = _first_duplicate([path.stem for path in images])
     if duplicate is not None:
-        raise DataError(f"{folder}: two frames have the name {duplicate} (.png, .jpg); remove one of them")
+        raise DataError(
+            f"{folder}: two frames have the name {duplicate} (.png, .jpg); remove one of them"
+        )
     return {path.stem: path for path in images}
 
 

@@ -9,7 +9,11 @@ from enum import StrEnum
 __all__ = ["Words", "modern_type", "object_type_of"]
 
 # Types of AI2-THOR 2.1.0, as in ALFRED and the published trajectories, that 5.x calls otherwise.
-_RENAMED = {"Glassbottle": "Bottle", "PaperTowel": "PaperTowelRoll", "ToiletPaperRoll": "ToiletPaper"}
+_RENAMED = {
+    "Glassbottle": "Bottle",
+    "PaperTowel": "PaperTowelRoll",
+    "ToiletPaperRoll": "ToiletPaper",
+}
 
 
 def object_type_of(object_id: str) -> str:
@@ -35,4 +39,8 @@ class Words(StrEnum):
 
     def name_of(self, object_id: str) -> str:
         """Return the name of an object."""
-        return object_id.split("|", maxsplit=1)[0] if self is Words.PUBLISHED else object_type_of(object_id)
+        return (
+            object_id.split("|", maxsplit=1)[0]
+            if self is Words.PUBLISHED
+            else object_type_of(object_id)
+        )

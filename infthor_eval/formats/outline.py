@@ -106,5 +106,7 @@ def read_states(path: Path) -> dict[int, str]:
     if not path.exists():
         return {}
     content = read_bytes(path, "replay it again")
-    with wrap_errors(f"{path}: not a mapping of low-level actions to states", "replay it again", catch=NOT_JSON):
+    with wrap_errors(
+        f"{path}: not a mapping of low-level actions to states", "replay it again", catch=NOT_JSON
+    ):
         return msgspec.json.decode(content, type=dict[int, str], strict=False)

@@ -15,15 +15,17 @@ from typing import Annotated, Any, NamedTuple
 import msgspec
 
 from infthor_eval.errors import DataError, in_one_line
-from infthor_eval.formats.digests import digest
 from infthor_eval.formats.reading import json_value, lines_of
 from infthor_eval.formats.reply_logs import UnreadRow
+from infthor_eval.storage.digests import digest
 
 __all__ = ["LoggedPlans", "PlanCount", "PlanLog", "is_plan_log", "read_plan_log"]
 
 _PUBLISHED_NAME = re.compile(r"eval_longhrz_checkpoints_(?P<model>.+?)_?\.log(?:\.gz)?$")
 _HINT = "give a log of the published scripts, with the counts of a trajectory's plans a line"
-_Number = Annotated[int, msgspec.Meta(ge=0, le=10_000)]  # each plan becomes a record; a task has a few
+_Number = Annotated[
+    int, msgspec.Meta(ge=0, le=10_000)
+]  # each plan becomes a record; a task has a few
 
 
 class PlanCount(NamedTuple):
@@ -123,13 +125,17 @@ def read_plan_log(path: Path) -> PlanLog:
         if isinstance(row, UnreadRow):
             unread.append(row)
         elif row.traj_id in rows:
-            unread.append(UnreadRow(row.line, f"has {row.traj_id!r:.80} again; the first row is kept"))
+            unread.append(
+                UnreadRow(row.line, f"has {row.traj_id!r:.80} again; the first row is kept")
+            )
         else:
             rows[row.traj_id] = row
     if not rows:
         reason = f"line {unread[0].line} {unread[0].reason}" if unread else "it is empty"
         raise DataError(f"{path}: no line has counts of plans ({reason}); {_HINT}")
-    return PlanLog(path, tuple(rows.values()), tuple(unread), digest(b"".join(line for _, line in lines)))
+    return PlanLog(
+        path, tuple(rows.values()), tuple(unread), digest(b"".join(line for _, line in lines))
+    )
 
 
 def _read_line(number: int, line: bytes) -> LoggedPlans | UnreadRow:
@@ -150,6 +156,9 @@ def _read_row(number: int, entry: Any) -> LoggedPlans:
     total = PlanCount(metric.success_count, metric.total_count)
     if any(count.n_done > count.n for count in (*of_kinds, total)):
         raise ValueError("more plans are done than there are")
-    if sum(count.n_done for count in of_kinds) > total.n_done or sum(count.n for count in of_kinds) > total.n:
+    if (
+        sum(count.n_done for count in of_kinds) > total.n_done
+        or sum(count.n for count in of_kinds) > total.n
+    ):
         raise ValueError("the total is less than its kinds together")
     return LoggedPlans(number, row.traj_id, *of_kinds, total)

@@ -12,12 +12,14 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import read_yaml
+from infthor_eval.storage.packaged import packaged_folder
 
 __all__ = ["PublishedRow", "PublishedTable", "published_tables"]
 
-_SAME_SIZE = 0.1  # relative tolerance: counts of one model differ with its heads and tied embeddings
+_SAME_SIZE = (
+    0.1  # relative tolerance: counts of one model differ with its heads and tied embeddings
+)
 
 
 class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -92,9 +94,13 @@ def published_tables(suite: str) -> tuple[PublishedTable, ...]:
 
 def _read(path: Path) -> PublishedTable:
     hint = "install infthor-eval again"
-    with wrap_errors(f"{path}: not a table of published numbers", hint, catch=msgspec.ValidationError):
+    with wrap_errors(
+        f"{path}: not a table of published numbers", hint, catch=msgspec.ValidationError
+    ):
         table = msgspec.convert(read_yaml(path, hint), PublishedTable)
     for row in table.rows:
         if len(row.values) != len(table.columns):
-            raise DataError(f"{path}: {row.name} has {len(row.values)} values for {len(table.columns)} columns")
+            raise DataError(
+                f"{path}: {row.name} has {len(row.values)} values for {len(table.columns)} columns"
+            )
     return table

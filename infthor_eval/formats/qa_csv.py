@@ -20,8 +20,8 @@ from typing import Any
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.csv_files import CsvRow, read_rows
-from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.question import PublishedColumns, Question, SkippedQuestion
+from infthor_eval.storage.files import write_atomically
 
 __all__ = ["encode_questions", "read_questions", "write_questions"]
 
@@ -63,7 +63,14 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
     writer.writerow([*_COLUMNS, _TYPE, _ABSENCE, *(_PUBLISHED if are_published else ())])
     for item in questions:
         absence = "yes" if item.absence else ""
-        cells = [item.traj_id, item.text, list(item.clues), list(item.answers), item.question_type or "", absence]
+        cells = [
+            item.traj_id,
+            item.text,
+            list(item.clues),
+            list(item.answers),
+            item.question_type or "",
+            absence,
+        ]
         writer.writerow([*cells, *(_published_cells(item.published) if item.published else ())])
     return text.getvalue().encode()
 
@@ -106,7 +113,9 @@ def _question(row: dict[str, str], file: str | None) -> Question:
 def _published(row: dict[str, str], file: Any) -> PublishedColumns | None:
     if file is None:
         return None
-    cells = {name: cell.strip() for name, cell in row.items() if name in _PUBLISHED and cell.strip()}
+    cells = {
+        name: cell.strip() for name, cell in row.items() if name in _PUBLISHED and cell.strip()
+    }
     try:
         n_evidence = int(cells["num_evidence"]) if "num_evidence" in cells else None
         matches = tuple((name, float(cells[name])) for name in _MATCHES if name in cells)
@@ -121,7 +130,12 @@ def _published(row: dict[str, str], file: Any) -> PublishedColumns | None:
 def _published_cells(published: PublishedColumns) -> list[object]:
     matches = dict(published.matches)
     n_evidence = "" if published.n_evidence is None else published.n_evidence
-    return [published.qid or "", n_evidence, list(published.steps), *(matches.get(name, "") for name in _MATCHES)]
+    return [
+        published.qid or "",
+        n_evidence,
+        list(published.steps),
+        *(matches.get(name, "") for name in _MATCHES),
+    ]
 
 
 def _literal_list(row: dict[str, str], name: str, types: type | tuple[type, ...]) -> list[Any]:
@@ -132,7 +146,9 @@ def _literal_list(row: dict[str, str], name: str, types: type | tuple[type, ...]
     if not isinstance(value, list):
         raise DataError(f"{name} is not a list; write it as in [12, 13] or ['yes']")
     if not all(isinstance(item, types) and not isinstance(item, bool) for item in value):
-        raise DataError(f"{name} has an entry of the wrong type; write it as in [12, 13] or ['yes']")
+        raise DataError(
+            f"{name} has an entry of the wrong type; write it as in [12, 13] or ['yes']"
+        )
     return value
 
 

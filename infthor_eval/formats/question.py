@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from infthor_eval.formats.digests import digest
+from infthor_eval.storage.digests import digest
 
 __all__ = ["ABSENCE", "Answer", "PublishedColumns", "Question", "SkippedQuestion"]
 
@@ -78,7 +78,9 @@ class Question:
     @cached_property
     def id(self) -> str:
         """Name of the question, which does not depend on the order of the file: `<traj_id>/<12 hex digits>`, or qid."""
-        if self.published and self.published.qid:  # a few published questions are there twice, under two names
+        if (
+            self.published and self.published.qid
+        ):  # a few published questions are there twice, under two names
             return self.published.qid
         key = repr((self.text, self.clues, self.answers))
         return f"{self.traj_id}/{digest(key, 6)}"

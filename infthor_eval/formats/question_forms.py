@@ -50,7 +50,13 @@ FORMS = (
 
 _CONTENT, _OPEN, _LOCATION, _COUNT, _PUT = (
     f"{name}_further"
-    for name in ("container_content", "open_state", "location_tracing", "movement_counting", "put_action")
+    for name in (
+        "container_content",
+        "open_state",
+        "location_tracing",
+        "movement_counting",
+        "put_action",
+    )
 )
 FURTHER_FORMS = (
     QuestionForm(_OPEN, "Was {} open when you {}?"),
@@ -60,7 +66,10 @@ FURTHER_FORMS = (
     QuestionForm(_LOCATION, "Where was {} before you first picked it up?"),
     QuestionForm(_LOCATION, "Where did you move {} to?"),
     QuestionForm(_LOCATION, "In which places was {}, from first to last?"),
-    QuestionForm(_CONTENT, "Which things that can be picked up were directly in/on {} when you first opened it?"),
+    QuestionForm(
+        _CONTENT,
+        "Which things that can be picked up were directly in/on {} when you first opened it?",
+    ),
     QuestionForm(
         _CONTENT,
         "Which other things that can be picked up were directly in/on {} when you picked up {} from it?",

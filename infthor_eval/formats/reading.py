@@ -16,7 +16,7 @@ from typing import Any, TypeVar, overload
 import msgspec
 
 from infthor_eval.errors import DataError, in_one_line, wrap_errors
-from infthor_eval.formats.limits import FILE_MB, LINE_MB
+from infthor_eval.storage.limits import FILE_MB, LINE_MB
 
 __all__ = [
     "DAMAGED",
@@ -128,13 +128,17 @@ def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
             while line := file.readline(LINE_MB.value * _MB + 1):
                 number, left = number + 1, left - len(line)
                 if len(line) > LINE_MB.value * _MB:
-                    raise DataError(f"{path}, line {number}: is longer than {LINE_MB.value} MiB; {LINE_MB.hint}")
+                    raise DataError(
+                        f"{path}, line {number}: is longer than {LINE_MB.value} MiB; {LINE_MB.hint}"
+                    )
                 if left < 0:
                     raise DataError(f"{path}: is longer than {FILE_MB.value} MiB; {FILE_MB.hint}")
                 if line.strip():
                     yield number, line
     except (OSError, *DAMAGED) as error:
-        raise DataError(f"{path}: cannot be read after line {number} ({in_one_line(error)}); {hint}") from error
+        raise DataError(
+            f"{path}: cannot be read after line {number} ({in_one_line(error)}); {hint}"
+        ) from error
 
 
 def json_value(text: bytes) -> Any:
@@ -159,7 +163,9 @@ def json_lines_of(path: Path, hint: str) -> Iterator[dict[str, Any]]:
         DataError: as `lines_of`, or a line is not a JSON object.
     """
     for number, line in lines_of(path, hint):
-        with wrap_errors(f"{path}, line {number}: not JSON", hint, catch=(ValueError, RecursionError)):
+        with wrap_errors(
+            f"{path}, line {number}: not JSON", hint, catch=(ValueError, RecursionError)
+        ):
             entry = json_value(line)
         if not isinstance(entry, dict):
             raise DataError(f"{path}, line {number}: not a JSON object; {hint}")

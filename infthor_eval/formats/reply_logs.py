@@ -116,7 +116,10 @@ def read_reply_log(path: Path) -> Iterator[LoggedReply | UnreadRow]:
             yield UnreadRow(number, f"is not a reply ({in_one_line(error)})")
             continue
         if len(row.text) > _LONGEST:
-            yield UnreadRow(number, f"has a reply of {len(row.text):,} characters; at most {_LONGEST:,} can be scored")
+            yield UnreadRow(
+                number,
+                f"has a reply of {len(row.text):,} characters; at most {_LONGEST:,} can be scored",
+            )
         else:
             yield row
 

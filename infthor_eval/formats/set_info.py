@@ -48,7 +48,9 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
             f"{root}: its frames are of the {theirs} simulator; give another folder for the {simulator} one"
         )
     if wrote != version:
-        raise DataError(f"{root}: its frames were rendered by version {wrote}, this is {version}; give another folder")
+        raise DataError(
+            f"{root}: its frames were rendered by version {wrote}, this is {version}; give another folder"
+        )
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -216,8 +216,13 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
             return _rows(path, document)
         case Layout.OBJECTS:
             # The published code counts the sorted pictures, so a frame's number is its place among their names.
-            listed = enumerate(sorted(document["img_idx"], key=lambda frame: str(frame.get("img_filename"))))
-            return [{"img_idx": place, "step": frame.get("low_idx") or 0, **frame} for place, frame in listed]
+            listed = enumerate(
+                sorted(document["img_idx"], key=lambda frame: str(frame.get("img_filename")))
+            )
+            return [
+                {"img_idx": place, "step": frame.get("low_idx") or 0, **frame}
+                for place, frame in listed
+            ]
 
 
 def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
@@ -226,12 +231,18 @@ def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
     n_rows = len(columns["img_idx"])
     for name, column in lists.items():
         if len(column) != n_rows:
-            raise DataError(f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {n_rows}; {_HINT}")
+            raise DataError(
+                f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {n_rows}; {_HINT}"
+            )
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 
 
 def _step(path: Path, index: int, entry: object) -> Step:
-    if isinstance(entry, dict) and "img_filename" not in entry and isinstance(entry.get("img_idx"), int):
+    if (
+        isinstance(entry, dict)
+        and "img_filename" not in entry
+        and isinstance(entry.get("img_idx"), int)
+    ):
         # Files of columns may lack the names; frame files are always named by their number.
         entry = {**entry, "img_filename": f"{entry['img_idx']:09d}.png"}
     try:

@@ -15,9 +15,9 @@ import msgspec
 from msgspec import Meta
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.digests import digest
-from infthor_eval.formats.limits import OBJECT_POSES
 from infthor_eval.formats.reading import lines_of, read_bytes
+from infthor_eval.storage.digests import digest
+from infthor_eval.storage.limits import OBJECT_POSES
 
 __all__ = [
     "ApiAction",
@@ -46,7 +46,11 @@ _SUFFIXES = (".json", ".jsonl", ".jsonl.gz")
 # Other JSON files of a replayed set.
 _NOT_TRAJECTORIES = {"metadata.json", "expert_log.json", "state_summary.json"}
 _HINT = "restore the file or leave it out"
-_ALWAYS: dict[str, Callable[[], Any]] = {"long_horizon_task": dict, "sub_tasks": list, "sub_trajs": list}
+_ALWAYS: dict[str, Callable[[], Any]] = {
+    "long_horizon_task": dict,
+    "sub_tasks": list,
+    "sub_trajs": list,
+}
 
 
 class _Fields(msgspec.Struct, omit_defaults=True):
@@ -67,7 +71,9 @@ class InitAction(_Fields, omit_defaults=False):
     @property
     def yaw(self) -> float:
         """Rotation about the vertical axis, degrees."""
-        return self.rotation if isinstance(self.rotation, int | float) else self.rotation.get("y", 0.0)
+        return (
+            self.rotation if isinstance(self.rotation, int | float) else self.rotation.get("y", 0.0)
+        )
 
 
 class ObjectPose(_Fields):
@@ -75,7 +81,9 @@ class ObjectPose(_Fields):
 
     name: str = msgspec.field(name="objectName")
     position: dict[str, float]
-    rotation: dict[str, float] = msgspec.field(default_factory=lambda: {"x": 0.0, "y": 0.0, "z": 0.0})
+    rotation: dict[str, float] = msgspec.field(
+        default_factory=lambda: {"x": 0.0, "y": 0.0, "z": 0.0}
+    )
 
 
 class Toggle(_Fields, omit_defaults=False):
@@ -231,7 +239,9 @@ class TrajectorySource:
             trajectory = msgspec.convert(_normalize(msgspec.json.decode(self.raw)), type=Trajectory)
         n_poses = len(trajectory.scene.object_poses)
         if n_poses > OBJECT_POSES.value:
-            raise DataError(f"{self.place}: {n_poses:,} object_poses are too many for a scene; {OBJECT_POSES.hint}")
+            raise DataError(
+                f"{self.place}: {n_poses:,} object_poses are too many for a scene; {OBJECT_POSES.hint}"
+            )
         stem = self.path.name.split(".")[0]
         in_file = stem if self.line is None else f"{stem}-{self.line}"
         trajectory.traj_id = trajectory.traj_id or trajectory.task_id or in_file
@@ -255,7 +265,9 @@ def iter_sources(path: Path) -> Iterator[TrajectorySource]:
     elif path.name.endswith((".jsonl", ".jsonl.gz")):
         yield from (TrajectorySource(path, line, raw) for line, raw in lines_of(path, _HINT))
     else:
-        raise DataError(f"{path}: not a trajectory file; give a {', '.join(_SUFFIXES)} file or a folder")
+        raise DataError(
+            f"{path}: not a trajectory file; give a {', '.join(_SUFFIXES)} file or a folder"
+        )
 
 
 def trajectory_files(path: Path) -> list[Path]:
@@ -298,10 +310,18 @@ def _normalize(document: Any) -> Any:
     """
     if not isinstance(document, dict):
         return document  # `msgspec.convert` refuses it and says what it is
-    normalized = {name: value for name, value in document.items() if (name, value) != ("long_horizon_task", {})}
+    normalized = {
+        name: value
+        for name, value in document.items()
+        if (name, value) != ("long_horizon_task", {})
+    }
     scene = normalized.get("scene")
     if isinstance(scene, dict):
-        scene = {name: value for name, value in scene.items() if (name, value) != ("dirty_and_empty", None)}
+        scene = {
+            name: value
+            for name, value in scene.items()
+            if (name, value) != ("dirty_and_empty", None)
+        }
         if not scene.get("floor_plan") and "scene_num" in scene:
             scene["floor_plan"] = f"FloorPlan{str(scene['scene_num']).removeprefix('FloorPlan')}"
         normalized["scene"] = scene

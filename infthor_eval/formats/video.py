@@ -17,10 +17,10 @@ from pathlib import Path
 from PIL import Image
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.reading import require_file
-from infthor_eval.formats.user_cache import user_cache
+from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.user_cache import user_cache
 
 __all__ = ["FILM_FPS", "Video", "read_video", "sample_positions"]
 
@@ -54,7 +54,9 @@ class Video:
     def __post_init__(self) -> None:
         """Raise ValueError if there is no frame, or the rate is not above 0."""
         if not self.frames or not self.fps > 0:
-            raise ValueError(f"a video has frames and a rate above 0, not {len(self.frames)} frames at {self.fps} fps")
+            raise ValueError(
+                f"a video has frames and a rate above 0, not {len(self.frames)} frames at {self.fps} fps"
+            )
 
 
 def sample_positions(n_frames: int, film_fps: float, fps: float) -> tuple[int, ...]:
@@ -98,7 +100,9 @@ def read_video(path: Path, fps: float) -> Video:
 def _is_complete(folder: Path) -> bool:
     """Return False also if frames were deleted later, as programs that clean caches do."""
     sampled = folder / _SAMPLED
-    return sampled.is_file() and json.loads(sampled.read_text())["n_frames"] == len(list(folder.glob("*.png")))
+    return sampled.is_file() and json.loads(sampled.read_text())["n_frames"] == len(
+        list(folder.glob("*.png"))
+    )
 
 
 def _extract(path: Path, fps: float, folder: Path) -> None:

@@ -6,8 +6,8 @@ from typing import Any
 import yaml
 
 from infthor_eval.errors import DataError, wrap_errors
-from infthor_eval.formats.limits import ALIAS_NODES
 from infthor_eval.formats.reading import read_text
+from infthor_eval.storage.limits import ALIAS_NODES
 
 __all__ = ["PlainLoader", "read_yaml"]
 
@@ -24,7 +24,9 @@ def read_yaml(path: Path, hint: str, loader: type[PlainLoader] = PlainLoader) ->
             of values once its aliases are expanded.
     """
     text = read_text(path, hint)
-    with wrap_errors(f"{path}: not YAML", hint, catch=(yaml.YAMLError, RecursionError, ValueError, TypeError)):
+    with wrap_errors(
+        f"{path}: not YAML", hint, catch=(yaml.YAMLError, RecursionError, ValueError, TypeError)
+    ):
         reader = loader(text)
         try:
             node = reader.get_single_node()
@@ -44,7 +46,9 @@ def _check(root: yaml.Node, path: Path) -> None:
 
     def size(node: yaml.Node) -> int:
         if id(node) in above:
-            raise DataError(f"{path}: an alias refers to a node that contains it; write it out without aliases")
+            raise DataError(
+                f"{path}: an alias refers to a node that contains it; write it out without aliases"
+            )
         if id(node) not in sizes:
             above.add(id(node))
             sizes[id(node)] = 1 + sum(map(size, _children(node, path)))
@@ -56,8 +60,12 @@ def _check(root: yaml.Node, path: Path) -> None:
 
 
 def _children(node: yaml.Node, path: Path) -> list[yaml.Node]:
-    if isinstance(node, yaml.ScalarNode) and any("\ud800" <= letter <= "\udfff" for letter in node.value):
-        raise DataError(f"{path}: half of a character (\\ud800 to \\udfff) in a text; write it whole, or take it out")
+    if isinstance(node, yaml.ScalarNode) and any(
+        "\ud800" <= letter <= "\udfff" for letter in node.value
+    ):
+        raise DataError(
+            f"{path}: half of a character (\\ud800 to \\udfff) in a text; write it whole, or take it out"
+        )
     if isinstance(node, yaml.SequenceNode):
         return list(node.value)
     if not isinstance(node, yaml.MappingNode):

@@ -13,17 +13,24 @@ from msgspec import Meta
 from PIL import Image
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.reading import read_json
-from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.generation.generate_set import generate_set
 from infthor_eval.generation.questions.generate import GeneratedQuestions, generate_questions
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.settings import TrajectorySettings
+from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["MANIFEST", "Manifest", "TrajectoryRecipe", "build_bundle", "differing_files", "read_manifest"]
+__all__ = [
+    "MANIFEST",
+    "Manifest",
+    "TrajectoryRecipe",
+    "build_bundle",
+    "differing_files",
+    "read_manifest",
+]
 
 MANIFEST = "manifest.json"
 _NOT_SHIPPED = "replay.json"  # has wall times, which differ from build to build
@@ -70,7 +77,10 @@ def read_manifest(path: Path) -> Manifest:
 
 
 def build_bundle(
-    manifest: Manifest, simulator: Simulator, out: Path, progress: Callable[[bool], None] = lambda _: None
+    manifest: Manifest,
+    simulator: Simulator,
+    out: Path,
+    progress: Callable[[bool], None] = lambda _: None,
 ) -> tuple[Manifest, GeneratedQuestions]:
     """Build the set: generate and replay the trajectories, generate questions, and compress the frames.
 
@@ -94,7 +104,10 @@ def build_bundle(
         replayed = replay_set(select([folder]), simulator, out, progress)
     _raise_first([item.message for item in replayed.failures])
     generated = generate_questions(
-        out, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory, further=manifest.further
+        out,
+        seed=manifest.question_seed,
+        per_trajectory=manifest.per_trajectory,
+        further=manifest.further,
     )
     write_questions(out / f"qa_set_{manifest.name}.csv", generated.questions)
     for frame in sorted(out.rglob("img/*.png")):
@@ -102,7 +115,9 @@ def build_bundle(
     for path in out.rglob(_NOT_SHIPPED):
         path.unlink()
     finished = msgspec.structs.replace(manifest, files=_digests(out))
-    (out / MANIFEST).write_bytes(msgspec.json.format(msgspec.json.encode(finished), indent=1) + b"\n")
+    (out / MANIFEST).write_bytes(
+        msgspec.json.format(msgspec.json.encode(finished), indent=1) + b"\n"
+    )
     return finished, generated
 
 

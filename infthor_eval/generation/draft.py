@@ -99,7 +99,9 @@ class Draft:
         """
         number = len(self._sub_tasks)
         self._n_put_downs += self.length.low > end.low
-        self._sub_trajs.append(SubTrajectory(number, (start.high, end.high), (start.low, end.low), task.task_desc))
+        self._sub_trajs.append(
+            SubTrajectory(number, (start.high, end.high), (start.low, end.low), task.task_desc)
+        )
         self._sub_tasks.append(task)
 
     def drop_last_task(self) -> None:
@@ -152,4 +154,8 @@ class Draft:
 def _image(low: LowAction) -> dict[str, Any]:
     """Return the entry of the frame after an action, with its name in a replay; frame 0 is before the first action."""
     assert low.low_idx is not None
-    return {"high_idx": low.high_idx, "low_idx": low.low_idx, "image_name": f"{low.low_idx + 1:09d}.png"}
+    return {
+        "high_idx": low.high_idx,
+        "low_idx": low.low_idx,
+        "image_name": f"{low.low_idx + 1:09d}.png",
+    }

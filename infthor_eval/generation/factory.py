@@ -99,7 +99,9 @@ class _Factory:
         self._statistics = AttemptStatistics()
         self._n_in_row = 0  # failures of executed tasks since the last one that was accepted
         self._n_roll_backs = 0  # since the last task that was accepted
-        self._n_not_executed = 0  # failures of tasks of which nothing was executed, since the pool began
+        self._n_not_executed = (
+            0  # failures of tasks of which nothing was executed, since the pool began
+        )
         self._problems: list[str] = []
         self._marks: list[SimulatorMark] = []  # the state before each task
         self._draft = self._start_draft()
@@ -109,9 +111,13 @@ class _Factory:
         view = self._simulator.reset(self._settings.scene)
         grid = reachable_grid(self._simulator)
         if not grid.cells:
-            raise UsageError(f"scene {self._settings.scene}: the agent cannot stand anywhere; choose another scene")
+            raise UsageError(
+                f"scene {self._settings.scene}: the agent cannot stand anywhere; choose another scene"
+            )
         x, z = grid.position(self._rng.choice(sorted(grid.cells)))
-        start = InitAction(x, view.agent.position.y, z, float(self._rng.choice([0, 90, 180, 270])), 30.0)
+        start = InitAction(
+            x, view.agent.position.y, z, float(self._rng.choice([0, 90, 180, 270])), 30.0
+        )
         scene = initial_scene(self._settings, view, start)
         restore(self._simulator, scene)
         return Draft(self._settings, scene, self._simulator.view)
@@ -182,7 +188,10 @@ class _Factory:
         pool = TaskPool(self._rng)
         while True:
             room = self._room()
-            candidates = [[task for task in self._candidates(room) if types.allows_task(task)] for types in directions]
+            candidates = [
+                [task for task in self._candidates(room) if types.allows_task(task)]
+                for types in directions
+            ]
             self._rng.shuffle(candidates)
             task = pool.draw(candidates[0]) or pool.draw(candidates[1])
             if task is None:
@@ -217,7 +226,9 @@ class _Factory:
             return
         self._n_not_executed += 1
         if self._n_not_executed > max(_MIN_NOT_EXECUTED, 10 * self._settings.max_fail):
-            raise _GaveUp(self._no_further_task("choose another scene or seed or a higher --max-fail"))
+            raise _GaveUp(
+                self._no_further_task("choose another scene or seed or a higher --max-fail")
+            )
 
     def _roll_back(self) -> None:
         """Drop the last sub-goals, twice as many as the last time, and go on from the state before them.
@@ -226,7 +237,9 @@ class _Factory:
             _GaveUp: there is nothing to drop.
         """
         if not self._draft.n_tasks:
-            raise _GaveUp(self._no_further_task("choose another scene or seed or a higher --max-fail"))
+            raise _GaveUp(
+                self._no_further_task("choose another scene or seed or a higher --max-fail")
+            )
         self._note_longest()
         before, n_before = self._draft.length, self._draft.n_subgoals
         n_to_drop = min(2**self._n_roll_backs, max(1, n_before - 1))
@@ -264,7 +277,11 @@ class _Factory:
         """Return the tasks that are possible now: what is known to be full or out of reach is left out."""
         types = {item.object_type for item in self._simulator.view.objects.values()}
         tasks = [task for task in tasks_of(room, types) if task.task_type in self._task_types]
-        return [task for task in tasks if is_feasible(task, room) and not is_achieved(task, room, room.start)]
+        return [
+            task
+            for task in tasks
+            if is_feasible(task, room) and not is_achieved(task, room, room.start)
+        ]
 
     def _try(self, task: Task, room: SymbolicRoom, is_last: bool = False) -> _Outcome:
         """Plan a task, rehearse it and carry it out; after a failure everything is as before."""

@@ -61,9 +61,13 @@ def violation(trajectory: Trajectory) -> str | None:
     info = task.task_info
     other = info.receptacle or task.pddl_params.get("toggle_target")
     either_way = end_types(trajectory.object_log[: before + 1])
-    if info.pickup is not None and any(ends.allows(info.pickup, other, info.movable) for ends in either_way):
+    if info.pickup is not None and any(
+        ends.allows(info.pickup, other, info.movable) for ends in either_way
+    ):
         return None
-    return f"'{task.task_desc}' is not about types seen at both ends of the {before} steps before it"
+    return (
+        f"'{task.task_desc}' is not about types seen at both ends of the {before} steps before it"
+    )
 
 
 def _types(entries: Sequence[dict[str, Any]], name: str) -> frozenset[str]:

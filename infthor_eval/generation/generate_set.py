@@ -8,7 +8,6 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.errors import InfthorError, UsageError, wrap_errors
-from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, generate
 from infthor_eval.generation.garbage import freeze_existing_objects
@@ -16,11 +15,18 @@ from infthor_eval.generation.settings import TrajectorySettings
 from infthor_eval.generation.simulator_jobs import SimulatorWorker, collect_outcomes
 from infthor_eval.generation.statistics import AttemptStatistics
 from infthor_eval.household.pddl import DOMAIN
+from infthor_eval.storage.files import write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.workers import WorkerSettings, run_jobs
 
-__all__ = ["GeneratedSet", "GenerationSummary", "TaskCounts", "generate_set", "generate_with_workers"]
+__all__ = [
+    "GeneratedSet",
+    "GenerationSummary",
+    "TaskCounts",
+    "generate_set",
+    "generate_with_workers",
+]
 
 _MAX_COPIES = 16  # of the simulator's state
 
@@ -168,10 +174,13 @@ def generate_with_workers(
 
 
 def _summarise(
-    outcomes: Iterable[tuple[int, _GenerationOutcome | InfthorError]], progress: Callable[[bool], None]
+    outcomes: Iterable[tuple[int, _GenerationOutcome | InfthorError]],
+    progress: Callable[[bool], None],
 ) -> GeneratedSet:
     result = GeneratedSet()
-    for outcome in collect_outcomes(outcomes, lambda _, error: _GenerationOutcome(failure=str(error)), progress):
+    for outcome in collect_outcomes(
+        outcomes, lambda _, error: _GenerationOutcome(failure=str(error)), progress
+    ):
         if outcome.path is None:
             result.failures.append(str(outcome.failure))
             continue
@@ -196,12 +205,16 @@ def _generate_one(job: TrajectorySettings, simulator: Simulator, out: Path) -> _
         return _GenerationOutcome(failure=str(error))
     # Outside of `try`: if this file has no room, generating the other trajectories would be wasted.
     _write(generated, path)
-    return _GenerationOutcome(path, len(generated.trajectory.plan.low_actions), generated.statistics)
+    return _GenerationOutcome(
+        path, len(generated.trajectory.plan.low_actions), generated.statistics
+    )
 
 
 def _write(generated: GeneratedTrajectory, path: Path) -> None:
     folder = path.with_suffix(".pddl")
-    with wrap_errors(f"{path}: cannot be written", "make room and run the same command again, which resumes"):
+    with wrap_errors(
+        f"{path}: cannot be written", "make room and run the same command again, which resumes"
+    ):
         folder.mkdir(exist_ok=True)
         (folder / "domain.pddl").write_text(DOMAIN)
         for number, problem in enumerate(generated.problems):
@@ -214,5 +227,7 @@ def _check_earlier(path: Path, job: TrajectorySettings) -> int:
     """Check that a trajectory was generated with the same settings, and return its number of actions."""
     trajectory = next(iter_sources(path)).read()
     if (trajectory.gen_info or {}).get("settings") != job.document():
-        raise UsageError(f"{path}: generated with other settings; remove it or choose another --out")
+        raise UsageError(
+            f"{path}: generated with other settings; remove it or choose another --out"
+        )
     return len(trajectory.plan.low_actions)

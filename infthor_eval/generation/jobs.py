@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.limits import TRAJECTORIES
 from infthor_eval.generation.settings import MAX_FAIL, TrajectorySettings
 from infthor_eval.household.scene_types import BATHROOM, scene_type
+from infthor_eval.storage.limits import TRAJECTORIES
 
 __all__ = ["trajectory_jobs", "without_bathrooms"]
 
@@ -37,10 +37,14 @@ def trajectory_jobs(
         UsageError: the number of trajectories exceeds the limit.
     """
     if count * len(scenes) > TRAJECTORIES.value:
-        raise UsageError(f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.hint}")
+        raise UsageError(
+            f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.hint}"
+        )
     seeds = range(seed, seed + count)
     return [
-        TrajectorySettings(scene, k, min_steps, min_subgoals, final_task, max_fail=max_fail, save_floor=save_floor)
+        TrajectorySettings(
+            scene, k, min_steps, min_subgoals, final_task, max_fail=max_fail, save_floor=save_floor
+        )
         for scene in scenes
         for k in seeds
     ]
@@ -55,5 +59,7 @@ def without_bathrooms(scenes: Sequence[str]) -> tuple[list[str], list[str]]:
     chosen = [scene for scene in scenes if scene_type(scene) != BATHROOM]
     skipped = sorted(set(scenes) - set(chosen))
     if not chosen:
-        raise UsageError(f"{', '.join(skipped)}: bathrooms are left out of test sets; give other scenes")
+        raise UsageError(
+            f"{', '.join(skipped)}: bathrooms are left out of test sets; give other scenes"
+        )
     return chosen, skipped

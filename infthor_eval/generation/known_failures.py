@@ -75,7 +75,9 @@ class KnownFailures:
         An object does not fit where an object of at most its size did not, nor into a receptacle of a smaller base.
         """
         yield from self._refused
-        sizes = {key: size for key, item in view.objects.items() if (size := _size(item)) is not None}
+        sizes = {
+            key: size for key, item in view.objects.items() if (size := _size(item)) is not None
+        }
         items = [key for key in sizes if view.objects[key].pickupable]
         for item, receptacle in self._refused:
             refused_size = self._sizes.get(item)
@@ -107,4 +109,6 @@ def _is_near(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
 
 def _contents(view: SimulatorView, receptacle: str) -> frozenset[str]:
     objects = view.objects
-    return frozenset(key for key, item in objects.items() if direct_parent(item, objects) == receptacle)
+    return frozenset(
+        key for key, item in objects.items() if direct_parent(item, objects) == receptacle
+    )

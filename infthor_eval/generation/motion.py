@@ -9,7 +9,9 @@ from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
 __all__ = ["intermediate_views"]
 
 
-def intermediate_views(simulator: Simulator, start: AgentPose, end: AgentPose, frames: int) -> Iterator[SimulatorView]:
+def intermediate_views(
+    simulator: Simulator, start: AgentPose, end: AgentPose, frames: int
+) -> Iterator[SimulatorView]:
     """Yield the states at evenly spaced poses between two; the agent returns to the second pose.
 
     Args:
@@ -33,7 +35,11 @@ def _interpolate(start: AgentPose, end: AgentPose, share: float) -> AgentPose:
     turn = (end.rotation - start.rotation + 180.0) % 360.0 - 180.0  # the shorter way round
     one, other = start.position, end.position
     return AgentPose(
-        Vector(one.x + share * (other.x - one.x), one.y + share * (other.y - one.y), one.z + share * (other.z - one.z)),
+        Vector(
+            one.x + share * (other.x - one.x),
+            one.y + share * (other.y - one.y),
+            one.z + share * (other.z - one.z),
+        ),
         (start.rotation + share * turn) % 360.0,
         start.horizon + share * (end.horizon - start.horizon),
         end.standing,

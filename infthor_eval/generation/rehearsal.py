@@ -51,7 +51,9 @@ def rehearse(task: Task, operators: list[Operator], simulator: Simulator) -> Rol
     try:
         Rollout(_ForcedTrace(simulator), _Stage()).run(operators)
         works = task.light is not None or goal_holds(task, simulator.view)
-        return None if works else RolloutError(f"{task.task_type}: its plan would not reach its goal")
+        return (
+            None if works else RolloutError(f"{task.task_type}: its plan would not reach its goal")
+        )
     except RolloutError as error:
         return error
     finally:

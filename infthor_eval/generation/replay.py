@@ -72,7 +72,9 @@ class ReplayReport(msgspec.Struct):
         return not self.refusals
 
 
-def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1) -> ReplayReport:
+def replay(
+    trajectory: Trajectory, simulator: Simulator, folder: Path, digest: str, frames: int = 1
+) -> ReplayReport:
     """Run a trajectory and write its frames and logs into a folder.
 
     These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words after
@@ -100,7 +102,9 @@ def replay(trajectory: Trajectory, simulator: Simulator, folder: Path, digest: s
     (folder / "traj.txt").write_text(sequence_text(trajectory, steps) + "\n")
     images = [{"low_idx": step.step, "image_name": step.img_filename} for step in steps]
     (folder / "expert_log.json").write_bytes(msgspec.json.encode({"images": images}) + b"\n")
-    ends = {item.low_pddl_idx[1] - 1 for item in trajectory.sub_trajs} | {len(trajectory.plan.low_actions) - 1}
+    ends = {item.low_pddl_idx[1] - 1 for item in trajectory.sub_trajs} | {
+        len(trajectory.plan.low_actions) - 1
+    }
     summaries = {str(index): text for index, text in state_summaries(steps, ends).items()}
     (folder / "state_summary.json").write_bytes(msgspec.json.encode(summaries) + b"\n")
     return report
@@ -136,7 +140,9 @@ class _Run:
             self._report.accepted[api.action] = self._report.accepted.get(api.action, 0) + 1
         else:
             self._report.refusals.append(Refusal(index, text, error))
-        for view in intermediate_views(self._simulator, before.agent, self._simulator.view.agent, self._report.frames):
+        for view in intermediate_views(
+            self._simulator, before.agent, self._simulator.view.agent, self._report.frames
+        ):
             self.recorder.record(view, step=index, high_idx=low.high_idx)
         putting = api.action == "PutObject"
         step = self.recorder.record(
@@ -150,7 +156,9 @@ class _Run:
         # Set here, as an action that could not be called at all has no reply of the simulator.
         step.success, step.error = error is None, error
 
-    def _call(self, index: int, low: LowAction, before: SimulatorView) -> tuple[str | None, str | None]:
+    def _call(
+        self, index: int, low: LowAction, before: SimulatorView
+    ) -> tuple[str | None, str | None]:
         """Execute an action; returns the id of the object acted on, and the reason if it was refused."""
         try:
             call = translate(low, self._grounding, before)
@@ -161,7 +169,9 @@ class _Run:
         after = self._simulator.step(**call)
         return target, None if after.success else after.error or "refused without a message"
 
-    def _compare_box(self, index: int, low: LowAction, target: str | None, before: SimulatorView) -> None:
+    def _compare_box(
+        self, index: int, low: LowAction, target: str | None, before: SimulatorView
+    ) -> None:
         """Compare the recorded box of the object acted on with the box in the frame before the action."""
         recorded = low.discrete_action.box if low.discrete_action is not None else None
         if recorded is None or target is None or before.instances is None:
@@ -169,4 +179,6 @@ class _Run:
         instance = before.instances.get(target)
         iou = 0.0 if instance is None else box_iou(recorded, instance.box)
         object_type = before.objects[target].object_type
-        self._report.overlaps.append(Overlap(index, low.api_action.action, object_type, round(iou, 4)))
+        self._report.overlaps.append(
+            Overlap(index, low.api_action.action, object_type, round(iou, 4))
+        )

@@ -15,20 +15,33 @@ from pathlib import Path
 import msgspec
 
 from infthor_eval.errors import DataError, InfthorError, SimulatorError, wrap_errors
-from infthor_eval.formats.digests import digest
-from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.reading import read_json
 from infthor_eval.formats.set_info import claim_for_simulator
-from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, folder_name, iter_sources, trajectory_files
+from infthor_eval.formats.trajectory import (
+    Trajectory,
+    TrajectorySource,
+    folder_name,
+    iter_sources,
+    trajectory_files,
+)
 from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.replay import ReplayReport, replay
 from infthor_eval.generation.simulator_jobs import SimulatorWorker, collect_outcomes
+from infthor_eval.storage.digests import digest
+from infthor_eval.storage.files import write_atomically
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.supplement import agent_path
 from infthor_eval.workers import WorkerSettings, run_jobs
 
-__all__ = ["ReplayFailure", "ReplayedSet", "Selection", "replay_set", "replay_with_workers", "select"]
+__all__ = [
+    "ReplayFailure",
+    "ReplayedSet",
+    "Selection",
+    "replay_set",
+    "replay_with_workers",
+    "select",
+]
 
 _REPORT = "replay.json"
 _TRAJECTORY = "traj_data.json"
@@ -73,7 +86,9 @@ class ReplayedSet:
     seconds: float = 0.0
 
 
-def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None) -> Selection:
+def select(
+    paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None
+) -> Selection:
     """Read the trajectories of files and folders, at most `limit`, and at most `per_floor_plan` on one floor plan.
 
     Raises:
@@ -87,7 +102,9 @@ def select(paths: Iterable[Path], limit: int | None = None, per_floor_plan: int 
         try:
             trajectory = source.read()
             with _wrap_malformed(f"{source.place}: "):
-                agent_path(trajectory)  # read for all scenes before the first replay, so an error must show here
+                agent_path(
+                    trajectory
+                )  # read for all scenes before the first replay, so an error must show here
         except DataError as error:
             selection.failures.append(ReplayFailure(source.place, str(error)))
             continue
@@ -155,7 +172,11 @@ def replay_with_workers(
         say: called with messages about the workers.
     """
     metadata = _prepare_set(out, launch.label)
-    start = partial(SimulatorWorker, partial(Simulator, launch), partial(_replay_one, metadata=metadata, frames=frames))
+    start = partial(
+        SimulatorWorker,
+        partial(Simulator, launch),
+        partial(_replay_one, metadata=metadata, frames=frames),
+    )
     return _collect(run_jobs(start, selection.items, worker_settings, say), selection, progress)
 
 
@@ -198,10 +219,14 @@ def _replay_one(item: Item, simulator: Simulator, metadata: Path, frames: int) -
 
 def _failure_outcome(item: Item, error: InfthorError) -> _ReplayOutcome:
     source, trajectory = item
-    return _ReplayOutcome(failure=ReplayFailure(source.place, f"{source.place}: {trajectory.traj_id}: {error}"))
+    return _ReplayOutcome(
+        failure=ReplayFailure(source.place, f"{source.place}: {trajectory.traj_id}: {error}")
+    )
 
 
-def _all_sources(paths: Iterable[Path], failures: list[ReplayFailure]) -> Iterator[TrajectorySource]:
+def _all_sources(
+    paths: Iterable[Path], failures: list[ReplayFailure]
+) -> Iterator[TrajectorySource]:
     """Yield the trajectories of all files; among several files, one that cannot be read is added to `failures`."""
     for path in paths:
         files = trajectory_files(path)
@@ -220,11 +245,17 @@ def _all_sources(paths: Iterable[Path], failures: list[ReplayFailure]) -> Iterat
 def _wrap_malformed(place: str = "") -> AbstractContextManager[None]:
     """Convert the errors of a trajectory that has the documented form but inconsistent content."""
     wrong = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
-    return wrap_errors(f"{place}not a trajectory that can be replayed", "restore it or leave it out", catch=wrong)
+    return wrap_errors(
+        f"{place}not a trajectory that can be replayed", "restore it or leave it out", catch=wrong
+    )
 
 
 def _replay_or_check(
-    source: TrajectorySource, trajectory: Trajectory, simulator: Simulator, metadata: Path, frames: int
+    source: TrajectorySource,
+    trajectory: Trajectory,
+    simulator: Simulator,
+    metadata: Path,
+    frames: int,
 ) -> _ReplayOutcome:
     content = source.raw.strip()
     final = metadata / folder_name(trajectory.traj_id)
@@ -239,7 +270,9 @@ def _replay_or_check(
             (folder / _TRAJECTORY).write_bytes(content + b"\n")
             (folder / _REPORT).write_bytes(msgspec.json.encode(report) + b"\n")
     except OSError as error:
-        message = f"{final}: cannot be written ({error.strerror}); make room or choose another --out"
+        message = (
+            f"{final}: cannot be written ({error.strerror}); make room or choose another --out"
+        )
         raise SimulatorError(message) from error
     return _ReplayOutcome(report)
 
@@ -248,7 +281,11 @@ def _check_earlier(folder: Path, digest: str, frames: int) -> ReplayReport:
     """Return the report of an earlier run, if it is of the same trajectory and settings."""
     report = read_json(folder / _REPORT, "remove the folder to replay it again", ReplayReport)
     if report.digest != digest:
-        raise DataError(f"{folder}: replayed from another trajectory of this name; remove it or choose another --out")
+        raise DataError(
+            f"{folder}: replayed from another trajectory of this name; remove it or choose another --out"
+        )
     if report.frames != frames:
-        raise DataError(f"{folder}: replayed with {report.frames} frames per move; remove it or choose another --out")
+        raise DataError(
+            f"{folder}: replayed with {report.frames} frames per move; remove it or choose another --out"
+        )
     return report

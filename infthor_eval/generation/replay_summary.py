@@ -99,11 +99,15 @@ def _count_actions(reports: Sequence[ReplayReport]) -> dict[str, ActionCounts]:
     return {name: ActionCounts(accepted[name], refused[name]) for name in names}
 
 
-def _statistics(overlaps: Sequence[Overlap], by: Callable[[Overlap], str]) -> dict[str, OverlapStatistics]:
+def _statistics(
+    overlaps: Sequence[Overlap], by: Callable[[Overlap], str]
+) -> dict[str, OverlapStatistics]:
     groups: defaultdict[str, list[float]] = defaultdict(list)
     for overlap in overlaps:
         groups[by(overlap)].append(overlap.iou)
     return {
-        name: OverlapStatistics(len(values), round(statistics.median(values), 4), round(statistics.fmean(values), 4))
+        name: OverlapStatistics(
+            len(values), round(statistics.median(values), 4), round(statistics.fmean(values), 4)
+        )
         for name, values in sorted(groups.items())
     }

@@ -54,7 +54,9 @@ class Rollout:
         for number, operator in enumerate(operators, 1):
             if operator.name == "GotoLocation" and number == len(operators):
                 self._walker.go([operator.item])  # the plan ends at a lamp that is lit already
-            elif operator.name != "GotoLocation":  # each sub-goal includes its walk: its object is known only then
+            elif (
+                operator.name != "GotoLocation"
+            ):  # each sub-goal includes its walk: its object is known only then
                 _SUBGOALS[operator.name](self, operator)
 
     # -- sub-goals
@@ -147,11 +149,15 @@ class Rollout:
             free = [
                 key
                 for key, candidate in self._view.objects.items()
-                if candidate.object_type == object_type and key.startswith(whole) and key not in taken
+                if candidate.object_type == object_type
+                and key.startswith(whole)
+                and key not in taken
             ]
             if not free:
                 raise RolloutError(f"slicing left no {object_type}")
-            self._slices[item] = min(free, key=lambda key: (not self._view.objects[key].visible, key))
+            self._slices[item] = min(
+                free, key=lambda key: (not self._view.objects[key].visible, key)
+            )
         return self._slices[item]
 
     def _closed_around(self, item: str) -> str | None:
@@ -174,7 +180,10 @@ class Rollout:
         if not candidates:
             raise RolloutError(f"no {object_type} in the room")
         at = objects[to].position
-        return min(candidates, key=lambda item: (item.position.x - at.x) ** 2 + (item.position.z - at.z) ** 2).object_id
+        return min(
+            candidates,
+            key=lambda item: (item.position.x - at.x) ** 2 + (item.position.z - at.z) ** 2,
+        ).object_id
 
 
 # As the published generator puts.

@@ -31,7 +31,10 @@ class SimulatorWorker:
     greeting = None
 
     def __init__(
-        self, open_simulator: Callable[[], Simulator], run_job: Callable[[Any, Simulator], Any], number: int
+        self,
+        open_simulator: Callable[[], Simulator],
+        run_job: Callable[[Any, Simulator], Any],
+        number: int,
     ) -> None:
         self._run_job = run_job
         self._simulator = open_simulator()
@@ -59,6 +62,8 @@ def collect_outcomes(
     """
     by_number: dict[int, T] = {}
     for number, outcome in outcomes:
-        by_number[number] = failed(number, outcome) if isinstance(outcome, InfthorError) else outcome
+        by_number[number] = (
+            failed(number, outcome) if isinstance(outcome, InfthorError) else outcome
+        )
         progress(by_number[number].is_resumed)
     return [by_number[number] for number in sorted(by_number)]

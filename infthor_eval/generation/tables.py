@@ -14,7 +14,10 @@ _EXACT = 0.995  # an IoU that is shown as 1.00
 
 def tasks_table(summary: GenerationSummary) -> Table:
     """Return the numbers of tasks tried and accepted, one row per task type."""
-    rows = [Row((name, str(counts.tried), str(counts.accepted))) for name, counts in summary.tasks.items()]
+    rows = [
+        Row((name, str(counts.tried), str(counts.accepted)))
+        for name, counts in summary.tasks.items()
+    ]
     tried = sum(counts.tried for counts in summary.tasks.values())
     accepted = sum(counts.accepted for counts in summary.tasks.values())
     rows.append(Row(("all", str(tried), str(accepted))))
@@ -25,17 +28,25 @@ def generation_notes(summary: GenerationSummary) -> list[str]:
     """Return lines on the failures of a run, its dead ends, and the pools of tasks that began again."""
     n_not_executed = sum(summary.not_executed.values())
     notes = [
-        (n_not_executed, f"{n_not_executed} sampled tasks not executed: {_most_frequent(summary.not_executed)}"),
+        (
+            n_not_executed,
+            f"{n_not_executed} sampled tasks not executed: {_most_frequent(summary.not_executed)}",
+        ),
         (len(summary.refusals), f"tried and failed: {_most_frequent(summary.refusals)}"),
         (len(summary.roll_backs), f"dropped at dead ends: {'; '.join(summary.roll_backs)}"),
-        (summary.pool_restarts, f"all tasks had been drawn, and were drawn again: {summary.pool_restarts} times"),
+        (
+            summary.pool_restarts,
+            f"all tasks had been drawn, and were drawn again: {summary.pool_restarts} times",
+        ),
         (summary.kept, f"gave up and were kept as far as they got: {summary.kept}"),
     ]
     return [note for number, note in notes if number]
 
 
 def _most_frequent(reasons: dict[str, int]) -> str:
-    return "; ".join(f"{reason} ({count})" for reason, count in list(reasons.items())[:_MAX_REASONS])
+    return "; ".join(
+        f"{reason} ({count})" for reason, count in list(reasons.items())[:_MAX_REASONS]
+    )
 
 
 def refusals_table(summary: ReplaySummary) -> Table | None:
@@ -56,7 +67,10 @@ def overlaps_table(summary: ReplaySummary) -> Table | None:
         for name, overlap in {**summary.iou_by_action, **summary.iou}.items()
         if not _is_exact(overlap)
     ]
-    columns = (Column("action, object type", False), *map(Column, ("boxes", "median IoU", "mean IoU")))
+    columns = (
+        Column("action, object type", False),
+        *map(Column, ("boxes", "median IoU", "mean IoU")),
+    )
     return Table("", columns, tuple(rows)) if rows else None
 
 
@@ -64,9 +78,15 @@ def regular_numbers(summary: ReplaySummary) -> str:
     """Return one line on the actions and boxes that the tables leave out because they are as recorded."""
     accepted = [counts.accepted for counts in summary.actions.values() if not counts.refused]
     exact = [overlap.count for overlap in summary.iou_by_action.values() if _is_exact(overlap)]
-    parts = [f"{_all_or_other(accepted, summary.actions)}{sum(accepted)} actions accepted"] if accepted else []
+    parts = (
+        [f"{_all_or_other(accepted, summary.actions)}{sum(accepted)} actions accepted"]
+        if accepted
+        else []
+    )
     if exact:
-        parts.append(f"{_all_or_other(exact, summary.iou_by_action)}{sum(exact)} boxes as recorded (IoU 1.00)")
+        parts.append(
+            f"{_all_or_other(exact, summary.iou_by_action)}{sum(exact)} boxes as recorded (IoU 1.00)"
+        )
     return f"{', '.join(parts) or 'nothing as recorded'} (--json has the numbers by action and object type)"
 
 

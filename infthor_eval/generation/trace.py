@@ -3,7 +3,13 @@
 from dataclasses import dataclass
 from typing import Any
 
-from infthor_eval.formats.trajectory import ApiAction, DiscreteAction, HighAction, LowAction, PlannerAction
+from infthor_eval.formats.trajectory import (
+    ApiAction,
+    DiscreteAction,
+    HighAction,
+    LowAction,
+    PlannerAction,
+)
 from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.view import SimulatorView
 
@@ -18,7 +24,9 @@ class RolloutError(Exception):
         receptacle: id of the receptacle without room for the object, if that is the reason.
     """
 
-    def __init__(self, message: str, item: str | None = None, receptacle: str | None = None) -> None:
+    def __init__(
+        self, message: str, item: str | None = None, receptacle: str | None = None
+    ) -> None:
         super().__init__(message)
         self.item = item
         self.receptacle = receptacle

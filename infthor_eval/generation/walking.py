@@ -3,7 +3,13 @@
 from infthor_eval.formats.trajectory import ApiAction, PlannerAction
 from infthor_eval.generation.trace import RolloutError, Trace
 from infthor_eval.household.navigation import GRID, Grid
-from infthor_eval.household.scout import HORIZON_STEP, Viewpoint, find_viewpoint, grid_pose_of, reachable_grid
+from infthor_eval.household.scout import (
+    HORIZON_STEP,
+    Viewpoint,
+    find_viewpoint,
+    grid_pose_of,
+    reachable_grid,
+)
 from infthor_eval.household.wording import compact_name
 
 __all__ = ["Walker"]

@@ -25,7 +25,9 @@ def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options:
     other_names = [item.name for item in fields(options) if item.name not in names]
     return {
         "suite": suite,
-        "settings": json.dumps({name: config[name] for name in names if config.get(name) is not None}),
+        "settings": json.dumps(
+            {name: config[name] for name in names if config.get(name) is not None}
+        ),
         "options": json.dumps({name: config[name] for name in other_names if name in config}),
         "data": str(config.get("data") or ""),
     }
@@ -35,7 +37,10 @@ def task_request(
     doc: Doc, task: str, options: type, generation_kwargs: Mapping[str, Any], seed: int
 ) -> TaskRequest[Any]:
     """Return the request of a task to its suite, given any of its docs, and the dataclass of the suite's options."""
-    settings = {"dataset_kwargs": json.loads(doc["settings"]), "generation_kwargs": generation_kwargs}
+    settings = {
+        "dataset_kwargs": json.loads(doc["settings"]),
+        "generation_kwargs": generation_kwargs,
+    }
     file = TaskFile(task, doc["suite"], Path(task), settings)
     data = Path(doc["data"]) if doc["data"] else None
     return TaskRequest([file], options(**json.loads(doc["options"])), data, None, seed)

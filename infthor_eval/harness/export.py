@@ -12,11 +12,11 @@ from statistics import fmean
 from typing import Any
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.formats.digests import canonical_json
-from infthor_eval.formats.files import write_atomically
 from infthor_eval.harness.registration import NAME
 from infthor_eval.runs import RunOutcome, TaskFile, UnitRecord, UnitSample
 from infthor_eval.statistics import clustered_mean
+from infthor_eval.storage.digests import canonical_json
+from infthor_eval.storage.files import write_atomically
 
 __all__ = ["Exported", "convert_run", "export"]
 
@@ -45,11 +45,17 @@ def convert_run(outcome: RunOutcome) -> Exported:
     tasks = _tasks(outcome)
     samples = {task.name: _scored_rows(task) for task in tasks}
     hashes = {
-        name: _hash("".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows))
+        name: _hash(
+            "".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows)
+        )
         for name, rows in samples.items()
     }
     model = str(sanitize_model_name(outcome.run.request.model))
-    return Exported(model, _results(outcome, tasks) | {"task_hashes": hashes, "model_name_sanitized": model}, samples)
+    return Exported(
+        model,
+        _results(outcome, tasks) | {"task_hashes": hashes, "model_name_sanitized": model},
+        samples,
+    )
 
 
 def export(outcome: RunOutcome) -> Path:
@@ -71,7 +77,9 @@ def export(outcome: RunOutcome) -> Path:
                 lines = (json.dumps(row, ensure_ascii=False) + "\n" for row in rows)
                 partial.write_text("".join(lines), encoding="utf-8")
         with write_atomically(folder / f"results_{stamp}.json") as partial:
-            partial.write_text(json.dumps(converted.results, indent=2, ensure_ascii=False), encoding="utf-8")
+            partial.write_text(
+                json.dumps(converted.results, indent=2, ensure_ascii=False), encoding="utf-8"
+            )
     return folder
 
 
@@ -118,7 +126,11 @@ def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
     for _, same in sorted(repeated.items()):
         replies = [reply for row, _ in same for reply in row["filtered_resps"]]
         means = {name: fmean(scores.get(name, 0.0) for _, scores in same) for name in task.metrics}
-        rows.append(same[0][0] | {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics} | means)
+        rows.append(
+            same[0][0]
+            | {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics}
+            | means
+        )
     return rows
 
 
@@ -127,7 +139,13 @@ def _row(sample: UnitSample) -> dict[str, Any]:
         "doc_id": sample.number,
         "doc": dict(sample.doc),
         "target": sample.target,
-        "arguments": {"gen_args_0": {"arg_0": sample.prompt, "arg_1": dict(sample.settings), "arg_2": {"visual": []}}},
+        "arguments": {
+            "gen_args_0": {
+                "arg_0": sample.prompt,
+                "arg_1": dict(sample.settings),
+                "arg_2": {"visual": []},
+            }
+        },
         "resps": [[sample.reply]],
         "filtered_resps": [sample.reply],
         "filter": _FILTER,
@@ -149,10 +167,14 @@ def _results(outcome: RunOutcome, tasks: Sequence[_Scored]) -> dict[str, Any]:
         "results": {task.name: _means(task) for task in tasks},
         "group_subtasks": {task.name: [] for task in tasks},
         "configs": {task.name: json.loads(canonical_json(task.file.settings)) for task in tasks},
-        "versions": {task.name: task.file.settings.get("metadata", {}).get("version") for task in tasks},
+        "versions": {
+            task.name: task.file.settings.get("metadata", {}).get("version") for task in tasks
+        },
         "n-shot": {task.name: 0 for task in tasks},
         "higher_is_better": {task.name: dict.fromkeys(task.metrics, True) for task in tasks},
-        "n-samples": {task.name: dict.fromkeys(("original", "effective"), task.n_samples) for task in tasks},
+        "n-samples": {
+            task.name: dict.fromkeys(("original", "effective"), task.n_samples) for task in tasks
+        },
         "config": {
             "model": NAME,
             "model_args": {"adapter": request.model, **request.model_options},

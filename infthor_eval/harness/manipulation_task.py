@@ -62,7 +62,10 @@ def doc_to_target(doc: Doc) -> str:
 def process_results(_doc: Doc, results: Sequence[str]) -> dict[str, float]:
     """Return success and reward of the episode; see `ManipulationRequests.response`."""
     outcome = json.loads(results[0] or "{}")
-    return {"success": float(outcome.get("done", False)), "reward": float(outcome.get("reward", 0.0))}
+    return {
+        "success": float(outcome.get("done", False)),
+        "reward": float(outcome.get("reward", 0.0)),
+    }
 
 
 class ManipulationRequests:
@@ -72,7 +75,9 @@ class ManipulationRequests:
         self, task: str, docs: Sequence[Doc], generation_kwargs: Mapping[str, Any], seed: int
     ) -> ManipulationEvaluation:
         """See `RequestAdapter`."""
-        return ManipulationEvaluation(task_request(docs[0], task, ManipulationOptions, generation_kwargs, seed))
+        return ManipulationEvaluation(
+            task_request(docs[0], task, ManipulationOptions, generation_kwargs, seed)
+        )
 
     def doc_id(self, doc: Doc) -> str:
         """Return the id of the episode."""

@@ -10,15 +10,15 @@ from lm_eval.api.instance import Instance
 from lm_eval.api.model import LM
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.harness.requests import RequestAdapter
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
-from infthor_eval.runs.binding import require_capability
-from infthor_eval.runs.journal import Journal
-from infthor_eval.runs.records import P, U
+from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.journals.records import P, U
+from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.run_config import run_config
-from infthor_eval.runs.session import JournalSession
+from infthor_eval.runs.work.binding import require_capability
+from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
 from model_adapters import adapter_identity, has_option, label, load
 
@@ -65,14 +65,22 @@ class InfthorLM(LM):
         """
         super().__init__()
         if adapter in baseline_suites():
-            raise UsageError(f"{adapter} is a baseline, not a model; run it with infthor-eval --model {adapter}")
+            raise UsageError(
+                f"{adapter} is a baseline, not a model; run it with infthor-eval --model {adapter}"
+            )
         given = {key: str(value) for key, value in options.items()}
-        batch = str(batch_size)  # "auto" means nothing to our models, and 1 is what lm-eval gives by default
+        batch = str(
+            batch_size
+        )  # "auto" means nothing to our models, and 1 is what lm-eval gives by default
         theirs = {
             "device": None if device == _DEFAULT_DEVICE else device,
             "batch_size": batch if batch.isdigit() and int(batch) > 1 else None,
         }
-        given |= {key: value for key, value in theirs.items() if value is not None and has_option(adapter, key)}
+        given |= {
+            key: value
+            for key, value in theirs.items()
+            if value is not None and has_option(adapter, key)
+        }
         say_model_takes_references()
         self._model = load(adapter, given, seed)
         self._seed = seed
@@ -102,13 +110,17 @@ class InfthorLM(LM):
             numbers_of.setdefault(_suite_and_task(request), []).append(number)
         responses: dict[int, str] = {}
         for (suite, task), numbers in numbers_of.items():
-            of_task = self._respond(find_suite(suite), task, [requests[number] for number in numbers])
+            of_task = self._respond(
+                find_suite(suite), task, [requests[number] for number in numbers]
+            )
             responses |= zip(numbers, of_task, strict=True)
         return [responses[number] for number in range(len(requests))]
 
     def loglikelihood(self, requests: Sequence[Instance]) -> list[Any]:
         """Refuse: no task of ours compares likelihoods."""
-        raise ModelError("infthor-eval models answer in words; use a task with output_type generate_until")
+        raise ModelError(
+            "infthor-eval models answer in words; use a task with output_type generate_until"
+        )
 
     loglikelihood_rolling = loglikelihood
 
@@ -122,7 +134,11 @@ class InfthorLM(LM):
         evaluation = adapter.prepare(task, docs, requests[0].args[1], self._seed)
         with closing(evaluation.bind(self._model)) as bound:
             for group in bound.workload.groups:
-                units = [unit for unit in group.units if adapter.doc_id_of_unit(unit.key, unit.cluster) in records]
+                units = [
+                    unit
+                    for unit in group.units
+                    if adapter.doc_id_of_unit(unit.key, unit.cluster) in records
+                ]
                 for record in bound.run(replace(group, units=units), session) if units else ():
                     doc_id = adapter.doc_id_of_unit(record.key, record.cluster)
                     records[doc_id].append(session.append_new(record)[0])
@@ -134,12 +150,16 @@ class InfthorLM(LM):
             model = {"name": self._model.name, **self._model.identity()}
             config = run_config(suite.name, model, self._code, {"host": "lm-eval"}, seed=self._seed)
             header = RunHeader(suite=suite.name, name=self._name, config=config)
-            self._sessions[suite.name] = JournalSession(Journal(self._folder / suite.name, header, suite.records))
+            self._sessions[suite.name] = JournalSession(
+                Journal(self._folder / suite.name, header, suite.records)
+            )
         return self._sessions[suite.name]
 
 
 def _suite_and_task(request: Instance) -> tuple[str, str]:
     suite = request.doc.get("suite") if isinstance(request.doc, dict) else None
     if request.task_name is None or not isinstance(suite, str):
-        raise ModelError(f"{request.task_name}: infthor-eval's models answer its own tasks (tasks/nieh) under lm-eval")
+        raise ModelError(
+            f"{request.task_name}: infthor-eval's models answer its own tasks (tasks/nieh) under lm-eval"
+        )
     return suite, request.task_name

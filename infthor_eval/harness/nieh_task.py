@@ -14,9 +14,9 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.harness.registration import model_takes_references, register
 from infthor_eval.harness.requests import Doc
+from infthor_eval.nieh.asking.recalling import recall_all
 from infthor_eval.nieh.docs import doc_of, doc_parts, doc_prompt, doc_target, sample_of, samples_of
 from infthor_eval.nieh.evaluation import PreparedEvaluation
-from infthor_eval.nieh.recalling import recall_all
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.nieh.scoring import scores
@@ -24,7 +24,14 @@ from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import UnitKey, UnitRecord
 from infthor_eval.runs.generation_kwargs import decoding_of
 
-__all__ = ["NiehRequests", "dataset", "doc_to_image", "doc_to_target", "doc_to_text", "process_results"]
+__all__ = [
+    "NiehRequests",
+    "dataset",
+    "doc_to_image",
+    "doc_to_target",
+    "doc_to_text",
+    "process_results",
+]
 
 # lm-eval 0.4.13 reads no entry points; where it imports a task's functions before it looks for the model (a task file
 # given by its path), this lets it find ours.
@@ -61,7 +68,11 @@ def doc_to_text(doc: Doc) -> str:
 
 def doc_to_image(doc: Doc) -> list[Image.Image]:
     """Return the decoded frames; none where the model takes references instead."""
-    return [part.load() for part in doc_parts(doc) if isinstance(part, FrameRef)] if doc["pixels"] else []
+    return (
+        [part.load() for part in doc_parts(doc) if isinstance(part, FrameRef)]
+        if doc["pixels"]
+        else []
+    )
 
 
 def doc_to_target(doc: Doc) -> str:
@@ -82,7 +93,9 @@ class NiehRequests:
     ) -> PreparedEvaluation:
         """See `RequestAdapter`."""
         decoding = decoding_of(generation_kwargs, seed, task)
-        return PreparedEvaluation({task: PreparedTask(samples_of(docs), decoding, generation_kwargs)})
+        return PreparedEvaluation(
+            {task: PreparedTask(samples_of(docs), decoding, generation_kwargs)}
+        )
 
     def doc_id(self, doc: Doc) -> tuple[str, str]:
         """Return question and variant."""

@@ -41,9 +41,15 @@ def dataset(**config: Any) -> dict[str, Any]:
         )
     doc = settings_doc("plans", config, PlanTaskSettings, PlansOptions)
     texts: dict[str, list[str]] = {}
-    for unit in PlansEvaluation(task_request(doc, "dataset", PlansOptions, {"max_gen_toks": 1}, 0)).units:
+    for unit in PlansEvaluation(
+        task_request(doc, "dataset", PlansOptions, {"max_gen_toks": 1}, 0)
+    ).units:
         texts.setdefault(unit.cluster, []).append(unit.payload.plan)
-    return {"test": Dataset.from_list([{**doc, "traj_id": name, "plans": plans} for name, plans in texts.items()])}
+    return {
+        "test": Dataset.from_list(
+            [{**doc, "traj_id": name, "plans": plans} for name, plans in texts.items()]
+        )
+    }
 
 
 def doc_to_text(doc: Doc) -> str:
@@ -86,4 +92,6 @@ class PlansRequests:
         """Return the outcomes of the plans as JSON, without excluded plans."""
         names = ("plan", "done", "reward", "ended")
         payloads = [record.payload for record in records if record.excluded is None]
-        return json.dumps([{name: getattr(payload, name) for name in names} for payload in payloads])
+        return json.dumps(
+            [{name: getattr(payload, name) for name in names} for payload in payloads]
+        )

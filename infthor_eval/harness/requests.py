@@ -8,7 +8,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 from infthor_eval.runs import Evaluation, UnitKey, UnitRecord
-from infthor_eval.runs.records import P, U
+from infthor_eval.runs.journals.records import P, U
 
 __all__ = ["Doc", "RequestAdapter"]
 

@@ -84,9 +84,14 @@ class Trackers:
     def _to_hub(self, run: Exported, name: str) -> None:
         from lm_eval.loggers import EvaluationTracker
 
-        with tempfile.TemporaryDirectory() as folder, _raise_failures("lm_eval.loggers.evaluation_tracker"):
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            _raise_failures("lm_eval.loggers.evaluation_tracker"),
+        ):
             tracker = EvaluationTracker(output_path=folder, **(self._hub or {}))
-            tracker.general_config_tracker.log_experiment_args(NAME, {"model": name}, None, None, False)
+            tracker.general_config_tracker.log_experiment_args(
+                NAME, {"model": name}, None, None, False
+            )
             samples = _as_evaluated(run)
             tracker.save_results_aggregated(dict(run.results), samples)
             for task, rows in samples.items():
@@ -114,10 +119,14 @@ def _hub_arguments(typed: Arguments | None) -> dict[str, Any] | None:
     known = [name for name in inspect.signature(EvaluationTracker).parameters if name not in _OURS]
     args = _parse(option, typed, known)
     if not (args.get("push_results_to_hub") or args.get("push_samples_to_hub")):
-        raise UsageError(f"{option} would push nothing; add push_results_to_hub=True or push_samples_to_hub=True")
+        raise UsageError(
+            f"{option} would push nothing; add push_results_to_hub=True or push_samples_to_hub=True"
+        )
     token = os.environ.get("HF_TOKEN") or get_token()
     if not token:
-        raise UsageError(f"{option} needs a token of the hub; set HF_TOKEN, or log in with `hf auth login`")
+        raise UsageError(
+            f"{option} needs a token of the hub; set HF_TOKEN, or log in with `hf auth login`"
+        )
     return {**args, "token": token}
 
 
@@ -128,7 +137,9 @@ def _parse(option: str, typed: Arguments, names: list[str]) -> dict[str, Any]:
     for name in typed:
         if name not in names:
             near = difflib.get_close_matches(name, names, n=1)
-            raise UsageError(f"{option} has no {name}; {f'did you mean {near[0]}?' if near else f'there are {names}'}")
+            raise UsageError(
+                f"{option} has no {name}; {f'did you mean {near[0]}?' if near else f'there are {names}'}"
+            )
     return {name: handle_arg_string(value) for name, value in typed.items()}
 
 
@@ -136,7 +147,12 @@ def _as_evaluated(run: Exported) -> dict[str, list[dict[str, Any]]]:
     """Return the samples as lm-eval has them before it writes them: the arguments of a request as a pair."""
     return {
         task: [
-            {**row, "arguments": [tuple(row["arguments"]["gen_args_0"][name] for name in ("arg_0", "arg_1"))]}
+            {
+                **row,
+                "arguments": [
+                    tuple(row["arguments"]["gen_args_0"][name] for name in ("arg_0", "arg_1"))
+                ],
+            }
             for row in rows
         ]
         for task, rows in run.samples.items()
@@ -158,7 +174,9 @@ def _raise_failures(name: str) -> Iterator[None]:
     finally:
         logger.removeHandler(handler)
         logger.setLevel(level)
-    failed = [number for number, text in enumerate(messages) if text.startswith(("Could not", "Failed"))]
+    failed = [
+        number for number, text in enumerate(messages) if text.startswith(("Could not", "Failed"))
+    ]
     if failed:
         raise RuntimeError(" ".join(messages[failed[0] : failed[0] + 2]))
 

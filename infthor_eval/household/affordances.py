@@ -45,12 +45,26 @@ SLICEABLE = frozenset(name for name in _ACTIONS["Sliceable"] if f"{name}Sliced" 
 KNIVES = frozenset({"ButterKnife", "Knife"})
 LIGHTS = _ACTIONS["Toggleable"]
 MOVABLE_RECEPTACLES = _types(_TABLES["movable_receptacles"])
-GOALS_BY_ROOM: dict[str, frozenset[str]] = {name: frozenset(rooms) for name, rooms in _TABLES["goals_by_room"].items()}
-KNOWN_TYPES = STOWABLE.union(_HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"})  # all types in tasks
+GOALS_BY_ROOM: dict[str, frozenset[str]] = {
+    name: frozenset(rooms) for name, rooms in _TABLES["goals_by_room"].items()
+}
+KNOWN_TYPES = STOWABLE.union(
+    _HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"}
+)  # all types in tasks
 MAX_PLAN_STEPS: int = _TABLES["planner_max_steps"]
 
 _INSIDE = frozenset(
-    {"BathtubBasin", "Bowl", "Box", "Cabinet", "Cup", "Drawer", "Fridge", "GarbageCan", "LaundryHamper"}
+    {
+        "BathtubBasin",
+        "Bowl",
+        "Box",
+        "Cabinet",
+        "Cup",
+        "Drawer",
+        "Fridge",
+        "GarbageCan",
+        "LaundryHamper",
+    }
     | {"Microwave", "Mug", "Pan", "Pot", "Safe", "Sink", "SinkBasin"}
 )
 

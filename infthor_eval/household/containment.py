@@ -33,7 +33,9 @@ def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
     if item is None or holder is None:
         return False
     parents = set(item.parent_receptacles or ())
-    in_carrier = any(key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id})
+    in_carrier = any(
+        key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id}
+    )
     reported = receptacle_id in parents or object_id in (holder.receptacle_object_ids or ())
     return reported and (holder.pickupable or not in_carrier)
 
@@ -43,10 +45,16 @@ def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | 
 
     If several qualify, it is the smallest: planning needs one place even where the report is ambiguous.
     """
-    parents = [objects[key] for key in item.parent_receptacles or () if key in objects and key != item.object_id]
+    parents = [
+        objects[key]
+        for key in item.parent_receptacles or ()
+        if key in objects and key != item.object_id
+    ]
     if not parents:
         return None
-    return min(parents, key=lambda parent: (not parent.pickupable, _volume(parent), parent.object_id)).object_id
+    return min(
+        parents, key=lambda parent: (not parent.pickupable, _volume(parent), parent.object_id)
+    ).object_id
 
 
 def logged_parent(state: ObjectState, world: Mapping[str, ObjectState]) -> str | None:
@@ -59,7 +67,11 @@ def logged_parent(state: ObjectState, world: Mapping[str, ObjectState]) -> str |
         return None
     parents = [key for key in state.parents if key in world and world[key].type != "Floor"]
     # The innermost one is inside all others. Basins are inside their sinks.
-    innermost = [key for key in parents if all(_within(world, key, other) for other in parents if other != key)]
+    innermost = [
+        key
+        for key in parents
+        if all(_within(world, key, other) for other in parents if other != key)
+    ]
     return innermost[0] if innermost else None
 
 

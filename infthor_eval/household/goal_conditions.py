@@ -32,7 +32,10 @@ def goal_conditions(task: Task, view: SimulatorView, treatments: Treatments) -> 
     slices = GoalConditions(min(len(items), two), two) if task.sliced else GoalConditions(0, 0)
     if task.task_type == TaskType.EXAMINE:
         held = any(view.objects[key].is_picked_up for key in items)
-        lit = any(item.object_type == task.light and item.is_toggled and item.visible for item in view.objects.values())
+        lit = any(
+            item.object_type == task.light and item.is_toggled and item.visible
+            for item in view.objects.values()
+        )
         others = [held, lit]
     elif task.task_type == TaskType.STACK:
         carriers = {key for key, object_type in types.items() if object_type == task.movable}

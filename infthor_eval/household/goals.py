@@ -42,7 +42,13 @@ def goal_holds(task: Task, view: SimulatorView, treatments: Treatments | None = 
     treated = Treatments(everything, everything, everything) if treatments is None else treatments
     lamps = [key for key in sorted(room.start.lit) if room.types[key] == task.light]
     visible = [key for key in lamps if treatments is None or view.objects[key].visible]
-    state = replace(room.start, at=next(iter(visible), None), clean=treated.clean, hot=treated.hot, cold=treated.cold)
+    state = replace(
+        room.start,
+        at=next(iter(visible), None),
+        clean=treated.clean,
+        hot=treated.hot,
+        cold=treated.cold,
+    )
     return is_achieved(task, room, state)
 
 
@@ -61,7 +67,9 @@ def lower_bound(task: Task, room: SymbolicRoom, state: State) -> int:
 
 def _n_to_slice(task: Task, room: SymbolicRoom, state: State, held: str | None) -> int:
     """Return the operators that slicing needs: picking up a knife, and the cut."""
-    is_cut = held == task.target or any(parent for item, parent in state.where if room.types[item] == task.target)
+    is_cut = held == task.target or any(
+        parent for item, parent in state.where if room.types[item] == task.target
+    )
     return 0 if is_cut or not task.sliced else 1 + (held not in KNIVES)
 
 
@@ -78,9 +86,13 @@ def _n_to_carry(task: Task, room: SymbolicRoom, state: State, held: str | None) 
         carriers = [item for item in where if room.types[item] == task.movable]
         there = any(room.types.get(where[item]) == task.receptacle for item in carriers)
         filled = task.sliced or any(
-            room.types.get(parent) == task.movable for item, parent in state.where if room.types[item] == task.target
+            room.types.get(parent) == task.movable
+            for item, parent in state.where
+            if room.types[item] == task.target
         )
-        return (0 if there else 2 - (held == task.movable)) + (0 if filled else 2 - (held == task.target))
+        return (0 if there else 2 - (held == task.movable)) + (
+            0 if filled else 2 - (held == task.target)
+        )
     if task.sliced:
         return 0
     return 2 * (_n_required(task) - _n_placed(task, room, state)) - (held in task.targets)
@@ -92,7 +104,9 @@ def _n_required(task: Task) -> int:
 
 def _treated_items(task: Task, state: State) -> frozenset[str] | None:
     """Return the items with the treatment that the task requires, or None if it requires none."""
-    return {TaskType.CLEAN: state.clean, TaskType.HEAT: state.hot, TaskType.COOL: state.cold}.get(task.task_type)
+    return {TaskType.CLEAN: state.clean, TaskType.HEAT: state.hot, TaskType.COOL: state.cold}.get(
+        task.task_type
+    )
 
 
 def _n_placed(task: Task, room: SymbolicRoom, state: State) -> int:

@@ -40,7 +40,12 @@ _OPERATORS = (
         "(at ?p) (in ?c ?p) (in ?i ?c) (handempty)",
         "(not (in ?i ?c)) (not (handempty)) (holding ?i)",
     ),
-    ("put", "(?i - item ?p - place)", "(at ?p) (holding ?i) (fits ?i ?p)", "(not (holding ?i)) (handempty) (in ?i ?p)"),
+    (
+        "put",
+        "(?i - item ?p - place)",
+        "(at ?p) (holding ?i) (fits ?i ?p)",
+        "(not (holding ?i)) (handempty) (in ?i ?p)",
+    ),
     (
         "put-into",
         "(?i ?c - item ?p - place)",
@@ -60,8 +65,18 @@ _OPERATORS = (
         "(not (in ?i ?c)) (in ?s ?c) (in ?t ?c)",
     ),
     ("clean", "(?i - item ?p - place)", "(at ?p) (basin ?p) (holding ?i)", "(clean ?i)"),
-    ("heat", "(?i - item ?p - place)", "(at ?p) (oven ?p) (holding ?i)", "(hot ?i) (not (cold ?i))"),
-    ("cool", "(?i - item ?p - place)", "(at ?p) (fridge ?p) (holding ?i)", "(cold ?i) (not (hot ?i))"),
+    (
+        "heat",
+        "(?i - item ?p - place)",
+        "(at ?p) (oven ?p) (holding ?i)",
+        "(hot ?i) (not (cold ?i))",
+    ),
+    (
+        "cool",
+        "(?i - item ?p - place)",
+        "(at ?p) (fridge ?p) (holding ?i)",
+        "(cold ?i) (not (hot ?i))",
+    ),
     ("toggle", "(?p - place)", "(at ?p) (lamp ?p) (not (lit ?p))", "(lit ?p)"),
 )
 _APPLIANCES = {"SinkBasin": "basin", "Microwave": "oven", "Fridge": "fridge"}
@@ -108,9 +123,17 @@ def problem(task: Task, room: SymbolicRoom, name: str = "task") -> str:
     names = {key: f"p{number}" for number, key in enumerate(sorted(room.places))}
     names |= {key: f"i{number}" for number, key in enumerate(items)}
     # An item on the floor has a place of its own. "nowhere" is where the agent starts if it is at no place.
-    places = [names[key] for key in sorted(room.places)] + [f"floor-{names[key]}" for key in on_floor] + ["nowhere"]
+    places = (
+        [names[key] for key in sorted(room.places)]
+        + [f"floor-{names[key]}" for key in on_floor]
+        + ["nowhere"]
+    )
     comments = [f" ; {short} {key}" for key, short in names.items()]
-    facts = [*_state(room, items, names), *_rules(task, room, items, names), *_goal(task, room, items, names)]
+    facts = [
+        *_state(room, items, names),
+        *_rules(task, room, items, names),
+        *_goal(task, room, items, names),
+    ]
     lines = [
         f"(define (problem {name})",
         " (:domain household)",
@@ -139,7 +162,9 @@ def _state(room: SymbolicRoom, items: list[str], names: dict[str, str]) -> Itera
     yield from (f"clean {names[item]}" for item in items if item in start.clean)
 
 
-def _rules(task: Task, room: SymbolicRoom, items: list[str], names: dict[str, str]) -> Iterable[str]:
+def _rules(
+    task: Task, room: SymbolicRoom, items: list[str], names: dict[str, str]
+) -> Iterable[str]:
     holders = [key for key in sorted(names) if key in room.receptacles]
     for item in items:
         object_type = room.types[item]

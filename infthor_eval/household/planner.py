@@ -17,7 +17,9 @@ from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["is_feasible", "plan", "relevant_items"]
 
-_LIMIT = 60_000  # states of a search; the hardest of the solvable problems tried needed a quarter of it
+_LIMIT = (
+    60_000  # states of a search; the hardest of the solvable problems tried needed a quarter of it
+)
 
 
 def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
@@ -66,7 +68,9 @@ def _of_types(room: SymbolicRoom, types: set[str | None]) -> list[str]:
 
 
 def _any_fits(room: SymbolicRoom, items: list[str], receptacles: list[str]) -> bool:
-    return any((item, receptacle) not in room.refused for item in items for receptacle in receptacles)
+    return any(
+        (item, receptacle) not in room.refused for item in items for receptacle in receptacles
+    )
 
 
 def relevant_items(task: Task, room: SymbolicRoom) -> set[str]:
@@ -75,7 +79,12 @@ def relevant_items(task: Task, room: SymbolicRoom) -> set[str]:
     where = dict(room.start.where)
     relevant = {item for item in where if room.types[item] in types or item == room.start.held}
     if task.sliced:
-        relevant |= {slice_item(item, number) for item in relevant if slice_item(item, 1) in where for number in (1, 2)}
+        relevant |= {
+            slice_item(item, number)
+            for item in relevant
+            if slice_item(item, 1) in where
+            for number in (1, 2)
+        }
     # What these items are in can itself be carried (a mug on a plate), so its place must be known.
     for item in list(relevant):
         while (item := where.get(item, ABSENT)) in where:
@@ -118,14 +127,22 @@ class _Problem:
         else:
             yield from self._puts(state, where, state.held)
             yield from self._treatments(state, where, state.held)
-        if state.at is not None and self._room.types[state.at] == self._task.light and state.at not in state.lit:
+        if (
+            state.at is not None
+            and self._room.types[state.at] == self._task.light
+            and state.at not in state.lit
+        ):
             yield Operator("ToggleObject", state.at), replace(state, lit=state.lit | {state.at})
 
     def _relevant_places(self, items: set[str], where: dict[str, str]) -> list[str]:
         room, task = self._room, self._task
         types = {task.receptacle, task.light, APPLIANCE.get(task.task_type)}
         needed = {place for place in room.places if room.types[place] in types}
-        needed |= {place for item in items if (place := room.place_of(item, where)) in room.places and place}
+        needed |= {
+            place
+            for item in items
+            if (place := room.place_of(item, where)) in room.places and place
+        }
         spare = set()  # one place per item to put it aside, see the module's docstring
         for item in sorted(items):
             others = [place for place in sorted(room.places - needed) if room.fits(item, place)]
@@ -143,18 +160,31 @@ class _Problem:
             if parent != ABSENT and self._room.place_of(item, where) == state.at:
                 yield Operator("PickupObject", item), _move(state, item, ABSENT, held=item)
 
-    def _puts(self, state: State, where: dict[str, str], held: str) -> Iterator[tuple[Operator, State]]:
+    def _puts(
+        self, state: State, where: dict[str, str], held: str
+    ) -> Iterator[tuple[Operator, State]]:
         for receptacle in itertools.chain((state.at,), self._movables):
             if receptacle is None or receptacle == held or not self._room.fits(held, receptacle):
                 continue
             if self._room.place_of(receptacle, where) == state.at:
-                yield Operator("PutObject", held, receptacle), _move(state, held, receptacle, held=None)
+                yield (
+                    Operator("PutObject", held, receptacle),
+                    _move(state, held, receptacle, held=None),
+                )
 
-    def _treatments(self, state: State, where: dict[str, str], held: str) -> Iterator[tuple[Operator, State]]:
+    def _treatments(
+        self, state: State, where: dict[str, str], held: str
+    ) -> Iterator[tuple[Operator, State]]:
         at = self._room.types.get(state.at or "")
-        if at == APPLIANCE.get(self._task.task_type) and self._room.types[held] == self._task.target:
+        if (
+            at == APPLIANCE.get(self._task.task_type)
+            and self._room.types[held] == self._task.target
+        ):
             if self._task.task_type == TaskType.CLEAN and held not in state.clean:
-                yield Operator("CleanObject", held, state.at), replace(state, clean=state.clean | {held})
+                yield (
+                    Operator("CleanObject", held, state.at),
+                    replace(state, clean=state.clean | {held}),
+                )
             if self._task.task_type == TaskType.HEAT and held not in state.hot:
                 after = replace(state, hot=state.hot | {held}, cold=state.cold - {held})
                 yield Operator("HeatObject", held, state.at), after
@@ -167,9 +197,15 @@ class _Problem:
     def _slicings(self, state: State, where: dict[str, str]) -> Iterator[tuple[Operator, State]]:
         for item, parent in where.items():
             whole = self._room.types[item] == self._task.pickup and parent != ABSENT
-            if whole and slice_item(item, 1) in where and self._room.place_of(item, where) == state.at:
+            if (
+                whole
+                and slice_item(item, 1) in where
+                and self._room.place_of(item, where) == state.at
+            ):
                 slices = {key: parent for key in where if key.startswith(f"{item}#")}
-                after = replace(state, where=tuple((key, slices.get(key, old)) for key, old in state.where))
+                after = replace(
+                    state, where=tuple((key, slices.get(key, old)) for key, old in state.where)
+                )
                 yield Operator("SliceObject", item), _move(after, item, ABSENT, held=state.held)
 
 

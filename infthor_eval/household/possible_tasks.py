@@ -4,7 +4,14 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 
 from infthor_eval.household import affordances
-from infthor_eval.household.affordances import KNIVES, LIGHTS, MOVABLE_RECEPTACLES, SLICEABLE, STOWABLE, goes_into
+from infthor_eval.household.affordances import (
+    KNIVES,
+    LIGHTS,
+    MOVABLE_RECEPTACLES,
+    SLICEABLE,
+    STOWABLE,
+    goes_into,
+)
 from infthor_eval.household.symbolic import ABSENT, SymbolicRoom
 from infthor_eval.household.tasks import Task, TaskType
 
@@ -15,7 +22,11 @@ _TREATED = {
     TaskType.HEAT: affordances.HEATABLE,
     TaskType.COOL: affordances.COOLABLE,
 }
-_APPLIANCES = {TaskType.CLEAN: {"SinkBasin", "Faucet"}, TaskType.HEAT: {"Microwave"}, TaskType.COOL: {"Fridge"}}
+_APPLIANCES = {
+    TaskType.CLEAN: {"SinkBasin", "Faucet"},
+    TaskType.HEAT: {"Microwave"},
+    TaskType.COOL: {"Fridge"},
+}
 
 
 def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:
@@ -24,15 +35,23 @@ def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:
     `extra_types` are the types of the objects that are neither items nor places (faucets).
     """
     where = dict(room.start.where)
-    items = {room.types[item] for item, parent in where.items() if parent != ABSENT or item == room.start.held}
+    items = {
+        room.types[item]
+        for item, parent in where.items()
+        if parent != ABSENT or item == room.start.held
+    }
     furniture = {room.types[place] for place in room.places & room.receptacles}
-    lamps = {room.types[lamp] for lamp in room.places - room.start.lit if room.types[lamp] in LIGHTS}
+    lamps = {
+        room.types[lamp] for lamp in room.places - room.start.lit if room.types[lamp] in LIGHTS
+    }
     known = items | furniture | set(extra_types)
     count = Counter(room.types[item] for item, parent in where.items() if parent != ABSENT)
     tasks: list[Task] = []
     for pickup in sorted(items & STOWABLE):
         for sliced in (False, True) if pickup in SLICEABLE and KNIVES & items else (False,):
-            tasks += [Task(TaskType.EXAMINE, pickup, light=lamp, sliced=sliced) for lamp in sorted(lamps)]
+            tasks += [
+                Task(TaskType.EXAMINE, pickup, light=lamp, sliced=sliced) for lamp in sorted(lamps)
+            ]
             for receptacle in sorted(furniture):
                 if goes_into(f"{pickup}Sliced" if sliced else pickup, receptacle):
                     tasks += _placements(pickup, receptacle, sliced, known, items, count)
@@ -40,7 +59,12 @@ def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:
 
 
 def _placements(
-    pickup: str, receptacle: str, sliced: bool, known: set[str], items: set[str], count: Counter[str]
+    pickup: str,
+    receptacle: str,
+    sliced: bool,
+    known: set[str],
+    items: set[str],
+    count: Counter[str],
 ) -> Iterator[Task]:
     task = Task(TaskType.PLACE, pickup, receptacle, sliced=sliced)
     target = task.target
@@ -48,7 +72,11 @@ def _placements(
     if sliced or count[pickup] > 1:
         yield Task(TaskType.PLACE_TWO, pickup, receptacle, sliced=sliced)
     for task_type, types in _TREATED.items():
-        if target in types and known >= _APPLIANCES[task_type] and receptacle not in _APPLIANCES[task_type]:
+        if (
+            target in types
+            and known >= _APPLIANCES[task_type]
+            and receptacle not in _APPLIANCES[task_type]
+        ):
             yield Task(task_type, pickup, receptacle, sliced=sliced)
     for movable in sorted(MOVABLE_RECEPTACLES & items - {pickup}):
         if goes_into(target, movable) and goes_into(movable, receptacle):

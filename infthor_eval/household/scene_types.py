@@ -8,7 +8,12 @@ from infthor_eval.household.tasks import SAMPLED, TaskType
 __all__ = ["BATHROOM", "scene_type", "usual_tasks"]
 
 BATHROOM = "Bathroom"
-_PROCEDURAL = {"kitchen": "Kitchen", "living-room": "LivingRoom", "bedroom": "Bedroom", "bathroom": BATHROOM}
+_PROCEDURAL = {
+    "kitchen": "Kitchen",
+    "living-room": "LivingRoom",
+    "bedroom": "Bedroom",
+    "bathroom": BATHROOM,
+}
 _FLOOR_PLANS = {
     "Kitchen": range(1, 31),
     "LivingRoom": range(201, 231),
@@ -21,7 +26,9 @@ def scene_type(scene: str) -> str | None:
     """Return the room type in the published tables' words ("LivingRoom"), or None for houses and unknown names."""
     number = re.fullmatch(r"FloorPlan(\d+)", scene)
     if number is not None:
-        return next((name for name, numbers in _FLOOR_PLANS.items() if int(number[1]) in numbers), None)
+        return next(
+            (name for name, numbers in _FLOOR_PLANS.items() if int(number[1]) in numbers), None
+        )
     return _PROCEDURAL.get(scene.rpartition("-")[0])
 
 

@@ -15,7 +15,14 @@ from infthor_eval.thor.simulator import Simulator
 from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
 
-__all__ = ["CAMERA_HEIGHT", "HORIZON_STEP", "Viewpoint", "find_viewpoint", "grid_pose_of", "reachable_grid"]
+__all__ = [
+    "CAMERA_HEIGHT",
+    "HORIZON_STEP",
+    "Viewpoint",
+    "find_viewpoint",
+    "grid_pose_of",
+    "reachable_grid",
+]
 
 CAMERA_HEIGHT = 0.675  # height of the camera above the agent's position, metres
 HORIZON_STEP = 30  # degrees
@@ -24,9 +31,13 @@ _REACH = 1.5  # the simulator's visibility distance, metres
 _SIDEWAYS = 32.0  # maximum angle from the camera's axis, degrees; half the field of view is 30
 _TOO_NEAR = 0.5  # metres; closer, a door may hit the agent, and an object fills the frame
 _MAX_TRIALS = 30
-_EXTRA_TRIALS = 4  # trials after the first success, for a viewpoint with the object well inside the frame
+_EXTRA_TRIALS = (
+    4  # trials after the first success, for a viewpoint with the object well inside the frame
+)
 _MARGIN, _SIDE = 15, 300  # margin and width of the frame, pixels
-_NO_IMAGE: dict[str, Any] = {"renderImage": False}  # the instance image is enough to tell what is in the frame
+_NO_IMAGE: dict[str, Any] = {
+    "renderImage": False
+}  # the instance image is enough to tell what is in the frame
 
 
 @dataclass(frozen=True)
@@ -38,7 +49,11 @@ class Viewpoint:
 
 
 def find_viewpoint(
-    simulator: Simulator, grid: Grid, shown: list[str], inside: str | None = None, min_pixels: int = 0
+    simulator: Simulator,
+    grid: Grid,
+    shown: list[str],
+    inside: str | None = None,
+    min_pixels: int = 0,
 ) -> Viewpoint | None:
     """Return the viewpoint with the fewest actions to it from which all given objects are visible.
 
@@ -62,7 +77,9 @@ def find_viewpoint(
     for viewpoint in list(_candidates(start, grid, focus, distances))[:_MAX_TRIALS]:
         view = _teleport(simulator, grid, start, viewpoint)
         qualifies = view.success and _shows(view, shown, min_pixels)
-        if qualifies and (inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels)):
+        if qualifies and (
+            inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels)
+        ):
             is_clear = inside is not None or not focus.pickupable or _is_well_inside(view, shown[0])
             best = viewpoint if is_clear or best is None else best
             if is_clear:
@@ -82,7 +99,9 @@ def reachable_grid(simulator: Simulator) -> Grid:
 
 def grid_pose_of(pose: AgentPose, grid: Grid) -> GridPose:
     """Return the nearest pose on the grid."""
-    return GridPose(grid.cell(pose.position.x, pose.position.z), round(pose.rotation / 90) * 90 % 360)
+    return GridPose(
+        grid.cell(pose.position.x, pose.position.z), round(pose.rotation / 90) * 90 % 360
+    )
 
 
 def _shows(view: SimulatorView, shown: list[str], min_pixels: int) -> bool:
@@ -109,7 +128,9 @@ def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels:
     # An open drawer can be out of view, and then cannot be closed normally. It must not stay open, as the trajectory
     # has no action that opened it.
     if not simulator.query("CloseObject", objectId=holder, forceAction=True, **_NO_IMAGE).success:
-        raise SimulatorError(f"{holder} was opened to look into it and cannot be closed again; choose another scene")
+        raise SimulatorError(
+            f"{holder} was opened to look into it and cannot be closed again; choose another scene"
+        )
     return False
 
 
@@ -143,8 +164,12 @@ def _bearing(position: tuple[float, float], facing: int, target: Vector) -> tupl
     return math.hypot(dx, dz), abs(angle)
 
 
-def _teleport(simulator: Simulator, grid: Grid, start: SimulatorView, viewpoint: Viewpoint) -> SimulatorView:
+def _teleport(
+    simulator: Simulator, grid: Grid, start: SimulatorView, viewpoint: Viewpoint
+) -> SimulatorView:
     x, z = grid.position(viewpoint.pose.cell)
     position = Vector(x, start.agent.position.y, z)
-    pose = AgentPose(position, float(viewpoint.pose.facing), float(viewpoint.horizon), start.agent.standing)
+    pose = AgentPose(
+        position, float(viewpoint.pose.facing), float(viewpoint.horizon), start.agent.standing
+    )
     return simulator.query(**teleport_call(pose, force=False), **_NO_IMAGE)

@@ -104,10 +104,15 @@ def _published_names(high: HighAction) -> list[str | None]:
     if planner.object_id is None and action.action == "PutObject":
         args = action.args if isinstance(action.args, list) else []
         if len(args) < 2:
-            raise DataError(f"sub-goal {high.high_idx} (PutObject) names no object; take --words natural")
+            raise DataError(
+                f"sub-goal {high.high_idx} (PutObject) names no object; take --words natural"
+            )
         names = [str(args[0]), str(args[1])]
     ids = (planner.object_id, planner.receptacle_id)
-    return [old if key is None else Words.PUBLISHED.name_of(key) for old, key in zip(names, ids, strict=True)]
+    return [
+        old if key is None else Words.PUBLISHED.name_of(key)
+        for old, key in zip(names, ids, strict=True)
+    ]
 
 
 def action_text(action: ApiAction, words: Words) -> str:
@@ -125,9 +130,14 @@ def action_text(action: ApiAction, words: Words) -> str:
     if name in _PLAIN_ACTIONS:
         return name
     if name not in _OBJECT_ACTIONS:
-        raise DataError(f"the published words do not know the action {name!r:.40}; take --words natural")
+        raise DataError(
+            f"the published words do not know the action {name!r:.40}; take --words natural"
+        )
     places = [(action.object_id, "[object]"), (action.receptacle_id, "[receptacle]")]
-    names = [hole if key is None else words.name_of(key) for key, hole in places[: 1 + (name == "PutObject")]]
+    names = [
+        hole if key is None else words.name_of(key)
+        for key, hole in places[: 1 + (name == "PutObject")]
+    ]
     return " ".join((name, *names))
 
 
@@ -165,7 +175,9 @@ def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
     The words are the published ones. A sub-goal or action that has none keeps its natural words, so that a trajectory
     is never without its text.
     """
-    starts: dict[int, int | None] = {item.low_pddl_idx[0]: item.sub_traj_idx for item in trajectory.sub_trajs}
+    starts: dict[int, int | None] = {
+        item.low_pddl_idx[0]: item.sub_traj_idx for item in trajectory.sub_trajs
+    }
     starts = starts or {0: None}
     plans = {high.high_idx: _in_some_words(plan_text, high) for high in trajectory.plan.high_pddl}
     actions = [_in_some_words(action_text, low.api_action) for low in trajectory.plan.low_actions]

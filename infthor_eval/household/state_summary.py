@@ -31,7 +31,11 @@ def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
 
 
 def _summary(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) -> str:
-    sentences = [f"You are holding {' and '.join(map(with_article, held))}." if held else "Your hands are free."]
+    sentences = [
+        f"You are holding {' and '.join(map(with_article, held))}."
+        if held
+        else "Your hands are free."
+    ]
     inside: dict[str, list[str]] = {}
     for state, place in known.values():
         if place is not None:
@@ -40,7 +44,13 @@ def _summary(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) 
         items = ", ".join(with_article(item) for item in sorted(inside[place]))
         sentences.append(f"You saw {items} {preposition(place)} the {noun(place)}.")
     opened = sorted({noun(state.type) for state, _ in known.values() if state.is_open})
-    lit = sorted({noun(state.type) for state, _ in known.values() if state.is_on and state.type.endswith("Lamp")})
+    lit = sorted(
+        {
+            noun(state.type)
+            for state, _ in known.values()
+            if state.is_on and state.type.endswith("Lamp")
+        }
+    )
     sentences += [f"Open: {', '.join(opened)}."] if opened else []
     sentences += [f"Switched on: {', '.join(lit)}."] if lit else []
     return " ".join(sentences)

@@ -83,17 +83,23 @@ class SymbolicRoom:
 
     def fits(self, item: str, receptacle: str) -> bool:
         """Return True if a receptacle is made for an item's type and is not known to have no room for it."""
-        usual = receptacle in self.receptacles and goes_into(self.types[item], self.types[receptacle])
+        usual = receptacle in self.receptacles and goes_into(
+            self.types[item], self.types[receptacle]
+        )
         return usual and (item, receptacle) not in self.refused
 
 
-def room_of(view: SimulatorView, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()) -> SymbolicRoom:
+def room_of(
+    view: SimulatorView, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()
+) -> SymbolicRoom:
     """Read a room from the simulator's state, with the agent at no place; `blocked` objects cannot be acted on."""
     objects = {key: item for key, item in view.objects.items() if not _is_remains(item)}
     items = {key: item for key, item in objects.items() if item.pickupable and key not in blocked}
     places = {key for key, item in objects.items() if _is_place(item)}
     where = {key: _parent_of(item, objects, places) for key, item in items.items()}
-    types = {key: item.object_type for key, item in objects.items() if key in places or key in items}
+    types = {
+        key: item.object_type for key, item in objects.items() if key in places or key in items
+    }
     for key, item in items.items():
         if item.object_type in SLICEABLE:
             for number in range(1, _SLICES + 1):
@@ -104,13 +110,17 @@ def room_of(view: SimulatorView, blocked: Container[str] = (), refused: Iterable
         types=types,
         places=frozenset(places),
         receptacles=frozenset(
-            key for key in types if key in objects and objects[key].receptacle and key not in blocked
+            key
+            for key in types
+            if key in objects and objects[key].receptacle and key not in blocked
         ),
         start=State(
             at=None,
             held=held,
             where=tuple(sorted(where.items())),
-            lit=frozenset(key for key in places if objects[key].toggleable and objects[key].is_toggled),
+            lit=frozenset(
+                key for key in places if objects[key].toggleable and objects[key].is_toggled
+            ),
         ),
         refused=frozenset(refused),
     )
@@ -125,7 +135,9 @@ def _parent_of(item: ThorObject, objects: dict[str, ThorObject], places: Iterabl
     if item.is_picked_up:
         return ABSENT
     parent = direct_parent(item, objects)
-    return parent if parent is not None and (parent in places or objects[parent].pickupable) else FLOOR
+    return (
+        parent if parent is not None and (parent in places or objects[parent].pickupable) else FLOOR
+    )
 
 
 def _is_remains(item: ThorObject) -> bool:

@@ -27,7 +27,9 @@ class TaskType(StrEnum):
     PUT_AWAY = "put object"
 
 
-SAMPLED = tuple(item for item in TaskType if item != TaskType.PUT_AWAY)  # those that a task is drawn from: ALFRED's
+SAMPLED = tuple(
+    item for item in TaskType if item != TaskType.PUT_AWAY
+)  # those that a task is drawn from: ALFRED's
 
 
 class Task(msgspec.Struct, frozen=True):
@@ -58,7 +60,11 @@ class Task(msgspec.Struct, frozen=True):
     @property
     def targets(self) -> tuple[str, ...]:
         """Types of which one must be in the receptacle in the end."""
-        return (self.pickup, f"{self.pickup}Sliced") if self.task_type == TaskType.PUT_AWAY else (self.target,)
+        return (
+            (self.pickup, f"{self.pickup}Sliced")
+            if self.task_type == TaskType.PUT_AWAY
+            else (self.target,)
+        )
 
 
 _TEMPLATES = {
@@ -77,7 +83,10 @@ _ONTO = {"Plate"}  # objects are on these, not in them
 def sub_task(task: Task, scene: str) -> SubTask:
     """Return a task in a scene in the form of trajectories, with a description in words."""
     if task.task_type == TaskType.PUT_AWAY:  # as the published generator writes it
-        return SubTask(TaskInfo(str(task.task_type), None, task.pickup, task.receptacle, scene), _describe(task))
+        return SubTask(
+            TaskInfo(str(task.task_type), None, task.pickup, task.receptacle, scene),
+            _describe(task),
+        )
     info = TaskInfo(str(task.task_type), task.pickup, task.movable, task.receptacle, scene)
     params = {
         "mrecep_target": task.movable or "",
@@ -102,7 +111,9 @@ def task_of(recorded: SubTask) -> Task:
     if task_type == TaskType.PUT_AWAY:
         # Its parameters are those of the task before it; the object is the movable one, and none is picked up.
         if not (info.movable and info.receptacle):
-            raise DataError(f"a task of type {task_type} needs task_info's movable and receptacle; give object types")
+            raise DataError(
+                f"a task of type {task_type} needs task_info's movable and receptacle; give object types"
+            )
         return Task(task_type, modern_type(info.movable), modern_type(info.receptacle))
     examines, stacks = task_type == TaskType.EXAMINE, task_type == TaskType.STACK
     pickup = _object_type(task_type, params, "object_target", info.pickup)
@@ -110,7 +121,9 @@ def task_of(recorded: SubTask) -> Task:
     return Task(
         task_type,
         whole,
-        receptacle=None if examines else _object_type(task_type, params, "parent_target", info.receptacle),
+        receptacle=None
+        if examines
+        else _object_type(task_type, params, "parent_target", info.receptacle),
         movable=_object_type(task_type, params, "mrecep_target", info.movable) if stacks else None,
         light=_object_type(task_type, params, "toggle_target", None) if examines else None,
         sliced=whole != pickup or _is_sliced(params),
@@ -123,25 +136,35 @@ def _task_type(goal: str) -> TaskType:
     try:
         return TaskType(goal)
     except ValueError as error:
-        raise DataError(f"a task's goal is {goal!r:.60}; give one of {', '.join(TaskType)}") from error
+        raise DataError(
+            f"a task's goal is {goal!r:.60}; give one of {', '.join(TaskType)}"
+        ) from error
 
 
 _IN_INFO = {"object_target": "pickup", "parent_target": "receptacle", "mrecep_target": "movable"}
 
 
-def _object_type(task_type: TaskType, params: dict[str, Any], name: str, in_info: str | None) -> str:
+def _object_type(
+    task_type: TaskType, params: dict[str, Any], name: str, in_info: str | None
+) -> str:
     """Return an object type that a goal needs, from `task_info` or else from `pddl_params`."""
     object_type = in_info or params.get(name)
     if isinstance(object_type, str) and object_type:
         return modern_type(object_type)
-    places = f"task_info's {_IN_INFO[name]} or pddl_params' {name}" if name in _IN_INFO else f"pddl_params' {name}"
+    places = (
+        f"task_info's {_IN_INFO[name]} or pddl_params' {name}"
+        if name in _IN_INFO
+        else f"pddl_params' {name}"
+    )
     raise DataError(f"a task of type {task_type} has no {places}; give an object type there")
 
 
 def _is_sliced(params: dict[str, Any]) -> bool:
     sliced = params.get("object_sliced")
     if sliced is not None and not isinstance(sliced, bool):
-        raise DataError(f"a task's pddl_params have object_sliced {sliced!r:.60}; set it to true or false")
+        raise DataError(
+            f"a task's pddl_params have object_sliced {sliced!r:.60}; set it to true or false"
+        )
     return sliced is True
 
 

@@ -48,7 +48,9 @@ class Treatments:
             return self
         if action == "ToggleObjectOn" and tool.object_type == "Faucet":
             basin = _basin_of(tool, view)
-            inside = frozenset[str]() if basin is None else contents_of(basin.object_id, view.objects)
+            inside = (
+                frozenset[str]() if basin is None else contents_of(basin.object_id, view.objects)
+            )
             return replace(self, clean=self.clean | inside)
         if action == "ToggleObjectOn" and tool.object_type == "Microwave":
             return replace(self, hot=self.hot | contents_of(tool.object_id, view.objects))
@@ -64,4 +66,8 @@ def _basin_of(faucet: ThorObject, view: SimulatorView) -> ThorObject | None:
     """
     basins = [item for item in view.objects.values() if item.object_type in _BASINS]
     at = astuple(faucet.position)
-    return min(basins, key=lambda item: (math.dist(astuple(item.position), at), item.object_id), default=None)
+    return min(
+        basins,
+        key=lambda item: (math.dist(astuple(item.position), at), item.object_id),
+        default=None,
+    )

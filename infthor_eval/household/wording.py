@@ -11,8 +11,20 @@ __all__ = ["canonical_type", "compact_name", "noun", "object_type", "plural", "w
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
 _LETTERS = {"CD": "CD", "TVStand": "TV stand", "Television": "television"}
-_BARE = {"blinds", "boots", "bread", "curtains", "lettuce", "toilet paper"}  # plural, or not counted
-_IRREGULAR = {"knife": "knives", "butter knife": "butter knives", "shelf": "shelves", "bread": "loaves of bread"}
+_BARE = {
+    "blinds",
+    "boots",
+    "bread",
+    "curtains",
+    "lettuce",
+    "toilet paper",
+}  # plural, or not counted
+_IRREGULAR = {
+    "knife": "knives",
+    "butter knife": "butter knives",
+    "shelf": "shelves",
+    "bread": "loaves of bread",
+}
 
 
 def canonical_type(object_type: str) -> str:

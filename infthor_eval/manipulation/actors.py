@@ -12,7 +12,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment
 from infthor_eval.manipulation.kinds import ManipulationKind
-from infthor_eval.manipulation.reaching import plan_steps
+from infthor_eval.manipulation.planner.reaching import plan_steps
 from infthor_eval.runs.baseline import BaselineSubject
 from model_adapters import ArmDelta, Capabilities, Policy, Subject
 
@@ -86,13 +86,17 @@ def _check_step(step: object) -> None:
         raise ModelError(f"the policy gives {step!r:.60} for a step; it must be an ArmDelta")
     numbers = (*step.translation, *step.rotation, step.gripper)
     if (len(step.translation), len(step.rotation)) != (3, 3):
-        raise ModelError(f"the policy gives {len(numbers)} numbers for a step; it must be {_N_NUMBERS}")
+        raise ModelError(
+            f"the policy gives {len(numbers)} numbers for a step; it must be {_N_NUMBERS}"
+        )
     try:
         finite = all(math.isfinite(number) for number in numbers)
     except TypeError:
         finite = False
     if not finite:
-        raise ModelError("the policy gives numbers that are not finite; its weights or its input are broken")
+        raise ModelError(
+            "the policy gives numbers that are not finite; its weights or its input are broken"
+        )
 
 
 class _ArmBaseline(BaselineSubject):

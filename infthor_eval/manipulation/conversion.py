@@ -37,7 +37,9 @@ class Conversion:
     def calls(self, delta: ArmDelta) -> list[Call]:
         """Return the movements of a step in order, without the gripper; none if the arm stands still."""
         calls = [self._translation(delta), self._rotation(delta) if self.rotation else None]
-        return [call | {"returnToStart": self.return_to_start} for call in calls if call is not None]
+        return [
+            call | {"returnToStart": self.return_to_start} for call in calls if call is not None
+        ]
 
     def _translation(self, delta: ArmDelta) -> Call | None:
         x, y, z = (self.translation_scale * value for value in delta.translation)
@@ -45,7 +47,10 @@ class Conversion:
         if length < _STILL:
             return None
         share = min(1.0, self.max_step / length)
-        return {"action": "MoveArmRelative", "offset": {"x": -share * y, "y": share * z, "z": share * x}}
+        return {
+            "action": "MoveArmRelative",
+            "offset": {"x": -share * y, "y": share * z, "z": share * x},
+        }
 
     @staticmethod
     def _rotation(delta: ArmDelta) -> Call | None:

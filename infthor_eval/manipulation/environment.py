@@ -11,7 +11,15 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.containment import is_in
 from infthor_eval.manipulation.conversion import Call, Conversion
 from infthor_eval.manipulation.expert import EpisodeStart
-from infthor_eval.manipulation.geometry import distance_to, interpolate, middle_of, offset, point_of, size_of, xyz
+from infthor_eval.manipulation.geometry import (
+    distance_to,
+    interpolate,
+    middle_of,
+    offset,
+    point_of,
+    size_of,
+    xyz,
+)
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.protocol import Closing, Hand, Stand
 from infthor_eval.manipulation.records import ArmEnded
@@ -102,7 +110,12 @@ class ArmEnvironment:
         self._is_over = True
 
     def reset(
-        self, episode: ArmEpisode, start: EpisodeStart, conversion: Conversion, grasp: Grasp, frames: FrameKeeper
+        self,
+        episode: ArmEpisode,
+        start: EpisodeStart,
+        conversion: Conversion,
+        grasp: Grasp,
+        frames: FrameKeeper,
     ) -> ArmOutcome:
         """Bring the world to the true state before an episode, with the arm at rest; for a put, with the object in it.
 
@@ -113,19 +126,25 @@ class ArmEnvironment:
         self.episode, self.start = episode, start
         self._conversion, self._grasp, self._frames = conversion, grasp, frames
         view = self._simulator.rewind(self._initial, exactly=True)
-        missing = {start.object_id, start.receptacle_id} & set(transfer(self._simulator, start.view))
+        missing = {start.object_id, start.receptacle_id} & set(
+            transfer(self._simulator, start.view)
+        )
         if missing:
             raise InfeasibleError(f"{min(map(str, missing))} cannot be brought to where it was")
         self._target = start.view.objects[start.receptacle_id or start.object_id]
         pose = start.view.agent if grasp.stand is Stand.EXPERT else start.before_the_way
         # An agent with an arm has another height than the default one, so the expert's y is not taken over.
         position = Vector(pose.position.x, view.agent.position.y, pose.position.z)
-        self._require(teleport_call(AgentPose(position, pose.rotation, pose.horizon, view.agent.standing)))
+        self._require(
+            teleport_call(AgentPose(position, pose.rotation, pose.horizon, view.agent.standing))
+        )
         if episode.kind == ManipulationKind.PUT:
             self._put_in_hand(start.object_id, start.view)
         elif grasp.hand is not Hand.REST:
             # Where something is in the way, the arm stays as near as it comes.
-            self._simulator.step("MoveArmBase", y=float(grasp.hand is Hand.HIGH), returnToStart=False)
+            self._simulator.step(
+                "MoveArmBase", y=float(grasp.hand is Hand.HIGH), returnToStart=False
+            )
         view = self._require({"action": "SetHandSphereRadius", "radius": grasp.radius})
         self.starts_inside = start.object_id in arm_of(view).pickupable
         self._is_over = False
@@ -153,7 +172,14 @@ class ArmEnvironment:
         ended = self._ending(released)
         self._is_over = ended is not None
         view = self._simulator.view
-        return ArmOutcome(view, self._frames.keep(view), tuple(calls), tuple(refusals), self._distance(view), ended)
+        return ArmOutcome(
+            view,
+            self._frames.keep(view),
+            tuple(calls),
+            tuple(refusals),
+            self._distance(view),
+            ended,
+        )
 
     @property
     def view(self) -> SimulatorView:
@@ -195,7 +221,11 @@ class ArmEnvironment:
         if self._grasp.takes_all:
             return [{"action": "PickupObject"}] if arm.pickupable else []
         target = self.start.object_id
-        return [{"action": "PickupObject", "objectIdCandidates": [target]}] if target in arm.pickupable else []
+        return (
+            [{"action": "PickupObject", "objectIdCandidates": [target]}]
+            if target in arm.pickupable
+            else []
+        )
 
     def _ending(self, released: bool) -> ArmEnded | None:
         target = self.start.object_id
@@ -228,7 +258,10 @@ class ArmEnvironment:
             low, high = (share, high) if arm_of(view).wrist.y < height else (low, share)
         view = self._require({"action": "SetHandSphereRadius", "radius": self._grasp.radius})
         places = [0] if self._grasp.at_palm else range(_PLACES, -1, -1)
-        calls = [_teleport_to_hand(view.objects[target], arm_of(view), place / _PLACES) for place in places]
+        calls = [
+            _teleport_to_hand(view.objects[target], arm_of(view), place / _PLACES)
+            for place in places
+        ]
         if not any(self._simulator.step(**call).success for call in calls):
             self._require(calls[-1] | {"forceAction": True})
         self._require({"action": "PickupObject", "objectIdCandidates": [target]})
@@ -241,7 +274,9 @@ class ArmEnvironment:
 
     def _distance(self, view: SimulatorView) -> float:
         # An object that broke (an egg) is no longer listed; its last place counts.
-        self._target = view.objects.get(self.start.receptacle_id or self.start.object_id, self._target)
+        self._target = view.objects.get(
+            self.start.receptacle_id or self.start.object_id, self._target
+        )
         return distance_to(point_of(arm_of(view).sphere_center), self._target)
 
 
@@ -258,7 +293,10 @@ def _teleport_to_hand(item: ThorObject, arm: ArmState, share: float) -> Call:
     length = math.dist(wrist, center) or 1.0
     ahead = offset(wrist, center)
     # Half the extent of the object's box along the hand's direction.
-    depth = sum(abs(part) / length * extent for part, extent in zip(ahead, size_of(item), strict=True)) / 2
+    depth = (
+        sum(abs(part) / length * extent for part, extent in zip(ahead, size_of(item), strict=True))
+        / 2
+    )
     nearest = length - arm.sphere_radius + _HELD_GAP + depth
     goal = interpolate(wrist, center, (nearest + share * max(0.0, length - nearest)) / length)
     # The call places the object's origin, which need not be the middle of its box.

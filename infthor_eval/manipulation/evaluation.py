@@ -54,11 +54,19 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
 class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
     """Manipulation for one subject; see `infthor_eval.runs.BoundEvaluation`."""
 
-    def __init__(self, evaluation: ManipulationEvaluation, create_actor: Callable[[], ArmActor], *, sees: bool) -> None:
+    def __init__(
+        self,
+        evaluation: ManipulationEvaluation,
+        create_actor: Callable[[], ArmActor],
+        *,
+        sees: bool,
+    ) -> None:
         """Take the work, what creates the actor of a trajectory, and whether actors look at frames."""
         self._tasks, self._create_actor, self._sees = evaluation.tasks, create_actor, sees
         self._experts = evaluation.simulators(image=False, instances=False)
-        by_camera = {task.settings.camera: task.settings.camera_options for task in self._tasks.values()}
+        by_camera = {
+            task.settings.camera: task.settings.camera_options for task in self._tasks.values()
+        }
         self._arms = {
             camera: evaluation.simulators(image=sees, instances=False, agentMode="arm", **options)
             for camera, options in by_camera.items()
@@ -67,9 +75,15 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         by_trajectory: dict[str, list[ArmUnit]] = {unit.cluster: [] for unit in evaluation.units}
         for unit in sorted(evaluation.units, key=lambda unit: (unit.episode.index, unit.key)):
             by_trajectory[unit.cluster].append(unit)
-        super().__init__(evaluation, evaluation.workload(by_trajectory.values()), [self._experts, *self._arms.values()])
+        super().__init__(
+            evaluation,
+            evaluation.workload(by_trajectory.values()),
+            [self._experts, *self._arms.values()],
+        )
 
-    def run(self, group: Group[ArmUnit], session: Session[ArmRecord]) -> Iterator[UnitRecord[ArmRecord]]:
+    def run(
+        self, group: Group[ArmUnit], session: Session[ArmRecord]
+    ) -> Iterator[UnitRecord[ArmRecord]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         fingerprints, known = self._find_records(group, session)
         yield from (record for record in known.values() if record is not None)
@@ -90,12 +104,16 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         trajectory = units[0].trajectory.data
         try:
             with self._experts.one() as expert:
-                states, faults = with_retries(expert, lambda: replay_expert(trajectory, expert), lambda: None)
+                states, faults = with_retries(
+                    expert, lambda: replay_expert(trajectory, expert), lambda: None
+                )
         except SceneError as error:
             yield from (unit.record_exclusion(str(error), fingerprints[unit.key]) for unit in units)
             return
         with arms.one() as simulator:
-            runner = ArmRunner(trajectory, states, simulator, self._create_actor(), sees=self._sees, seed=self.seed)
+            runner = ArmRunner(
+                trajectory, states, simulator, self._create_actor(), sees=self._sees, seed=self.seed
+            )
             for unit in units:
                 run = partial(runner.run, self._tasks[unit.key.task], unit.episode)
                 record = runner.record(unit, fingerprints[unit.key], run, session)

@@ -77,12 +77,16 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
             return ExpertStates(starts, _refusal(number, low, str(error)))
         after = simulator.step(**call)
         if not after.success:
-            return ExpertStates(starts, _refusal(number, low, after.error or "refused without a message"))
+            return ExpertStates(
+                starts, _refusal(number, low, after.error or "refused without a message")
+            )
         kind = EXPERT_ACTIONS.get(low.api_action.action)
         if kind == ManipulationKind.PICKUP:
             starts[number] = EpisodeStart(before, call["objectId"], walked_from)
         elif kind == ManipulationKind.PUT:
-            starts[number] = EpisodeStart(before, before.inventory[0], walked_from, call["objectId"])
+            starts[number] = EpisodeStart(
+                before, before.inventory[0], walked_from, call["objectId"]
+            )
     return ExpertStates(starts)
 
 

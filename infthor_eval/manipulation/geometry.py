@@ -64,7 +64,9 @@ def size_of(item: ThorObject) -> Point:
 def distance_to(point: Point, item: ThorObject) -> float:
     """Return the metres from a point to the nearest point of an object's box."""
     apart = offset(middle_of(item), point)
-    return math.hypot(*(max(0.0, abs(d) - size / 2) for d, size in zip(apart, size_of(item), strict=True)))
+    return math.hypot(
+        *(max(0.0, abs(d) - size / 2) for d, size in zip(apart, size_of(item), strict=True))
+    )
 
 
 def corners_of(item: ThorObject) -> Corners:

@@ -12,4 +12,7 @@ class ManipulationKind(StrEnum):
     PUT = "put"
 
 
-KIND_NAMES = {ManipulationKind.PICKUP: "Pick-up", ManipulationKind.PUT: "Put"}  # as the paper calls them
+KIND_NAMES = {
+    ManipulationKind.PICKUP: "Pick-up",
+    ManipulationKind.PUT: "Put",
+}  # as the paper calls them

@@ -17,7 +17,11 @@ class ManipulationOptions(SimulatorOptions):
 
     radius: str | None = field(
         default=None,
-        metadata={"help": "Radius of the hand's magnet, metres, a run with each.", "metavar": "R,...", "each": True},
+        metadata={
+            "help": "Radius of the hand's magnet, metres, a run with each.",
+            "metavar": "R,...",
+            "each": True,
+        },
     )
     stand: str | None = field(
         default=None,
@@ -28,7 +32,10 @@ class ManipulationOptions(SimulatorOptions):
     )
     hand: str | None = field(
         default=None,
-        metadata={"choices": tuple(map(str, Hand)), "help": "Height of the arm at the start of a pick-up."},
+        metadata={
+            "choices": tuple(map(str, Hand)),
+            "help": "Height of the arm at the start of a pick-up.",
+        },
     )
     closing: str | None = field(
         default=None,
@@ -49,7 +56,9 @@ class ManipulationOptions(SimulatorOptions):
         """Check the options; raises UsageError for unknown frames, or a radius that AI2-THOR does not allow."""
         super().__post_init__()
         if self.radius_metres is not None and not RADII[0] <= self.radius_metres <= RADII[1]:
-            raise UsageError(f"--radius {self.radius}: is a length of {RADII[0]} to {RADII[1]} metres")
+            raise UsageError(
+                f"--radius {self.radius}: is a length of {RADII[0]} to {RADII[1]} metres"
+            )
 
     @property
     def radius_metres(self) -> float | None:

@@ -6,7 +6,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
-from infthor_eval.runs.records import RecordTypes
+from infthor_eval.runs.journals.records import RecordTypes
 
 __all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep"]
 
@@ -48,7 +48,9 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         return sum(text.startswith(_COLLIDED) for text in self.refusals)
 
 
-class ArmRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="arm"):
+class ArmRecord(
+    EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="arm"
+):
     """One pick-up or put, and what an arm did in it; `index` is that of the expert's low-level action it replaces.
 
     Attributes:

@@ -6,7 +6,6 @@ from contextlib import contextmanager
 import msgspec
 
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
-from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
@@ -15,6 +14,7 @@ from infthor_eval.manipulation.geometry import point_of
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode
+from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.frames import FrameFolder, FrameKeeper, NoFrames
 from infthor_eval.thor.simulator import Simulator
 from model_adapters import ArmDelta
@@ -64,7 +64,9 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         start = self._states.before(episode)
         with self._frames() as frames:
             environment = self.environment
-            outcome = environment.reset(episode, start, task.settings.conversion, task.settings.grasp, frames)
+            outcome = environment.reset(
+                episode, start, task.settings.conversion, task.settings.grasp, frames
+            )
             self.begun = msgspec.structs.replace(
                 arm_record(task, episode),
                 object_id=start.object_id,
@@ -73,17 +75,25 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
                 start_distance=round(outcome.distance, _DIGITS),
             )
             seed = f"{self._seed}/{task.name}/{episode.index}"
-            self._actor.begin(ArmSituation(environment, self.begun.instruction, seed, task.settings.max_step))
+            self._actor.begin(
+                ArmSituation(environment, self.begun.instruction, seed, task.settings.max_step)
+            )
             steps, ended = self._act(environment, outcome, task.settings.max_steps)
         closest = min([outcome.distance, *(step.distance for step in steps)])
         reward = task.settings.reward if ended == ArmEnded.DONE else 0.0
         return EpisodeResult(
             msgspec.structs.replace(
-                self.begun, steps=tuple(steps), closest=round(closest, _DIGITS), reward=reward, ended=str(ended)
+                self.begun,
+                steps=tuple(steps),
+                closest=round(closest, _DIGITS),
+                reward=reward,
+                ended=str(ended),
             )
         )
 
-    def _act(self, environment: ArmEnvironment, outcome: ArmOutcome, max_steps: int) -> tuple[list[ArmStep], ArmEnded]:
+    def _act(
+        self, environment: ArmEnvironment, outcome: ArmOutcome, max_steps: int
+    ) -> tuple[list[ArmStep], ArmEnded]:
         """Let the actor act until the episode is over; the steps of a chunk are executed before it is asked again."""
         steps: list[ArmStep] = []
         chunk: list[Step] = []
@@ -117,7 +127,9 @@ def _arm_step(step: Step, outcome: ArmOutcome) -> ArmStep:
     x, y, z = (round(value, _DIGITS) for value in point_of(arm_of(outcome.view).sphere_center))
     delta = None
     if isinstance(step, ArmDelta):
-        delta = tuple(round(number, _DIGITS) for number in (*step.translation, *step.rotation, step.gripper))
+        delta = tuple(
+            round(number, _DIGITS) for number in (*step.translation, *step.rotation, step.gripper)
+        )
     return ArmStep(
         delta=delta,
         calls=outcome.calls,

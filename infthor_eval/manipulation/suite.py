@@ -12,7 +12,15 @@ from infthor_eval.manipulation.summary import ManipulationSummary, summarise_man
 from infthor_eval.manipulation.tables import overview_table, result_tables
 from infthor_eval.manipulation.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord, check_config
+from infthor_eval.runs import (
+    RecordTypes,
+    RunHeader,
+    RunSummary,
+    TaskFile,
+    TaskRequest,
+    UnitRecord,
+    check_config,
+)
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -37,7 +45,9 @@ class ManipulationSuite:
         """See `Suite.prepare`."""
         return ManipulationEvaluation(request)
 
-    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[ArmRecord]]) -> ManipulationSummary:
+    def summarise(
+        self, header: RunHeader, records: Sequence[UnitRecord[ArmRecord]]
+    ) -> ManipulationSummary:
         """See `Suite.summarise`; raises DataError for a journal whose config is of another form."""
         check_config(header, ManipulationConfig)
         return summarise_manipulation(header.config, records)
@@ -45,11 +55,15 @@ class ManipulationSuite:
     def scores(self, record: UnitRecord[ArmRecord]) -> Mapping[str, float]:
         """See `Suite.scores`: whether the episode is a success, and its reward."""
         payload = record.payload
-        return {"success": float(payload.done), "reward": payload.reward} if payload.attempted else {}
+        return (
+            {"success": float(payload.done), "reward": payload.reward} if payload.attempted else {}
+        )
 
     def primary_metrics(self, summary: ManipulationSummary) -> Mapping[str, Rate]:
         """See `Suite.primary_metrics`: share of successful episodes."""
-        return {name: task.success for name, task in summary.tasks.items() if task.success is not None}
+        return {
+            name: task.success for name, task in summary.tasks.items() if task.success is not None
+        }
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.overview`."""

@@ -48,7 +48,9 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
 ManipulationSummary = EpisodesSummary[ArmTaskSummary]
 
 
-def summarise_manipulation(config: Mapping[str, Any], records: Sequence[Record]) -> ManipulationSummary:
+def summarise_manipulation(
+    config: Mapping[str, Any], records: Sequence[Record]
+) -> ManipulationSummary:
     """Summarise a run, given its config and the records of all its episodes."""
     return summarise_episodes(config, records, _summarise_task)
 

@@ -3,7 +3,13 @@
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
-from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes, run_name
+from infthor_eval.episodes.tables import (
+    NAME_COLUMNS,
+    endings_table,
+    named_tasks,
+    result_notes,
+    run_name,
+)
 from infthor_eval.formats.published import published_tables
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.summary import ArmTaskSummary
@@ -19,7 +25,9 @@ _FLOOR = (
     "Above still: percentage points more than the baseline that never moves, in the same episodes. With a sphere of"
     " 0.5 m it alone is above Table 6, so the paper's protocol differs from this one (docs/manipulation.md)."
 )
-_N_OVERVIEW = 6  # columns of the success table that the overview has: those before what was left out
+_N_OVERVIEW = (
+    6  # columns of the success table that the overview has: those before what was left out
+)
 
 
 def overview_table(runs: Sequence[RunSummary]) -> Table:
@@ -33,7 +41,11 @@ def overview_table(runs: Sequence[RunSummary]) -> Table:
 def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     """Return all tables of some runs."""
     tasks = list(named_tasks(runs))
-    return [_success_table(runs), _episodes_table(tasks), endings_table("How episodes ended", tasks)]
+    return [
+        _success_table(runs),
+        _episodes_table(tasks),
+        endings_table("How episodes ended", tasks),
+    ]
 
 
 def _success_table(runs: Sequence[RunSummary]) -> Table:
@@ -52,12 +64,24 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
             values = (f"{value:.2f}" for value in row.values)
             rows.append(Row((row.name, f"published, {table.title}", *values), is_published=True))
         notes += table.notes
-    names = ("Pick-up", "Put", "pick-ups", "puts", "trajectories", "excluded", "skipped", "failed", *_ABOVE)
+    names = (
+        "Pick-up",
+        "Put",
+        "pick-ups",
+        "puts",
+        "trajectories",
+        "excluded",
+        "skipped",
+        "failed",
+        *_ABOVE,
+    )
     columns = (Column("model", False), Column("radius, m", False), *map(Column, names))
     return Table("Low-level manipulation, success %", columns, tuple(rows), tuple(notes))
 
 
-def _above_floor(run: RunSummary, named: tuple[str, ArmTaskSummary], runs: Sequence[RunSummary]) -> Rate | None:
+def _above_floor(
+    run: RunSummary, named: tuple[str, ArmTaskSummary], runs: Sequence[RunSummary]
+) -> Rate | None:
     """Return a task's success less that of `still` in the same episodes; None without a run of `still` like this."""
     name, task = named
     stills = [
@@ -71,7 +95,9 @@ def _above_floor(run: RunSummary, named: tuple[str, ArmTaskSummary], runs: Seque
         return None
     both = sorted(task.outcomes.keys() & stills[0].outcomes.keys())
     trajectories = [episode.rpartition("/")[0] for episode in both]
-    return paired_rate([stills[0].outcomes[it] for it in both], [task.outcomes[it] for it in both], trajectories)
+    return paired_rate(
+        [stills[0].outcomes[it] for it in both], [task.outcomes[it] for it in both], trajectories
+    )
 
 
 def _cells(pair: Sequence[ArmTaskSummary | None]) -> Iterator[str]:

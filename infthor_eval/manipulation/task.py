@@ -81,7 +81,9 @@ class ArmTaskSettings:
     @property
     def conversion(self) -> Conversion:
         """How a policy's steps become calls."""
-        return Conversion(self.translation_scale, self.max_step, self.rotation, self.return_to_start)
+        return Conversion(
+            self.translation_scale, self.max_step, self.rotation, self.return_to_start
+        )
 
     @property
     def grasp(self) -> Grasp:
@@ -104,7 +106,11 @@ class ArmTaskSettings:
     @property
     def camera_options(self) -> dict[str, Any]:
         """The same as options of `Simulator`."""
-        return {"width": self.image_size, "height": self.image_size, "fieldOfView": self.field_of_view}
+        return {
+            "width": self.image_size,
+            "height": self.image_size,
+            "fieldOfView": self.field_of_view,
+        }
 
 
 def check_task_file(file: TaskFile) -> None:
@@ -128,7 +134,9 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
         given |= {name: getattr(request.options, name) for name in _GIVEN}
         settings = task_settings(file, ArmTaskSettings, given, _CHOICES)
         self.kind = ManipulationKind(settings.kind)
-        self._template = _INSTRUCTIONS[self.kind] if settings.instruction is None else settings.instruction
+        self._template = (
+            _INSTRUCTIONS[self.kind] if settings.instruction is None else settings.instruction
+        )
         _check_numbers(file.name, settings)
         self._check_instruction(file.name)
         super().__init__(file, request, settings, read_arm_trajectory)
@@ -138,7 +146,9 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             for episode in trajectory.episodes
             if episode.kind == self.kind
         ]
-        self.episodes = limit_items(episodes, lambda item: item[0].traj_id, request.seed, request.limit)
+        self.episodes = limit_items(
+            episodes, lambda item: item[0].traj_id, request.seed, request.limit
+        )
         if not self.episodes:
             raise UsageError(f"{self.name}: no trajectory there has a {KIND_NAMES[self.kind]}")
 
@@ -148,7 +158,9 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
         if template == "short":
             return KIND_NAMES[self.kind]
         names = {"object": episode.object_type, "receptacle": episode.receptacle_type}
-        return template.format(**{key: noun(canonical_type(name)) for key, name in names.items() if name is not None})
+        return template.format(
+            **{key: noun(canonical_type(name)) for key, name in names.items() if name is not None}
+        )
 
     def config(self) -> dict[str, Any]:
         """See `EpisodeTask`."""
@@ -184,6 +196,10 @@ def _check_numbers(name: str, settings: ArmTaskSettings) -> None:
     if settings.field_of_view >= 180:
         raise UsageError(f"{name}: field_of_view {settings.field_of_view} is not below 180 degrees")
     if settings.gripper_threshold > 1:
-        raise UsageError(f"{name}: gripper_threshold {settings.gripper_threshold} is above 1, fully open")
+        raise UsageError(
+            f"{name}: gripper_threshold {settings.gripper_threshold} is above 1, fully open"
+        )
     if not RADII[0] <= settings.radius <= RADII[1]:
-        raise UsageError(f"{name}: radius {settings.radius} is not within {RADII[0]} to {RADII[1]} metres")
+        raise UsageError(
+            f"{name}: radius {settings.radius} is not within {RADII[0]} to {RADII[1]} metres"
+        )

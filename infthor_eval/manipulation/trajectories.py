@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
 from infthor_eval.errors import DataError
-from infthor_eval.formats.digests import digest
 from infthor_eval.formats.object_ids import object_type_of
 from infthor_eval.formats.trajectory import LowAction, Trajectory, TrajectorySource
 from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.storage.digests import digest
 
 __all__ = ["EXPERT_ACTIONS", "ArmEpisode", "ArmTrajectory", "arm_episodes", "read_arm_trajectory"]
 
@@ -41,7 +41,9 @@ class ArmTrajectory(TaskTrajectory):
 def arm_episodes(trajectory: Trajectory) -> list[ArmEpisode]:
     """Return the pick-ups and puts of a trajectory, in time order; raises DataError if one names no object."""
     numbered = enumerate(trajectory.plan.low_actions)
-    return [_episode(number, low) for number, low in numbered if low.api_action.action in EXPERT_ACTIONS]
+    return [
+        _episode(number, low) for number, low in numbered if low.api_action.action in EXPERT_ACTIONS
+    ]
 
 
 def read_arm_trajectory(source: TrajectorySource) -> ArmTrajectory:
@@ -56,7 +58,9 @@ def read_arm_trajectory(source: TrajectorySource) -> ArmTrajectory:
 
 def _episode(number: int, low: LowAction) -> ArmEpisode:
     recorded = low.api_action
-    if recorded.object_id is None or (recorded.action == "PutObject" and recorded.receptacle_id is None):
+    if recorded.object_id is None or (
+        recorded.action == "PutObject" and recorded.receptacle_id is None
+    ):
         raise DataError(f"action {number} ({recorded.action}) names no object; restore the file")
     receptacle = None if recorded.receptacle_id is None else object_type_of(recorded.receptacle_id)
     kind = EXPERT_ACTIONS[recorded.action]

@@ -25,7 +25,11 @@ def read_budget(text: str | None) -> int | None:
 
 
 def check_recalled(
-    recalled: Recalled, past: Sequence[Observation], name: str, budget: int | None, tokens_per_frame: int | None
+    recalled: Recalled,
+    past: Sequence[Observation],
+    name: str,
+    budget: int | None,
+    tokens_per_frame: int | None,
 ) -> None:
     """Check that what a memory recalled may be shown: texts, and steps that it has observed, within its budget.
 
@@ -42,4 +46,6 @@ def check_recalled(
     if budget is not None and tokens_per_frame is not None:
         n_tokens = tokens_of(recalled, tokens_per_frame)
         if n_tokens > budget:
-            raise ModelError(f"the memory {name} recalls {n_tokens} tokens where the budget is {budget}")
+            raise ModelError(
+                f"the memory {name} recalls {n_tokens} tokens where the budget is {budget}"
+            )

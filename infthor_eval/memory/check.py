@@ -9,9 +9,16 @@ from typing import Any
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.formats.step_log import ObjectLog
-from infthor_eval.memory.protocol import Memory, MemoryCapabilities, Observation, Query, TrajectoryFacts, tokens_of
+from infthor_eval.memory.protocol import (
+    Memory,
+    MemoryCapabilities,
+    Observation,
+    Query,
+    TrajectoryFacts,
+    tokens_of,
+)
+from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.check.clauses import require
 from model_adapters.check.results import MEMBERS, CheckResult, run_each
 
@@ -46,7 +53,9 @@ def check_memory(memory: Memory) -> Iterator[CheckResult]:
 def _check_members(memory: Any) -> None:
     for name in ("capabilities", "identity", "begin", "observe", "recall"):
         require(hasattr(memory, name), f"it has no {name}")
-    require(isinstance(memory.capabilities, MemoryCapabilities), "capabilities is no MemoryCapabilities")
+    require(
+        isinstance(memory.capabilities, MemoryCapabilities), "capabilities is no MemoryCapabilities"
+    )
 
 
 def _check_identity(memory: Memory) -> None:
@@ -91,8 +100,14 @@ def _check_repeats(memory: Memory, folder: Path) -> None:
     again = list(memory.recall(_query(memory, steps, question), None))
     require(first == again, "the same question recalls another thing after one more question")
     steps = _observe(memory, "first", folder)
-    require(list(memory.recall(_query(memory, steps), None)) == first, "the same trajectory recalls another thing")
-    require(list(memory.recall(_query(memory, steps, other_question), None)) == other, "the order of questions matters")
+    require(
+        list(memory.recall(_query(memory, steps), None)) == first,
+        "the same trajectory recalls another thing",
+    )
+    require(
+        list(memory.recall(_query(memory, steps, other_question), None)) == other,
+        "the order of questions matters",
+    )
 
 
 def _check_forgets(memory: Memory, folder: Path) -> None:
@@ -101,15 +116,22 @@ def _check_forgets(memory: Memory, folder: Path) -> None:
     known = [step.frame for step in before]
     for item in memory.recall(_query(memory, steps), None):
         _require_recallable(item, steps[:-1])
-        require(isinstance(item, str) or item.frame not in known, "it recalls a frame of the trajectory before")
+        require(
+            isinstance(item, str) or item.frame not in known,
+            "it recalls a frame of the trajectory before",
+        )
 
 
 def _require_recallable(item: Any, past: Sequence[Observation]) -> None:
     if isinstance(item, str):
         require(bool(item.strip()), "it recalls an empty text")
         return
-    require(isinstance(item, Observation), f"it recalls {item!r:.60}, neither a text nor an observation")
-    require(item in past, "it recalls a step that it has not observed; the current one is shown anyway")
+    require(
+        isinstance(item, Observation), f"it recalls {item!r:.60}, neither a text nor an observation"
+    )
+    require(
+        item in past, "it recalls a step that it has not observed; the current one is shown anyway"
+    )
 
 
 def _observe(memory: Memory, name: str, folder: Path, n_steps: int = _STEPS) -> list[Observation]:
@@ -126,7 +148,10 @@ def _facts(memory: Memory, name: str) -> TrajectoryFacts:
         return f"{sum(isinstance(part, FrameRef) for part in parts)} frames"[:max_new_tokens]
 
     return TrajectoryFacts(
-        name=name, tokens_per_frame=_TOKENS_PER_FRAME, seed=0, write=write if memory.capabilities.writes else None
+        name=name,
+        tokens_per_frame=_TOKENS_PER_FRAME,
+        seed=0,
+        write=write if memory.capabilities.writes else None,
     )
 
 
@@ -155,4 +180,6 @@ def _frame(path: Path, number: int) -> FrameRef:
 
 def _query(memory: Memory, steps: Sequence[Observation], text: str = _QUESTIONS[0]) -> Query:
     clues = tuple(number for number in _CLUES if number < len(steps) - 1)
-    return Query(text=text, present=steps[-1], clues=clues if memory.capabilities.privileged else None)
+    return Query(
+        text=text, present=steps[-1], clues=clues if memory.capabilities.privileged else None
+    )

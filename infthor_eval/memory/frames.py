@@ -98,8 +98,12 @@ class Oracle(FrameMemory):
     def choose(self, query: Query, n_frames: int) -> Sequence[int]:
         """See `FrameMemory`."""
         known = set(query.clues or ())
-        clues = [place for place, observation in enumerate(self.past) if observation.number in known]
+        clues = [
+            place for place, observation in enumerate(self.past) if observation.number in known
+        ]
         if len(clues) >= n_frames:
             return [clues[number * len(clues) // n_frames] for number in range(n_frames)]
-        others = [place for place, observation in enumerate(self.past) if observation.number not in known]
+        others = [
+            place for place, observation in enumerate(self.past) if observation.number not in known
+        ]
         return [*clues, *self.draw(query).sample(others, n_frames - len(clues))]

@@ -27,7 +27,9 @@ __all__ = [
     "wrap_memory_errors",
 ]
 
-_FRAMES, _RETRIEVAL, _TEXTS = (f"infthor_eval.memory.{module}" for module in ("frames", "retrieval", "texts"))
+_FRAMES, _RETRIEVAL, _TEXTS = (
+    f"infthor_eval.memory.{module}" for module in ("frames", "retrieval", "texts")
+)
 MEMORIES = PluginTable(
     "memory",
     "infthor_eval.memories",
@@ -96,7 +98,9 @@ def parse_options(text: str | None) -> dict[str, str] | None:
 
 def wrap_memory_errors(name: str) -> AbstractContextManager[None]:
     """Turn whatever a memory raises into an error of one line; ours pass unchanged."""
-    return wrap_errors(f"the memory {name} fails", "fix it", catch=Exception, raise_as=UserCodeError)
+    return wrap_errors(
+        f"the memory {name} fails", "fix it", catch=Exception, raise_as=UserCodeError
+    )
 
 
 @lru_cache(maxsize=8)  # by the class: an edited file has another one
@@ -105,9 +109,15 @@ def _build(name: str, kind: Any, options: MemoryOptions) -> Memory:
     try:
         memory = kind(**values)
     except (TypeError, ValueError) as error:
-        raise UsageError(f"the memory {name} cannot be made ({in_one_line(error)}); see docs/memories.md") from error
+        raise UsageError(
+            f"the memory {name} cannot be made ({in_one_line(error)}); see docs/memories.md"
+        ) from error
     if not isinstance(memory, Memory):
-        members = [member for member in vars(Memory) if not member.startswith("_") and not hasattr(memory, member)]
+        members = [
+            member
+            for member in vars(Memory)
+            if not member.startswith("_") and not hasattr(memory, member)
+        ]
         raise UsageError(f"the memory {name} lacks {', '.join(members)}; see docs/memories.md")
     return memory
 
@@ -138,9 +148,13 @@ def _converted(name: str, kind: Any, options: Mapping[str, Any]) -> dict[str, An
     values = {}
     for key, value in options.items():
         if key not in known:
-            raise UsageError(f"the memory {name} has no option {key}; it has {', '.join(known) or 'none'}")
+            raise UsageError(
+                f"the memory {name} has no option {key}; it has {', '.join(known) or 'none'}"
+            )
         try:
             values[key] = msgspec.convert(value, hints.get(key, Any), strict=False)
         except msgspec.ValidationError as error:
-            raise UsageError(f"the memory {name}: {key} is {value!r:.60} ({in_one_line(error)})") from error
+            raise UsageError(
+                f"the memory {name}: {key} is {value!r:.60} ({in_one_line(error)})"
+            ) from error
     return values

@@ -24,7 +24,10 @@ class _Nearest(FrameMemory):
     """Base: frames by their similarity to something."""
 
     def __init__(
-        self, k: int = PUBLISHED_K, retriever: str = PUBLISHED_RETRIEVER, retriever_revision: str | None = None
+        self,
+        k: int = PUBLISHED_K,
+        retriever: str = PUBLISHED_RETRIEVER,
+        retriever_revision: str | None = None,
     ) -> None:
         """Set the number of frames where there is no budget, and the CLIP model: a hub id or a folder."""
         super().__init__(k)
@@ -51,7 +54,9 @@ class _Nearest(FrameMemory):
 
         if not n_frames:
             return ()
-        return nearest(self.retriever.frames([item.frame for item in self.past]), self.vector(query), n_frames)
+        return nearest(
+            self.retriever.frames([item.frame for item in self.past]), self.vector(query), n_frames
+        )
 
     @abstractmethod
     def vector(self, query: Query) -> Any:
@@ -85,7 +90,9 @@ class Clip(_Nearest):
         if self._query == "question":
             return self.retriever.text(query.text)
         if not query.present.goal:
-            raise DataError("the goal at this step is not known; take query=question (--memory-args)")
+            raise DataError(
+                "the goal at this step is not known; take query=question (--memory-args)"
+            )
         return self.retriever.text(query.present.goal)
 
 

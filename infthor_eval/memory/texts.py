@@ -73,7 +73,9 @@ class Notes(_Texts):
     def recall(self, query: Query, budget: int | None) -> Recalled:
         """See `Memory`; one text, a line for each window."""
         steps = [*self.past, query.present]
-        lines = [self._line(steps[at : at + self._window]) for at in range(0, len(steps), self._window)]
+        lines = [
+            self._line(steps[at : at + self._window]) for at in range(0, len(steps), self._window)
+        ]
         kept = _last_that_fit(lines, budget)
         return ["".join(kept)] if kept else []
 
@@ -81,7 +83,9 @@ class Notes(_Texts):
         if self.facts.write is None:
             raise ValueError("notes need a model that writes them")
         steps = _steps(window[0].number, window[-1].number)
-        note = self.facts.write([*(item.frame for item in window), note_request(steps)], self._tokens)
+        note = self.facts.write(
+            [*(item.frame for item in window), note_request(steps)], self._tokens
+        )
         return f"{steps}: {' '.join(note.split())}\n"
 
 

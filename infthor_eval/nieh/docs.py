@@ -12,13 +12,22 @@ from typing import Any
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.question import PublishedColumns, Question
 from infthor_eval.formats.video import Video
+from infthor_eval.nieh.asking.recall_settings import RecallSettings
 from infthor_eval.nieh.contexts import ContextPart, Sample, context_named
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
-from infthor_eval.nieh.recall_settings import RecallSettings
 from infthor_eval.nieh.samples import TaskSamples, open_set
 
-__all__ = ["Doc", "doc_of", "doc_parts", "doc_prompt", "doc_target", "prompt_of", "sample_of", "samples_of"]
+__all__ = [
+    "Doc",
+    "doc_of",
+    "doc_parts",
+    "doc_prompt",
+    "doc_target",
+    "prompt_of",
+    "sample_of",
+    "samples_of",
+]
 
 Doc = dict[str, Any]
 # The first is lm-eval's own mark of an image in a text.
@@ -35,7 +44,8 @@ def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> D
         "question": question.text,
         "question_type": question.question_type or "",
         "absence": question.absence,
-        "published": question.published and {"file": question.published.file, "qid": question.published.qid},
+        "published": question.published
+        and {"file": question.published.file, "qid": question.published.qid},
         "file": question.file,
         "clues": list(question.clues),
         "answers": json.dumps(question.answers),
@@ -82,7 +92,9 @@ def samples_of(docs: Sequence[Doc]) -> TaskSamples:
     data = open_set(doc["set"], doc["trajectories"] or None)
     frame_ablation = FrameAblation(**doc["frame_ablation"])
     samples = [sample_of(doc) for doc in docs]
-    return TaskSamples(data, doc["context"], context, samples, [], {}, frame_ablation, doc["prompt"])
+    return TaskSamples(
+        data, doc["context"], context, samples, [], {}, frame_ablation, doc["prompt"]
+    )
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:
@@ -100,7 +112,9 @@ def prompt_of(task_samples: TaskSamples, sample: Sample, *, videos: bool = False
     """Return the text of a sample's request, with placeholders for frames, and for videos if it has them."""
     context, text = task_samples.request(sample)
     shown = context if videos else as_images(context)
-    return "".join(part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*shown, text))
+    return "".join(
+        part if isinstance(part, str) else _PLACEHOLDERS[type(part)] for part in (*shown, text)
+    )
 
 
 def doc_target(question: Question) -> str:

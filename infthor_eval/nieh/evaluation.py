@@ -7,18 +7,28 @@ from typing import Any
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.answering import answer_units
-from infthor_eval.nieh.answering_models import AnsweringModel, OpenAnswerer, answering_model
-from infthor_eval.nieh.baselines import Baseline
+from infthor_eval.nieh.asking.answering import answer_units
+from infthor_eval.nieh.asking.answering_models import AnsweringModel, OpenAnswerer, answering_model
+from infthor_eval.nieh.asking.baselines import Baseline
+from infthor_eval.nieh.asking.recalling import apply_recall
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
-from infthor_eval.nieh.recalling import apply_recall
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import TaskSamples, open_set
 from infthor_eval.nieh.task import NiehTask, PreparedTask
 from infthor_eval.nieh.units import NiehUnit
-from infthor_eval.runs import Cost, Group, Session, Skipped, TaskRequest, UnitKey, UnitRecord, UnitSample, Workload
+from infthor_eval.runs import (
+    Cost,
+    Group,
+    Session,
+    Skipped,
+    TaskRequest,
+    UnitKey,
+    UnitRecord,
+    UnitSample,
+    Workload,
+)
 from model_adapters import Model, Subject
 
 __all__ = ["BoundNieh", "NiehEvaluation", "PreparedEvaluation"]
@@ -62,11 +72,18 @@ class NiehEvaluation:
                 for skipped in item.task_samples.skipped
             ],
             config={
-                "tasks": {name: task.config(prepared[name], model.video_input) for name, task in tasks.items()},
+                "tasks": {
+                    name: task.config(prepared[name], model.video_input)
+                    for name, task in tasks.items()
+                },
                 "k_tokens": self._options.k_tokens,
                 "tokens_per_frame": tokens,
                 "frames": self._options.frames,
-                **({"prompt": prompt} if (prompt := self._options.prompt) not in (None, PUBLISHED_MAIN) else {}),
+                **(
+                    {"prompt": prompt}
+                    if (prompt := self._options.prompt) not in (None, PUBLISHED_MAIN)
+                    else {}
+                ),
                 **self._memory(),
                 **({"repeats": self._options.repeats} if self._options.repeats > 1 else {}),
             },
@@ -84,7 +101,9 @@ class NiehEvaluation:
     def _memory(self) -> dict[str, Any]:
         """Return the options of the memory, as far as there are any, so that other runs are what they were."""
         names = ("memory", "memory_args", "budget")
-        return {name: value for name in names if (value := getattr(self._options, name)) is not None}
+        return {
+            name: value for name in names if (value := getattr(self._options, name)) is not None
+        }
 
     def _refuse_unused(self) -> None:
         """Refuse options without effect: they would only change the run's config, or mislead."""
@@ -108,7 +127,9 @@ class NiehEvaluation:
                 f"--prompt {self._options.prompt}: no task of {asked} leaves its words open; "
                 "leave it out, or ask nieh_full"
             )
-        if (self._options.retriever or self._options.retriever_revision) and not self._depends_on("retriever"):
+        if (self._options.retriever or self._options.retriever_revision) and not self._depends_on(
+            "retriever"
+        ):
             raise UsageError(
                 f"--retriever: no context of {asked} retrieves frames; "
                 "leave it out, or ask nieh_clip_retrieval or nieh_memory_frames, or --memory clip"
@@ -134,7 +155,9 @@ class PreparedEvaluation:
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
         model = answering_model(subject)
-        return BoundNieh(Workload(_groups(self._prepared)), self._prepared, model.fit({}), model.video_input)
+        return BoundNieh(
+            Workload(_groups(self._prepared)), self._prepared, model.fit({}), model.video_input
+        )
 
 
 class BoundNieh:
@@ -160,10 +183,14 @@ class BoundNieh:
         self._open_answerer = open_answerer
         self._video_input = video_input
 
-    def run(self, group: Group[NiehUnit], session: Session[NiehAnswer]) -> Iterator[UnitRecord[NiehAnswer]]:
+    def run(
+        self, group: Group[NiehUnit], session: Session[NiehAnswer]
+    ) -> Iterator[UnitRecord[NiehAnswer]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         task = group.units[0].key.task
-        yield from answer_units(group.units, self._prepared[task], self._open_answerer(task, session), session)
+        yield from answer_units(
+            group.units, self._prepared[task], self._open_answerer(task, session), session
+        )
 
     def to_sample(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
         """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
@@ -220,8 +247,12 @@ def _measure_frame(data: NiehSet, model: AnsweringModel) -> int:
                 return model.tokens_per_frame(frame)
             except (DataError, ModelError) as error:
                 problems.append(error)
-    reasons = [str(problem) for problem in problems] or sorted(data.reasons()) or ["its files are empty"]
-    raise UsageError(f"no question of {data.root} can be asked ({reasons[0]}); fix the set, or give another")
+    reasons = (
+        [str(problem) for problem in problems] or sorted(data.reasons()) or ["its files are empty"]
+    )
+    raise UsageError(
+        f"no question of {data.root} can be asked ({reasons[0]}); fix the set, or give another"
+    )
 
 
 def _refuse_without_frames(subject: Subject, tasks: Sequence[NiehTask]) -> None:
@@ -235,15 +266,24 @@ def _refuse_without_frames(subject: Subject, tasks: Sequence[NiehTask]) -> None:
 
 def _refuse_without_sampling(subject: Subject, options: NiehOptions) -> None:
     """Refuse to draw replies from a model that cannot; baselines say the same every time."""
-    for name, is_given in (("repeats", options.repeats > 1), ("temperature", options.temperature is not None)):
+    for name, is_given in (
+        ("repeats", options.repeats > 1),
+        ("temperature", options.temperature is not None),
+    ):
         if is_given and isinstance(subject, Model) and not subject.capabilities.sampling:
-            raise UsageError(f"--{name}: {subject.name} draws no replies; leave it out, or give another model")
+            raise UsageError(
+                f"--{name}: {subject.name} draws no replies; leave it out, or give another model"
+            )
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
     """Refuse tasks of which none has a question to ask; some may have none, where no window of their size fits."""
     if any(samples is None or samples.samples for samples in task_samples):
         return
-    reasons = {item.reason for samples in task_samples if samples is not None for item in samples.skipped}
+    reasons = {
+        item.reason for samples in task_samples if samples is not None for item in samples.skipped
+    }
     listed = "; ".join(sorted(reasons)[:3]) or "its files are empty"
-    raise UsageError(f"no question of {tasks[0].data.root} can be asked ({listed}); fix the set, or give another")
+    raise UsageError(
+        f"no question of {tasks[0].data.root} can be asked ({listed}); fix the set, or give another"
+    )

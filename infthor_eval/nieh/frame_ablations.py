@@ -39,9 +39,13 @@ class FrameAblation:
             UsageError: the set has no other trajectory.
         """
         if self.frames == "other" and len(_trajectories(data)) < 2:
-            raise UsageError(f"--frames other: {data.root} has questions on one trajectory only; give another set")
+            raise UsageError(
+                f"--frames other: {data.root} has questions on one trajectory only; give another set"
+            )
 
-    def apply(self, parts: Sequence[ContextPart], data: NiehSet, context: Context, sample: Sample) -> list[ContextPart]:
+    def apply(
+        self, parts: Sequence[ContextPart], data: NiehSet, context: Context, sample: Sample
+    ) -> list[ContextPart]:
         """Return the parts of a request with the frames replaced."""
         if self.frames == SHOWN:
             return list(parts)
@@ -57,7 +61,9 @@ class FrameAblation:
 
     def _shuffle(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
         """Return the frames in another order if there is one; the same order for every question in a context."""
-        draw = random.Random(f"{self.seed}/{traj_id}/{'/'.join(frame.path.name for frame in frames)}")
+        draw = random.Random(
+            f"{self.seed}/{traj_id}/{'/'.join(frame.path.name for frame in frames)}"
+        )
         shuffled = list(frames)
         while len(set(frames)) > 1 and shuffled == list(frames):
             draw.shuffle(shuffled)
@@ -69,8 +75,13 @@ class FrameAblation:
         """Return the frames at the same positions of another trajectory; of a shorter one, modulo its length."""
         traj_id = sample.question.traj_id
         others = [other for other in _trajectories(data) if other != traj_id]
-        shown = context.frames(data, random.Random(f"{self.seed}/{traj_id}").choice(others), sample.fps)
-        positions = {frame: position for position, frame in enumerate(context.frames(data, traj_id, sample.fps))}
+        shown = context.frames(
+            data, random.Random(f"{self.seed}/{traj_id}").choice(others), sample.fps
+        )
+        positions = {
+            frame: position
+            for position, frame in enumerate(context.frames(data, traj_id, sample.fps))
+        }
         return [shown[positions[frame] % len(shown)] for frame in frames]
 
 

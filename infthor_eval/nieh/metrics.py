@@ -15,12 +15,12 @@ from types import ModuleType
 from typing import Any
 
 from infthor_eval.errors import DataError, UserCodeError, describe_exception, in_one_line
-from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.docs import Doc, doc_of
 from infthor_eval.nieh.samples import TaskSamples
 from infthor_eval.nieh.scoring import SCORERS, STRICT_RULES, scores
 from infthor_eval.runs.catalog import TaskFile
+from infthor_eval.storage.digests import digest_of_file
 
 __all__ = ["PUBLISHED", "MetricError", "Metrics", "finite", "metrics_of", "wrap_metric_errors"]
 
@@ -105,7 +105,9 @@ def metrics_of(task: TaskFile) -> Metrics:
     if name == _OURS:
         return _our_metrics([item["metric"] for item in listed], f"{task.path}: metric_list: ")
     if not listed:
-        raise DataError(f"{task.path}: a task with its own process_results names its metrics under metric_list")
+        raise DataError(
+            f"{task.path}: a task with its own process_results names its metrics under metric_list"
+        )
     module, attribute = _import_function(task.path, name)
     source = {"process_results": name, "source": digest_of_file(Path(str(module.__file__)))}
     return Metrics(tuple(item["metric"] for item in listed), getattr(module, attribute), source)
@@ -114,9 +116,15 @@ def metrics_of(task: TaskFile) -> Metrics:
 def _our_metrics(listed: Sequence[str], place: str) -> Metrics:
     for name in listed:
         if name not in SCORERS:
-            raise DataError(f"{place}{name} is none of our scorers, {', '.join(SCORERS)}; name its process_results too")
+            raise DataError(
+                f"{place}{name} is none of our scorers, {', '.join(SCORERS)}; name its process_results too"
+            )
     names = tuple(name for name in SCORERS if name in (listed or SCORERS))
-    return replace(PUBLISHED, names=names, code={key: rules for key, rules in PUBLISHED.code.items() if key in names})
+    return replace(
+        PUBLISHED,
+        names=names,
+        code={key: rules for key, rules in PUBLISHED.code.items() if key in names},
+    )
 
 
 def _check(item: object, place: str) -> None:
@@ -124,7 +132,9 @@ def _check(item: object, place: str) -> None:
         raise DataError(f"{place}{item!r} is not a mapping with the metric's name (metric: NAME)")
     if item.get("aggregation", "mean") != "mean":
         raise DataError(f"{place}{item['metric']} is not averaged (aggregation: mean); use lm-eval")
-    if not item.get("higher_is_better", True):  # a failed sample counts as 0, which would be the best value
+    if not item.get(
+        "higher_is_better", True
+    ):  # a failed sample counts as 0, which would be the best value
         raise DataError(f"{place}{item['metric']} is better when lower; negate it, or use lm-eval")
 
 
@@ -143,5 +153,7 @@ def _import_function(task_file: Path, name: str) -> tuple[ModuleType, str]:
         getattr(imported, attribute)
     except Exception as error:  # a module may raise anything when it is imported
         reason = in_one_line(error)
-        raise DataError(f"{task_file}: process_results {name} cannot be imported ({reason})") from error
+        raise DataError(
+            f"{task_file}: process_results {name} cannot be imported ({reason})"
+        ) from error
     return imported, attribute

@@ -49,10 +49,18 @@ class NiehOptions:
     )
     retriever: str | None = field(
         default=None,
-        metadata={"help": "CLIP model of retrieval tasks, a hub id or a folder.", "metavar": "NAME", "is_place": True},
+        metadata={
+            "help": "CLIP model of retrieval tasks, a hub id or a folder.",
+            "metavar": "NAME",
+            "is_place": True,
+        },
     )
     retriever_revision: str | None = field(
-        default=None, metadata={"help": "Branch, tag or commit of the retriever on the hub.", "metavar": "REVISION"}
+        default=None,
+        metadata={
+            "help": "Branch, tag or commit of the retriever on the hub.",
+            "metavar": "REVISION",
+        },
     )
     trajectories: str | None = field(
         default=None,
@@ -87,7 +95,8 @@ class NiehOptions:
         },
     )
     memory_args: str | None = field(
-        default=None, metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."}
+        default=None,
+        metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."},
     )
     budget: str | None = field(
         default=None,
@@ -115,21 +124,30 @@ class NiehOptions:
 
     max_thinking_tokens: int | None = field(
         default=None,
-        metadata={"help": "Tokens for what a model thinks, beside those of its answer.", "metavar": "N"},
+        metadata={
+            "help": "Tokens for what a model thinks, beside those of its answer.",
+            "metavar": "N",
+        },
     )
 
     def __post_init__(self) -> None:
         """Raise UsageError if a value is not valid."""
         if self.max_thinking_tokens is not None and self.max_thinking_tokens < 1:
-            raise UsageError(f"--max-thinking-tokens {self.max_thinking_tokens}: give 1 or more, or leave it out")
+            raise UsageError(
+                f"--max-thinking-tokens {self.max_thinking_tokens}: give 1 or more, or leave it out"
+            )
         if self.repeats < 1:
             raise UsageError(f"--repeats {self.repeats}: a question is asked once at least")
         if self.temperature is not None and not 0 < self.temperature < float("inf"):
-            raise UsageError(f"--temperature {self.temperature}: replies are drawn at a temperature above 0")
+            raise UsageError(
+                f"--temperature {self.temperature}: replies are drawn at a temperature above 0"
+            )
         read_budget(self.budget)
         check_frames(self.frames)
         if self.tokens_per_frame is not None and self.tokens_per_frame < 1:
-            raise UsageError(f"--tokens-per-frame {self.tokens_per_frame}: a frame has one token at least")
+            raise UsageError(
+                f"--tokens-per-frame {self.tokens_per_frame}: a frame has one token at least"
+            )
 
 
 def check_frames(frames: str) -> None:

@@ -56,7 +56,9 @@ class OwnScorer:
     function: ScoreReply
     source: Mapping[str, Any]
 
-    def score_all(self, records: Sequence[UnitRecord[NiehAnswer]], reserved: Sequence[str]) -> OwnScores:
+    def score_all(
+        self, records: Sequence[UnitRecord[NiehAnswer]], reserved: Sequence[str]
+    ) -> OwnScores:
         """Return the scores of all records, each with a reply.
 
         The first reply that is scored has the names of the metrics. A reply with others fails.
@@ -80,7 +82,9 @@ class OwnScorer:
         names = names or (self.name,)
         taken = next((name for name in names if name in reserved), None)
         if taken is not None:
-            raise UsageError(f"--scorer {self.name}: calls its metric {taken}, as one of ours is called; rename it")
+            raise UsageError(
+                f"--scorer {self.name}: calls its metric {taken}, as one of ours is called; rename it"
+            )
         return OwnScores(names, by_unit)
 
     def _score(self, record: UnitRecord[NiehAnswer], names: Sequence[str]) -> dict[str, float]:
@@ -88,7 +92,9 @@ class OwnScorer:
             result = self.function(record.payload.reply or "", record.payload.answers)
             scores = result if isinstance(result, Mapping) else {self.name: result}
             if not scores or (names and set(scores) != set(names)):
-                raise ValueError(f"it gives {', '.join(map(str, scores)) or 'nothing'}, not {', '.join(names)}")
+                raise ValueError(
+                    f"it gives {', '.join(map(str, scores)) or 'nothing'}, not {', '.join(names)}"
+                )
             return {str(name): finite(str(name), scores[name]) for name in names or scores}
 
 
@@ -100,13 +106,21 @@ def find_scorer(name: str) -> OwnScorer:
         ModelError: the file does not define it or cannot be imported, or its source cannot be read.
     """
     if names_a_file(name):
-        scorer = OwnScorer(name_in_file(name), load_from_file(name, "function"), file_identity(name))
+        scorer = OwnScorer(
+            name_in_file(name), load_from_file(name, "function"), file_identity(name)
+        )
     elif name in _SCORERS.names:
         source = package_identity(_SCORERS.entry_points()[name])
         scorer = OwnScorer(name, _SCORERS.load(name, _Scorer), source)
     else:
-        installed = f"there are {', '.join(_SCORERS.names)}" if _SCORERS.names else "no package has any"
-        raise UsageError(f"unknown scorer {name!r}; write FILE.py:NAME, or the name of a package's ({installed})")
+        installed = (
+            f"there are {', '.join(_SCORERS.names)}" if _SCORERS.names else "no package has any"
+        )
+        raise UsageError(
+            f"unknown scorer {name!r}; write FILE.py:NAME, or the name of a package's ({installed})"
+        )
     if not callable(scorer.function):
-        raise UsageError(f"--scorer {name}: is not a function of a reply and the gold answers; make it one")
+        raise UsageError(
+            f"--scorer {name}: is not a function of a reply and the gold answers; make it one"
+        )
     return scorer

@@ -8,7 +8,7 @@ from msgspec import Meta
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.runs.counts import Count
-from infthor_eval.runs.records import RecordTypes
+from infthor_eval.runs.journals.records import RecordTypes
 
 __all__ = ["RECORDS", "Guess", "NiehAnswer", "NiehNote", "NiehRecall", "NiehVerdict", "ShownClues"]
 
@@ -60,7 +60,14 @@ class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
     recall_s: float
 
 
-class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="nieh_answer"):
+class NiehAnswer(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    tag_field="type",
+    tag="nieh_answer",
+):
     """A question and the reply to it.
 
     Attributes:
@@ -94,7 +101,9 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
     n_watched: Count | None = None
 
     @classmethod
-    def of(cls, question: Question, guess: Guess | None = None, shown_clues: ShownClues | None = None) -> "NiehAnswer":
+    def of(
+        cls, question: Question, guess: Guess | None = None, shown_clues: ShownClues | None = None
+    ) -> "NiehAnswer":
         """Return the payload of a question before it is asked."""
         return cls(
             question=question.text,
@@ -108,10 +117,16 @@ class NiehAnswer(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, 
         )
 
     def with_reply(
-        self, reply: str, scores: dict[str, float], thinking: str | None = None, n_watched: int | None = None
+        self,
+        reply: str,
+        scores: dict[str, float],
+        thinking: str | None = None,
+        n_watched: int | None = None,
     ) -> "NiehAnswer":
         """Return the same question with a reply, what a model thought before it, and how much a person looked at."""
-        return msgspec.structs.replace(self, reply=reply, scores=scores, thinking=thinking, n_watched=n_watched)
+        return msgspec.structs.replace(
+            self, reply=reply, scores=scores, thinking=thinking, n_watched=n_watched
+        )
 
 
 class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_note"):
@@ -128,7 +143,7 @@ class NiehNote(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag=
 
 
 class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="nieh_verdict"):
-    """A judge's verdict on a reply (`infthor_eval.nieh.judging`).
+    """A judge's verdict on a reply (`infthor_eval.nieh.rescoring.judging`).
 
     Attributes:
         question: the question's text.
@@ -149,4 +164,6 @@ class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", t
     seconds: float
 
 
-RECORDS: RecordTypes[NiehAnswer] = RecordTypes(unit=NiehAnswer, artifact=NiehNote | NiehRecall | NiehVerdict)
+RECORDS: RecordTypes[NiehAnswer] = RecordTypes(
+    unit=NiehAnswer, artifact=NiehNote | NiehRecall | NiehVerdict
+)

@@ -9,14 +9,21 @@ from typing import Any
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.hub_data import default_folder
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.question import Question, SkippedQuestion
-from infthor_eval.nieh.contexts import Context, ContextPart, ContextSettings, Sample, check_prompt, context_named
+from infthor_eval.nieh.contexts import (
+    Context,
+    ContextPart,
+    ContextSettings,
+    Sample,
+    check_prompt,
+    context_named,
+)
 from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
+from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.runs.limiting import spread
+from infthor_eval.storage.packaged import packaged_folder
 
 __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
 
@@ -51,7 +58,12 @@ class TaskSamples:
     def words(self) -> tuple[str, ...]:
         """All answers in words and all words of the questions, sorted: what a person's typing is completed from."""
         questions = [sample.question for sample in self.samples]
-        answers = {answer for question in questions for answer in question.answers if isinstance(answer, str)}
+        answers = {
+            answer
+            for question in questions
+            for answer in question.answers
+            if isinstance(answer, str)
+        }
         asked = {word.lower() for question in questions for word in _WORD.findall(question.text)}
         return tuple(sorted(answers | (asked - {answer.lower() for answer in answers})))
 
@@ -62,7 +74,9 @@ class TaskSamples:
             DataError: the trajectory cannot be read.
         """
         frames = self.data.frames(sample.question.traj_id)
-        if self.frame_ablation.frames == "shuffled":  # the shown ones are shuffled, once they are recalled
+        if (
+            self.frame_ablation.frames == "shuffled"
+        ):  # the shown ones are shuffled, once they are recalled
             return list(frames)
         shown = self.frame_ablation.apply(frames, self.data, self.context, sample)
         return [part for part in shown if isinstance(part, FrameRef)]
@@ -80,7 +94,10 @@ def open_set(root: str, trajectories: str | None = None) -> NiehSet:
 
 
 def find_set(
-    data: str | None = None, bundled: str | None = None, trajectories: str | None = None, **_: object
+    data: str | None = None,
+    bundled: str | None = None,
+    trajectories: str | None = None,
+    **_: object,
 ) -> NiehSet:
     """Return the set of a task.
 
@@ -115,21 +132,31 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
             not allow the ablation.
         DataError: the set cannot be read.
     """
-    context, settings, data = context_named(config["context"]), ContextSettings.read(config), find_set(**config)
+    context, settings, data = (
+        context_named(config["context"]),
+        ContextSettings.read(config),
+        find_set(**config),
+    )
     check_prompt(config["context"], settings.prompt)
     frame_ablation = FrameAblation(settings.frames, settings.seed)
     frame_ablation.check(data)
-    items = [item for of_question in _by_question(data, context, settings, limit) for item in of_question]
+    items = [
+        item for of_question in _by_question(data, context, settings, limit) for item in of_question
+    ]
     samples = [item for item in items if isinstance(item, Sample)]
     skipped = [item for item in items if isinstance(item, SkippedQuestion)]
     sources = context.sources(data, settings)
-    return TaskSamples(data, config["context"], context, samples, skipped, sources, frame_ablation, settings.prompt)
+    return TaskSamples(
+        data, config["context"], context, samples, skipped, sources, frame_ablation, settings.prompt
+    )
 
 
 _Items = list[Sample | SkippedQuestion]  # of one question
 
 
-def _by_question(data: NiehSet, context: Context, settings: ContextSettings, limit: int | None) -> list[_Items]:
+def _by_question(
+    data: NiehSet, context: Context, settings: ContextSettings, limit: int | None
+) -> list[_Items]:
     """Return the items of each question in the order of the set; with a limit, of the questions read to reach it."""
     problems: dict[FrameRef, str | None] = {}
 
@@ -137,21 +164,27 @@ def _by_question(data: NiehSet, context: Context, settings: ContextSettings, lim
         problem = _find_problem(context.select_frames(data, sample), problems)
         return SkippedQuestion(sample.question, problem, sample.variant) if problem else sample
 
-    trajectories = [row.traj_id if isinstance(row, Question) else row.question.traj_id for row in data.rows]
+    trajectories = [
+        row.traj_id if isinstance(row, Question) else row.question.traj_id for row in data.rows
+    ]
     places = range(len(data.rows)) if limit is None else spread(trajectories, str, settings.seed)
     by_place: dict[int, _Items] = {}
     n_asked = 0
     for place in places:
         row = data.rows[place]
         items = _samples(context, data, row, settings) if isinstance(row, Question) else [row]
-        by_place[place] = [skip_unreadable(item) if isinstance(item, Sample) else item for item in items]
+        by_place[place] = [
+            skip_unreadable(item) if isinstance(item, Sample) else item for item in items
+        ]
         n_asked += any(isinstance(item, Sample) for item in by_place[place])
         if n_asked == limit:
             break
     return [by_place[place] for place in sorted(by_place)]
 
 
-def _samples(context: Context, data: NiehSet, question: Question, settings: ContextSettings) -> _Items:
+def _samples(
+    context: Context, data: NiehSet, question: Question, settings: ContextSettings
+) -> _Items:
     try:
         return context.samples(data, question, settings)
     except DataError as error:  # in this trajectory's frames; questions on others can be asked

@@ -82,7 +82,11 @@ def says_number(response: str) -> bool:
 
 def pieces_of(response: str) -> list[str]:
     """Return the answers that a response enumerates, as the strict scorer separates them."""
-    return [piece for piece in re.split(r"[,;\n]|\band\b", response, flags=re.IGNORECASE) if piece.strip()]
+    return [
+        piece
+        for piece in re.split(r"[,;\n]|\band\b", response, flags=re.IGNORECASE)
+        if piece.strip()
+    ]
 
 
 def plain_form(text: str) -> str:
@@ -95,7 +99,9 @@ def _reference(response: str, answers: Sequence[Answer]) -> float:
     if len(answers) == 1:
         return float(_matches_reference(response, answers[0]))
     pieces = [piece.replace("and", "").strip() for piece in response.split(",")]
-    return sum(_matches_reference(piece, gold) for gold in answers for piece in pieces) / len(answers)
+    return sum(_matches_reference(piece, gold) for gold in answers for piece in pieces) / len(
+        answers
+    )
 
 
 def _strict(response: str, answers: Sequence[Answer]) -> float:
@@ -105,7 +111,9 @@ def _strict(response: str, answers: Sequence[Answer]) -> float:
     return 2 * _largest_matching(answers, pieces, _matches_strict) / (len(answers) + len(pieces))
 
 
-def _largest_matching(answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]) -> int:
+def _largest_matching(
+    answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]
+) -> int:
     """Return the number of gold answers that can have a piece each (augmenting paths; both lists are short)."""
     fits = [[index for index, piece in enumerate(pieces) if match(piece, gold)] for gold in answers]
     owner: dict[int, int] = {}
@@ -161,7 +169,10 @@ def _normalise(text: Answer) -> str:
     text = text.lower().strip()
     try:
         return str(w2n.word_to_num(text))
-    except (ValueError, IndexError):  # the library's own ways to say "not a number" ("thousand one": IndexError)
+    except (
+        ValueError,
+        IndexError,
+    ):  # the library's own ways to say "not a number" ("thousand one": IndexError)
         return plain_form(text)
 
 

@@ -20,7 +20,9 @@ __all__ = ["AskedTask", "SetContents", "read_asked_tasks", "read_contents"]
 
 # Contexts whose frames are chosen by a model; which questions they can be asked with is that of whole trajectories.
 _BY_MODEL = frozenset({"clip_retrieval", "memory"})
-_QWEN_FRAME = 121  # tokens of a frame of 300x300 in Qwen2.5-VL, for contexts that are measured in tokens
+_QWEN_FRAME = (
+    121  # tokens of a frame of 300x300 in Qwen2.5-VL, for contexts that are measured in tokens
+)
 
 
 @dataclass
@@ -80,7 +82,9 @@ def read_contents(root: Path) -> SetContents:
         found.questions[name] = Counter(row.question_type or type_of(row.text) for row in asked)
     found.malformed.update(row.reason for row in data.malformed)
     found.left_out.update(data.reasons() - found.malformed)
-    named = {row.traj_id for rows in data.files.values() for row in rows if isinstance(row, Question)}
+    named = {
+        row.traj_id for rows in data.files.values() for row in rows if isinstance(row, Question)
+    }
     found.n_trajectories = len(named)
     if data.has_frames:
         folders = [path.name for path in data.folder("").iterdir() if path.is_dir()]
@@ -115,8 +119,17 @@ def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[A
     for name, task in sorted(Catalog.find_packaged().tasks.items()):
         settings: dict[str, Any] = task.settings.get("dataset_kwargs") or {}
         context = settings.get("context")
-        if not name.startswith("nieh") or "bundled" in settings or context is None or context in _BY_MODEL:
+        if (
+            not name.startswith("nieh")
+            or "bundled" in settings
+            or context is None
+            or context in _BY_MODEL
+        ):
             continue
         more = {} if trajectories is None else {"trajectories": str(trajectories)}
-        samples = find_samples({"data": str(root), "tokens_per_frame": _QWEN_FRAME, "seed": 0, **settings, **more})
-        yield AskedTask(name, len(samples.samples), Counter(item.reason for item in samples.skipped))
+        samples = find_samples(
+            {"data": str(root), "tokens_per_frame": _QWEN_FRAME, "seed": 0, **settings, **more}
+        )
+        yield AskedTask(
+            name, len(samples.samples), Counter(item.reason for item in samples.skipped)
+        )

@@ -3,16 +3,24 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
-from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.config_form import NiehConfig
 from infthor_eval.nieh.evaluation import NiehEvaluation
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
-from infthor_eval.nieh.summary import NiehSummary, primary_metrics, summarise
-from infthor_eval.nieh.tables import overview, tables
+from infthor_eval.nieh.results.summary import NiehSummary, primary_metrics, summarise
+from infthor_eval.nieh.results.tables import overview, tables
 from infthor_eval.nieh.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord, check_config
+from infthor_eval.runs import (
+    RecordTypes,
+    RunHeader,
+    RunSummary,
+    TaskFile,
+    TaskRequest,
+    UnitRecord,
+    check_config,
+)
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -37,7 +45,9 @@ class NiehSuite:
         """See `Suite.prepare`."""
         return NiehEvaluation(request)
 
-    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[NiehAnswer]]) -> NiehSummary:
+    def summarise(
+        self, header: RunHeader, records: Sequence[UnitRecord[NiehAnswer]]
+    ) -> NiehSummary:
         """See `Suite.summarise`; raises DataError for a journal whose config is of another form."""
         check_config(header, NiehConfig)
         return summarise(header.config, records)

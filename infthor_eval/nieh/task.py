@@ -8,7 +8,6 @@ from typing import Any
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.memory import parse_options, read_budget
 from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, ContextSettings, Sample, check_prompt
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
@@ -16,12 +15,24 @@ from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
+from infthor_eval.storage.packaged import packaged_folder
 from model_adapters import Decoding, cut_at_stop
 
 __all__ = ["NiehTask", "PreparedTask", "check_task_file"]
 
-_OF_SETS = ("context", "data", "bundled")  # keys of `dataset_kwargs` beside the settings of contexts
-_NEEDED = ("custom_dataset", "dataset_kwargs", "doc_to_text", "generation_kwargs", "process_results", "test_split")
+_OF_SETS = (
+    "context",
+    "data",
+    "bundled",
+)  # keys of `dataset_kwargs` beside the settings of contexts
+_NEEDED = (
+    "custom_dataset",
+    "dataset_kwargs",
+    "doc_to_text",
+    "generation_kwargs",
+    "process_results",
+    "test_split",
+)
 
 
 @dataclass(frozen=True)
@@ -74,23 +85,33 @@ class NiehTask:
         self.metrics: Metrics = metrics_of(file)
         self.data: NiehSet = find_set(**self._config)
         # A budget of a memory is in tokens, too.
-        self.needs_size = CONTEXTS[self._config["context"]].needs_model or self._config.get("budget") is not None
-        self.takes_memory = self._config["context"] == MEMORY and "memory" not in file.settings["dataset_kwargs"]
+        self.needs_size = (
+            CONTEXTS[self._config["context"]].needs_model or self._config.get("budget") is not None
+        )
+        self.takes_memory = (
+            self._config["context"] == MEMORY and "memory" not in file.settings["dataset_kwargs"]
+        )
         self.takes_prompt = "prompt" not in file.settings["dataset_kwargs"]
-        self.task_samples: TaskSamples | None = None if self.needs_size else find_samples(self._config, self._limit)
+        self.task_samples: TaskSamples | None = (
+            None if self.needs_size else find_samples(self._config, self._limit)
+        )
 
     @cached_property
     def sources(self) -> Mapping[str, Any]:
         """Whatever the frames depend on besides the set and the settings (`Context.sources`)."""
         if self.task_samples is not None:
             return self.task_samples.sources
-        return CONTEXTS[self._config["context"]].sources(self.data, ContextSettings.read(self._config))
+        return CONTEXTS[self._config["context"]].sources(
+            self.data, ContextSettings.read(self._config)
+        )
 
     def prepare(self, tokens_per_frame: int | None) -> PreparedTask:
         """Prepare the task for a model, given the tokens of a frame where the samples depend on them."""
         samples = self.task_samples
         if samples is None:
-            samples = find_samples(self._config | {"tokens_per_frame": tokens_per_frame}, self._limit)
+            samples = find_samples(
+                self._config | {"tokens_per_frame": tokens_per_frame}, self._limit
+            )
         if self._max_thinking_tokens is None:
             return PreparedTask(samples, self.decoding, self._generation_kwargs, self.metrics)
         n_tokens = self.decoding.max_new_tokens + self._max_thinking_tokens
@@ -112,8 +133,15 @@ class NiehTask:
             video_input: True if the model is given films as videos, False if as images; None if it sees nothing.
         """
         samples, names = prepared.task_samples, prepared.metrics.names
-        skipped = [{"question_id": i.question.id, "variant": i.variant, "reason": i.reason} for i in samples.skipped]
-        film = {} if video_input is None or not samples.shows_films else {"film": "video" if video_input else "images"}
+        skipped = [
+            {"question_id": i.question.id, "variant": i.variant, "reason": i.reason}
+            for i in samples.skipped
+        ]
+        film = (
+            {}
+            if video_input is None or not samples.shows_films
+            else {"film": "video" if video_input else "images"}
+        )
         return {
             "config": dict(self.settings),
             "decoding": prepared.decoding.document(),
@@ -150,14 +178,18 @@ def check_task_file(file: TaskFile) -> None:
             raise DataError(f"{place}: {key} is {given[key]!r:.60}; it is a name")
     context = CONTEXTS.get(given["context"])
     if context is None:
-        raise UsageError(f"{place}: context is {given['context']!r:.60}; it is one of {', '.join(CONTEXTS)}")
+        raise UsageError(
+            f"{place}: context is {given['context']!r:.60}; it is one of {', '.join(CONTEXTS)}"
+        )
     settings = ContextSettings.read(given, place)
     try:
         check_prompt(given["context"], settings.prompt)
     except UsageError as error:
         raise UsageError(f"{place}: {error}") from error
     if context.needs_model and settings.ctx_size is None:
-        raise UsageError(f"{place}: ctx_size is missing; {given['context']} needs it, a number of kilo-tokens above 0")
+        raise UsageError(
+            f"{place}: ctx_size is missing; {given['context']} needs it, a number of kilo-tokens above 0"
+        )
     if "bundled" in given:
         try:
             packaged_folder(f"sets/{given['bundled']}")
@@ -182,4 +214,6 @@ def _run_settings(request: TaskRequest[NiehOptions]) -> dict[str, Any]:
     options = {"data": str(request.data) if request.data else None, **asdict(request.options)}
     options["budget"] = read_budget(request.options.budget)
     options["memory_args"] = parse_options(request.options.memory_args)
-    return {"seed": request.seed} | {key: value for key, value in options.items() if value is not None}
+    return {"seed": request.seed} | {
+        key: value for key, value in options.items() if value is not None
+    }

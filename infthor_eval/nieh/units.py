@@ -31,7 +31,9 @@ class NiehUnit(Unit[NiehAnswer]):
     find_guess: Callable[[], Guess | None] = field(repr=False, compare=False)
 
     @classmethod
-    def of(cls, task: str, task_samples: TaskSamples, sample: Sample, repeat: int = 1) -> "NiehUnit":
+    def of(
+        cls, task: str, task_samples: TaskSamples, sample: Sample, repeat: int = 1
+    ) -> "NiehUnit":
         """Return the unit of a task's sample, with how much of its evidence is shown."""
         question, knowledge = sample.question, visible_knowledge(task_samples.context_name)
         return cls(
@@ -42,7 +44,9 @@ class NiehUnit(Unit[NiehAnswer]):
             lambda: find_guesses(task_samples.data, knowledge).get(question.id),
         )
 
-    def record(self, fingerprint: str, payload: NiehAnswer, **envelope: Any) -> UnitRecord[NiehAnswer]:
+    def record(
+        self, fingerprint: str, payload: NiehAnswer, **envelope: Any
+    ) -> UnitRecord[NiehAnswer]:
         """See `Unit.record`."""
         return super().record(fingerprint, self._with_guess(payload), **envelope)
 

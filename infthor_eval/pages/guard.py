@@ -36,7 +36,9 @@ class Guard:
     def __init__(self, application: ASGIApp, token: str) -> None:
         self._application = application
         self._token = token.encode()
-        self._headers = [(name.lower().encode(), value.encode()) for name, value in _HEADERS.items()]
+        self._headers = [
+            (name.lower().encode(), value.encode()) for name, value in _HEADERS.items()
+        ]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """See ASGI; only requests over HTTP arrive here."""
@@ -47,7 +49,11 @@ class Guard:
             await send(message)
 
         problem = self._problem(Headers(scope=scope), scope["path"])
-        answer = PlainTextResponse(f"Refused: {problem}.\n", status_code=403) if problem else self._application
+        answer = (
+            PlainTextResponse(f"Refused: {problem}.\n", status_code=403)
+            if problem
+            else self._application
+        )
         await answer(scope, receive, send_with_headers)
 
     def _problem(self, headers: Headers, path: str) -> str:

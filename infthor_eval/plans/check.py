@@ -65,7 +65,10 @@ def check_env(environment: Environment, plans: Sequence[int] | None = None) -> N
     _check_nonsense(environment, possible[0])
     _check_limit(environment, possible[0])
     for plan in (-1, len(environment.plans)):
-        _require(_raises(IndexError, environment.reset, plan), f"reset({plan}) does not raise IndexError: no such plan")
+        _require(
+            _raises(IndexError, environment.reset, plan),
+            f"reset({plan}) does not raise IndexError: no such plan",
+        )
 
 
 def _require(holds: bool, clause: str) -> None:
@@ -83,22 +86,37 @@ def _raises(error_type: type[Exception], call: Callable[..., Any], *args: Any) -
 
 def _check_plans(plans: Sequence[Plan]) -> None:
     _require(bool(plans), "there is no plan")
-    _require([plan.index for plan in plans] == list(range(len(plans))), "plans are not numbered in their order")
+    _require(
+        [plan.index for plan in plans] == list(range(len(plans))),
+        "plans are not numbered in their order",
+    )
 
 
 def _check_nothing_under_way(environment: Environment, when: str) -> None:
-    _require(_raises(RuntimeError, environment.step, "NoOp"), f"step() {when} does not raise RuntimeError")
+    _require(
+        _raises(RuntimeError, environment.step, "NoOp"),
+        f"step() {when} does not raise RuntimeError",
+    )
 
 
 def _check_reset(environment: Environment, plan: int) -> None:
     result = environment.reset(plan)
-    _require(isinstance(result, tuple) and len(result) == 2, "reset() does not give an observation and information")
+    _require(
+        isinstance(result, tuple) and len(result) == 2,
+        "reset() does not give an observation and information",
+    )
     observation, info = result
-    _require({"max_reward", "n_expert"} <= set(info), "the information of reset() lacks max_reward or n_expert")
+    _require(
+        {"max_reward", "n_expert"} <= set(info),
+        "the information of reset() lacks max_reward or n_expert",
+    )
     most = info["max_reward"]
     _require(math.isfinite(most) and most >= 0, f"max_reward of plan {plan} is {most}")
     n_expert = len(environment.expert_actions(plan))
-    _require(info["n_expert"] == n_expert > 0, f"n_expert of plan {plan} is {info['n_expert']}, of {n_expert} actions")
+    _require(
+        info["n_expert"] == n_expert > 0,
+        f"n_expert of plan {plan} is {info['n_expert']}, of {n_expert} actions",
+    )
     _check_observation(observation)
 
 
@@ -116,7 +134,10 @@ def _check_expert(environment: Environment, plan: int) -> None:
     done = over and outcome.info.ended == Ended.DONE
     _require(done, f"the expert's actions do not complete plan {plan}: {outcome.info}")
     most = info["max_reward"]
-    _require(abs(earned - most) < _SMALL, f"the expert earns {earned:g} in plan {plan}, and max_reward says {most:g}")
+    _require(
+        abs(earned - most) < _SMALL,
+        f"the expert earns {earned:g} in plan {plan}, and max_reward says {most:g}",
+    )
     _check_nothing_under_way(environment, "after a plan's end")
 
 
@@ -126,10 +147,18 @@ def _check_state_is_the_plans_own(environment: Environment, plans: Sequence[int]
     for plan in (*reversed(plans), *plans):
         observation, info = environment.reset(plan)
         before, before_info = first[plan]
-        states = [(view.agent, view.inventory, view.objects) for view in (observation.view, before.view)]
+        states = [
+            (view.agent, view.inventory, view.objects) for view in (observation.view, before.view)
+        ]
         _require(states[0] == states[1], f"plan {plan} begins in another state the second time")
-        _require(_same_picture(observation, before), f"plan {plan} begins with another picture the second time")
-        _require(dict(info) == dict(before_info), f"the information of reset({plan}) differs the second time")
+        _require(
+            _same_picture(observation, before),
+            f"plan {plan} begins with another picture the second time",
+        )
+        _require(
+            dict(info) == dict(before_info),
+            f"the information of reset({plan}) differs the second time",
+        )
         for action in ("RotateLeft", "LookUp"):
             if environment.step(action).terminated:
                 break
@@ -144,7 +173,10 @@ def _check_nonsense(environment: Environment, plan: int) -> None:
         _require(outcome.terminated, f"{text!r}, which is no action, does not terminate the plan")
         _require(outcome.reward == 0, f"{text!r}, which is no action, earns {outcome.reward}")
         expected = Ended.UNKNOWN_OBJECT if text == _UNKNOWN else Ended.NO_ACTION
-        _require(outcome.info.ended == expected, f"{text!r} ends the plan with {outcome.info.ended}, not {expected}")
+        _require(
+            outcome.info.ended == expected,
+            f"{text!r} ends the plan with {outcome.info.ended}, not {expected}",
+        )
         _require(outcome.info.call is None, f"{text!r}, which is no action, has a call")
         _require(bool(outcome.info.message), f"{text!r}, which is no action, has no message")
         _check_nothing_under_way(environment, "after what is no action")
@@ -165,12 +197,18 @@ def _check_limit(environment: Environment, plan: int) -> None:
 def _check_outcome(outcome: StepOutcome) -> None:
     _require(isinstance(outcome, tuple) and len(outcome) == 5, "step() does not give five values")
     observation, reward, terminated, truncated, info = outcome
-    _require(isinstance(terminated, bool) and isinstance(truncated, bool), "terminated and truncated are no booleans")
+    _require(
+        isinstance(terminated, bool) and isinstance(truncated, bool),
+        "terminated and truncated are no booleans",
+    )
     _require(not (terminated and truncated), "a plan is terminated and truncated at once")
     _require(isinstance(reward, int | float) and math.isfinite(reward), f"a reward is {reward!r}")
     goes_on = not terminated and not truncated
     _require((info.ended is None) == goes_on, f"info.ended is {info.ended} at the wrong time")
-    _require((info.ended == Ended.LIMIT) == truncated, f"truncated is {truncated}, and info.ended is {info.ended}")
+    _require(
+        (info.ended == Ended.LIMIT) == truncated,
+        f"truncated is {truncated}, and info.ended is {info.ended}",
+    )
     _check_observation(observation)
 
 
@@ -180,16 +218,25 @@ def _check_observation(observation: Observation) -> None:
         _require(key == item.object_id, f"the object {item.object_id} is kept as {key}")
         _require(bool(_ID.fullmatch(key)), f"{key!r:.80} is no id of the form Type|x|y|z")
         named = object_type_of(key)
-        _require(named == item.object_type, f"{key} says that it is a {named}, and is a {item.object_type}")
+        _require(
+            named == item.object_type,
+            f"{key} says that it is a {named}, and is a {item.object_type}",
+        )
     for key in view.inventory:
         _require(key in view.objects, f"{key}, which is held, is not among the objects")
     if view.frame is not None:
         shape, kind = view.frame.shape, view.frame.dtype
         _require(kind == np.uint8, f"a frame is of {kind}, not of bytes")
-        _require(len(shape) == 3 and shape[2] == 3, f"a frame has the shape {shape}, not (height, width, 3)")
+        _require(
+            len(shape) == 3 and shape[2] == 3,
+            f"a frame has the shape {shape}, not (height, width, 3)",
+        )
     if observation.frame is not None and view.frame is not None:
         kept = np.asarray(observation.frame.load())
-        _require(np.array_equal(kept, view.frame), f"{observation.frame.path} is another picture than the view's")
+        _require(
+            np.array_equal(kept, view.frame),
+            f"{observation.frame.path} is another picture than the view's",
+        )
 
 
 def _same_picture(one: Observation, other: Observation) -> bool:

@@ -15,9 +15,9 @@ from infthor_eval.household.navigation import Grid
 from infthor_eval.household.scout import HORIZON_STEP, grid_pose_of, reachable_grid
 from infthor_eval.household.treatments import Treatments
 from infthor_eval.plans.expert import Expert, ExpertAction
-from infthor_eval.plans.past import Past
+from infthor_eval.plans.history.past import Past
 from infthor_eval.plans.plan import Plan, PlanKind, plans_of, tasks_of
-from infthor_eval.plans.published_script import PublishedReward, PublishedScript
+from infthor_eval.plans.published.script import PublishedReward, PublishedScript
 from infthor_eval.plans.reward_rules import RewardRules, reward_rules
 from infthor_eval.plans.rewards import PlanReward, StepReward, count_actions_to_goal, max_reward
 from infthor_eval.plans.targets import PlanTarget, target_of
@@ -138,7 +138,9 @@ class PlanEnvironment:
         self._max_steps = max_steps
         self._frames = frames or NoFrames()
         self.look_degrees = _look_degrees(trajectory)
-        self._expert = Expert(trajectory, self.plans, self.tasks, simulator, self._frames, words, in_words)
+        self._expert = Expert(
+            trajectory, self.plans, self.tasks, simulator, self._frames, words, in_words
+        )
         self._script: PublishedScript | None = None
         if self._rules.scoring == "published":
             self._script = PublishedScript(
@@ -180,7 +182,9 @@ class PlanEnvironment:
             self._reward = PublishedReward(scripted.task.copy(), scripted.sub_goal)
             info |= {"max_reward": scripted.planner_reward, "expert_reward": scripted.expert_reward}
         else:
-            info["max_reward"] = self._begin_default(present, view, start.treatments, end.mark.view.agent)
+            info["max_reward"] = self._begin_default(
+                present, view, start.treatments, end.mark.view.agent
+            )
         return Observation(view, start.frame), info
 
     def go_on(self, plan: int) -> tuple[Observation, Mapping[str, Any]]:
@@ -206,14 +210,18 @@ class PlanEnvironment:
             info["max_reward"] = self._begin_default(present, view, self._reward.treatments, end)
         return Observation(view, self._frames.keep(view)), info
 
-    def _begin_default(self, plan: Plan, view: SimulatorView, treatments: Treatments, end: AgentPose) -> float:
+    def _begin_default(
+        self, plan: Plan, view: SimulatorView, treatments: Treatments, end: AgentPose
+    ) -> float:
         """Begin a plan under the default rules, and return its highest possible reward."""
         task, actions = self.tasks[plan.task].task, self._expert.actions(plan.index)
         grid = self._grid(plan, actions, view)
         target = self._target(plan, view, end, grid)
         self._preferred = _preferred_objects(target, view)
         self._reward = PlanReward(self._rules, target, task, view, treatments, grid)
-        n_actions = count_actions_to_goal(self._rules, target, [action.pose for action in actions], grid)
+        n_actions = count_actions_to_goal(
+            self._rules, target, [action.pose for action in actions], grid
+        )
         completes = any(action.completes for action in actions[:n_actions])
         return max_reward(self._rules, target, view, grid, task if completes else None)
 
@@ -254,11 +262,19 @@ class PlanEnvironment:
             ExpertRefusedError: as `reset`.
         """
         present, view = self.plans[plan], self._expert.start(plan).mark.view
-        grounding = deepcopy(self._expert.grounding)  # it remembers its choices, and a picture must not decide any
-        ids = (grounding.ground(key, view) for key in (present.object_id, present.receptacle_id) if key is not None)
+        grounding = deepcopy(
+            self._expert.grounding
+        )  # it remembers its choices, and a picture must not decide any
+        ids = (
+            grounding.ground(key, view)
+            for key in (present.object_id, present.receptacle_id)
+            if key is not None
+        )
         return [key for key in ids if key is not None]
 
-    def _ground(self, action: str | Mapping[str, Any], view: SimulatorView) -> tuple[str, Mapping[str, Any]]:
+    def _ground(
+        self, action: str | Mapping[str, Any], view: SimulatorView
+    ) -> tuple[str, Mapping[str, Any]]:
         force = {"forceAction": True} if self._rules.force_action else {}
         if not isinstance(action, str):
             return str(text_of_call(action, view, self._words)), {**action, **force}
@@ -288,13 +304,19 @@ class PlanEnvironment:
         observation = Observation(after, self._frames.keep(after))
         return StepOutcome(observation, earned.reward, ended is not None, truncated, info)
 
-    def _target(self, plan: Plan, view: SimulatorView, end: AgentPose, grid: Grid | None) -> PlanTarget:
+    def _target(
+        self, plan: Plan, view: SimulatorView, end: AgentPose, grid: Grid | None
+    ) -> PlanTarget:
         """Return the target of a plan; that of GotoLocation is the pose in which the expert ended."""
         if grid is not None:
-            return PlanTarget(plan.kind, goal_stand=grid_pose_of(end, grid), goal_horizon=end.horizon)
+            return PlanTarget(
+                plan.kind, goal_stand=grid_pose_of(end, grid), goal_horizon=end.horizon
+            )
         return target_of(plan, self._expert.grounding, view)
 
-    def _grid(self, plan: Plan, expert_actions: Sequence[ExpertAction], view: SimulatorView) -> Grid | None:
+    def _grid(
+        self, plan: Plan, expert_actions: Sequence[ExpertAction], view: SimulatorView
+    ) -> Grid | None:
         """Return the reachable cells for GotoLocation, None for other plans.
 
         The expert's own cells are added: the simulator need not report all of them, yet the expert stood there.
@@ -302,7 +324,9 @@ class PlanEnvironment:
         if plan.kind != PlanKind.GOTO:
             return None
         walked = [view.agent, *(action.pose for action in expert_actions)]
-        return reachable_grid(self._simulator).with_positions((pose.position.x, pose.position.z) for pose in walked)
+        return reachable_grid(self._simulator).with_positions(
+            (pose.position.x, pose.position.z) for pose in walked
+        )
 
 
 def _ending(earned: StepReward) -> Ended | None:
@@ -313,13 +337,19 @@ def _ending(earned: StepReward) -> Ended | None:
 
 def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:
     """Return the ids that ambiguous words mean: the plan's objects, and what they are in (one of ten drawers)."""
-    named = [start.objects[key] for key in (target.object_id, target.receptacle_id) if key in start.objects]
+    named = [
+        start.objects[key]
+        for key in (target.object_id, target.receptacle_id)
+        if key in start.objects
+    ]
     return {key for item in named for key in (item.object_id, *(item.parent_receptacles or ()))}
 
 
 def _look_degrees(trajectory: Trajectory) -> float:
     """Return the angle of most looks up or down in this trajectory: 15 degrees in ALFRED's, 30 in others."""
     looks = Counter(
-        degrees_of(low) for low in trajectory.plan.low_actions if low.api_action.action in {"LookUp", "LookDown"}
+        degrees_of(low)
+        for low in trajectory.plan.low_actions
+        if low.api_action.action in {"LookUp", "LookDown"}
     )
     return looks.most_common(1)[0][0] if looks else float(HORIZON_STEP)

@@ -8,16 +8,16 @@ from itertools import groupby
 from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, EpisodeUnit
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult
-from infthor_eval.formats.scratch import ScratchFolder
-from infthor_eval.plans.actor_factory import ActorFactory, actor_factory
-from infthor_eval.plans.final_protocol import FinalForm
+from infthor_eval.plans.actors.factory import ActorFactory, actor_factory
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
+from infthor_eval.plans.published.final_protocol import FinalForm
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.plans.runner import PlanRunner, plan_record
 from infthor_eval.plans.task import PlansTask
 from infthor_eval.plans.trajectories import PlanTrajectory
 from infthor_eval.runs import Group, Session, TaskRequest, UnitRecord, UnitSample
+from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters import Subject
 
 __all__ = ["BoundPlans", "PlanUnit", "PlansEvaluation"]
@@ -57,11 +57,17 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         self._simulators = evaluation.simulators(image=factory.sees, instances=in_words)
         # A trajectory is a group: its plans share the expert's history, in the simulator and in the prefix cache.
         groups = groupby(evaluation.units, lambda unit: (unit.key.task, unit.cluster))
-        workload = evaluation.workload((same for _, same in groups), constrained=evaluation.options.constrained)
-        workload = replace(workload, warnings=_warnings(factory.trained_words, self._tasks.values()))
+        workload = evaluation.workload(
+            (same for _, same in groups), constrained=evaluation.options.constrained
+        )
+        workload = replace(
+            workload, warnings=_warnings(factory.trained_words, self._tasks.values())
+        )
         super().__init__(evaluation, workload, [self._simulators])
 
-    def run(self, group: Group[PlanUnit], session: Session[PlanRecord]) -> Iterator[UnitRecord[PlanRecord]]:
+    def run(
+        self, group: Group[PlanUnit], session: Session[PlanRecord]
+    ) -> Iterator[UnitRecord[PlanRecord]]:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         fingerprints, known = self._find_records(group, session)
         if all(record is not None for record in known.values()):
@@ -85,14 +91,20 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
                 stopped = stopped or (failed and task.settings.after_failure == "stop")
 
     def _run_in_one_go(
-        self, group: Group[PlanUnit], form: FinalForm, runner: PlanRunner, session: Session[PlanRecord]
+        self,
+        group: Group[PlanUnit],
+        form: FinalForm,
+        runner: PlanRunner,
+        session: Session[PlanRecord],
     ) -> Iterator[UnitRecord[PlanRecord]]:
         """Run the plans of a final task as the published scripts do, all of them even if some have records."""
         fingerprints, known = self._find_records(group, session)
         tried, goes_on = 0, True
         for unit in group.units:
             if not tried:
-                run: Callable[[], EpisodeResult[PlanRecord]] = partial(self._first_of_all, runner, group, unit)
+                run: Callable[[], EpisodeResult[PlanRecord]] = partial(
+                    self._first_of_all, runner, group, unit
+                )
             elif goes_on:
                 run = partial(runner.run, unit.episode, goes_on=True)
             else:
@@ -104,7 +116,9 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
             yield known[unit.key] or record
 
     @staticmethod
-    def _first_of_all(runner: PlanRunner, group: Group[PlanUnit], unit: PlanUnit) -> EpisodeResult[PlanRecord]:
+    def _first_of_all(
+        runner: PlanRunner, group: Group[PlanUnit], unit: PlanUnit
+    ) -> EpisodeResult[PlanRecord]:
         runner.prepare([other.episode for other in group.units])
         return runner.run(unit.episode)
 
@@ -113,7 +127,12 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         payload, task = record.payload, self._tasks[record.task]
         return UnitSample(
             number=self._numbers[record.key],
-            doc={"traj_id": record.cluster, "plan": payload.index, "kind": payload.kind, "goal": payload.goal},
+            doc={
+                "traj_id": record.cluster,
+                "plan": payload.index,
+                "kind": payload.kind,
+                "goal": payload.goal,
+            },
             target=payload.plan,
             prompt=f"{payload.goal}\n{payload.plan}",
             settings=task.file.settings["generation_kwargs"],

@@ -12,10 +12,10 @@ from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.sequence_text import action_text
 from infthor_eval.household.state_summary import state_summaries
 from infthor_eval.household.treatments import Treatments
-from infthor_eval.plans.clue_steps import clue_step, object_logs
-from infthor_eval.plans.past import Past
+from infthor_eval.plans.history.clue_steps import clue_step, object_logs
+from infthor_eval.plans.history.past import Past
+from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.plans.plan import Plan, TrajectoryTask
-from infthor_eval.plans.segments import PlanSegment
 from infthor_eval.thor.frames import FrameKeeper
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.recorded import MissingObjectError, translate
@@ -162,13 +162,17 @@ class Expert:
                 self._log.record(step.view, step=number, action=step.action.text)
         if start.frame is not None:
             segment = self._open_segment(plan.index)
-            after = tuple((step.action.text, step.frame) for step in steps if step.frame is not None)
+            after = tuple(
+                (step.action.text, step.frame) for step in steps if step.frame is not None
+            )
             self._segments.append(replace(segment, steps=after))
         self._actions.append([step.action for step in steps])
         self._watch(plan, steps)
         following = self._plans[plan.index + 1 : plan.index + 2]
         task_goes_on = any(item.task == plan.task for item in following)
-        self._starts.append(PlanStart(mark, last.frame, last.treatments if task_goes_on else Treatments()))
+        self._starts.append(
+            PlanStart(mark, last.frame, last.treatments if task_goes_on else Treatments())
+        )
 
     def _steps(self, plan: Plan, start: PlanStart) -> Iterator[Replayed]:
         view, treatments = self._simulator.rewind(start.mark, exactly=True), start.treatments

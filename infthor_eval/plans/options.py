@@ -14,7 +14,10 @@ class PlansOptions(SimulatorOptions):
 
     rewards: str | None = field(
         default=None,
-        metadata={"choices": ("default", "published"), "help": "Rules of rewards; the task's own if not given."},
+        metadata={
+            "choices": ("default", "published"),
+            "help": "Rules of rewards; the task's own if not given.",
+        },
     )
     words: str | None = field(
         default=None,
@@ -25,7 +28,9 @@ class PlansOptions(SimulatorOptions):
     )
     force_action: bool = field(
         default=False,
-        metadata={"help": "Call the simulator with forceAction, as the published script does (--rewards published)."},
+        metadata={
+            "help": "Call the simulator with forceAction, as the published script does (--rewards published)."
+        },
     )
     history: str | None = field(
         default=None,
@@ -43,7 +48,8 @@ class PlansOptions(SimulatorOptions):
         },
     )
     memory_args: str | None = field(
-        default=None, metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."}
+        default=None,
+        metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."},
     )
     budget: str | None = field(
         default=None,
@@ -62,13 +68,23 @@ class PlansOptions(SimulatorOptions):
     )
     after_failure: str | None = field(
         default=None,
-        metadata={"choices": ("continue", "stop"), "help": "What follows a failed plan; the task's own if not given."},
+        metadata={
+            "choices": ("continue", "stop"),
+            "help": "What follows a failed plan; the task's own if not given.",
+        },
     )
     constrained: bool = field(
-        default=False, metadata={"help": "Restrict replies to the actions that are possible in view."}
+        default=False,
+        metadata={"help": "Restrict replies to the actions that are possible in view."},
     )
-    greedy: bool = field(default=False, metadata={"help": "Decode greedily instead of sampling as published."})
+    greedy: bool = field(
+        default=False, metadata={"help": "Decode greedily instead of sampling as published."}
+    )
     retriever: str | None = field(
         default=None,
-        metadata={"help": "CLIP model that finds frames, a hub id or a folder.", "metavar": "NAME", "is_place": True},
+        metadata={
+            "help": "CLIP model that finds frames, a hub id or a folder.",
+            "metavar": "NAME",
+            "is_place": True,
+        },
     )

@@ -88,9 +88,13 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
     for sub_task, span in zip(_sub_tasks(trajectory), trajectory.sub_trajs, strict=True):
         first, end = span.high_pddl_idx
         if not 0 <= first <= end <= n_high:
-            raise _error(trajectory, f"task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}")
+            raise _error(
+                trajectory, f"task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}"
+            )
         task = _task(trajectory, span.sub_traj_idx, sub_task)
-        tasks.append(TrajectoryTask(goal_text(trajectory, sub_task), sub_task.task_info, task, first, end))
+        tasks.append(
+            TrajectoryTask(goal_text(trajectory, sub_task), sub_task.task_info, task, first, end)
+        )
     return tasks
 
 
@@ -109,7 +113,9 @@ def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
         low = spans.get(high.high_idx)
         if low is None:
             continue
-        task = max((number for number, item in enumerate(tasks) if item.first_high <= place), default=0)
+        task = max(
+            (number for number, item in enumerate(tasks) if item.first_high <= place), default=0
+        )
         object_id, receptacle_id = _ids(trajectory, high, low)
         plans.append(
             Plan(
@@ -164,7 +170,9 @@ def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
     previous = -1
     for number, low in enumerate(trajectory.plan.low_actions):
         if low.high_idx < previous:
-            raise _error(trajectory, f"action {number} belongs to sub-goal {low.high_idx}, out of order")
+            raise _error(
+                trajectory, f"action {number} belongs to sub-goal {low.high_idx}, out of order"
+            )
         first, _ = spans.get(low.high_idx, (number, number))
         spans[low.high_idx] = (first, number + 1)
         previous = low.high_idx
@@ -173,7 +181,9 @@ def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
     return spans
 
 
-def _ids(trajectory: Trajectory, high: HighAction, low: tuple[int, int]) -> tuple[str | None, str | None]:
+def _ids(
+    trajectory: Trajectory, high: HighAction, low: tuple[int, int]
+) -> tuple[str | None, str | None]:
     """Return the ids of a sub-goal's object and receptacle.
 
     What is put away after a task is named by its type in the sub-goal; its ids are in the action that puts it.
@@ -181,8 +191,14 @@ def _ids(trajectory: Trajectory, high: HighAction, low: tuple[int, int]) -> tupl
     planner = high.planner_action
     if "|" not in (planner.object_id or "|"):
         for action in trajectory.plan.low_actions[slice(*low)]:
-            if action.api_action.action == high.discrete_action.action and action.api_action.object_id is not None:
-                return action.api_action.object_id, action.api_action.receptacle_id or planner.receptacle_id
+            if (
+                action.api_action.action == high.discrete_action.action
+                and action.api_action.object_id is not None
+            ):
+                return (
+                    action.api_action.object_id,
+                    action.api_action.receptacle_id or planner.receptacle_id,
+                )
     return planner.object_id, planner.receptacle_id
 
 

@@ -4,7 +4,7 @@ import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.runs.counts import Count, Total
-from infthor_eval.runs.records import RecordTypes
+from infthor_eval.runs.journals.records import RecordTypes
 
 __all__ = ["RECORDS", "PlanRecord", "StepRecord"]
 
@@ -28,10 +28,12 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     n_context_tokens: Count | None = None
 
 
-class PlanRecord(EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="plan"):
+class PlanRecord(
+    EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="plan"
+):
     """One plan, and what an agent did in it; `kind` is that of the plan ("PickupObject"), `ended` see `Ended`.
 
-    A plan from imported counts (`infthor_eval.plans.imported_counts`) has its kind and whether it was done, no more:
+    A plan from imported counts (`infthor_eval.plans.published.imported_counts`) has its kind and whether it was done, no more:
     the goal is empty, and all numbers but its index are 0.
 
     Attributes:

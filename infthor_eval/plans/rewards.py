@@ -26,7 +26,9 @@ __all__ = ["PlanReward", "StepReward", "count_actions_to_goal", "max_reward"]
 
 _SMALL_LOOK = 0.01  # share of a look below which the camera's angle is right: simulators report rounded angles
 _COOLING_STAGES = 3  # cooled, opened again, picked up again
-_TAKING_WHILE_CLOSED = {"Toilet"}  # the receptacle that AI2-THOR need not have opened; experts put things onto its lid
+_TAKING_WHILE_CLOSED = {
+    "Toilet"
+}  # the receptacle that AI2-THOR need not have opened; experts put things onto its lid
 _NOTHING = Treatments()
 
 
@@ -79,7 +81,9 @@ class PlanReward:
         self._task_open = not goal_holds(task, start, self.treatments)
         self.goal_reached = self._is_over = False
 
-    def after(self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView) -> StepReward:
+    def after(
+        self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
         """Return the reward of an action, as `Simulator.step(**call)` takes it; ValueError if the plan is over."""
         if self._is_over:
             raise ValueError("the plan is over; begin the next one")
@@ -107,7 +111,9 @@ class PlanReward:
 
     # -- the kinds; where they depart from the published functions is said in docs/plan-rewards.md
 
-    def _goto(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+    def _goto(
+        self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
         assert self._paths is not None  # as checked when the plan began
         left = self._paths.remaining(after.agent)
         # A step that was gained, lost and gained again is rewarded once. From where there is no path nothing is gained:
@@ -117,12 +123,16 @@ class PlanReward:
         arrived = left < self._rules.nearer_than
         return StepReward(gained * self._rules.per_step + arrived * self._per_success, done=arrived)
 
-    def _pickup(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+    def _pickup(
+        self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
         if action != "PickupObject":
             return StepReward()
         return self._success() if in_hand(self._object_id, after) else StepReward()
 
-    def _put_down(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+    def _put_down(
+        self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
         receptacle = self._target.receptacle_id or ""
         is_there = is_in(self._object_id, receptacle, after)
         if action == "PutObject" and not is_there:
@@ -135,27 +145,45 @@ class PlanReward:
             return StepReward()
         if action == "OpenObject":
             return self._complete_stage("open")
-        return self._complete_stage("close", last=True) if is_there and "put" in self._stages else StepReward()
+        return (
+            self._complete_stage("close", last=True)
+            if is_there and "put" in self._stages
+            else StepReward()
+        )
 
-    def _open_or_close(self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+    def _open_or_close(
+        self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
         wanted = self._target.kind == PlanKind.OPEN
         is_done = object_id == self._object_id and bool(after.objects[object_id].is_open) == wanted
         return self._success() if is_done else StepReward()
 
-    def _toggle(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+    def _toggle(
+        self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
         if object_id != self._object_id:
             return StepReward()
         changed = after.objects[object_id].is_toggled != self._start.objects[object_id].is_toggled
         return self._success() if changed else StepReward()
 
-    def _slice(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
-        return self._success() if action == "SliceObject" and object_id == self._object_id else StepReward()
+    def _slice(
+        self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
+        return (
+            self._success()
+            if action == "SliceObject" and object_id == self._object_id
+            else StepReward()
+        )
 
-    def _wash_or_heat(self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+    def _wash_or_heat(
+        self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
         treated = self._in_plan.clean if self._target.kind == PlanKind.CLEAN else self._in_plan.hot
         return self._success() if self._subject in treated else StepReward()
 
-    def _cool(self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView) -> StepReward:
+    def _cool(
+        self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
+    ) -> StepReward:
         """Reward three stages in their order: an object in the closed fridge is cold, but still to be taken out."""
         subject = self._subject or ""
         if subject not in self._in_plan.cold:
@@ -166,7 +194,9 @@ class PlanReward:
         if action == "OpenObject" and fridge is not None and fridge.object_type == "Fridge":
             holds = subject in contents_of(fridge.object_id, before.objects)
             return self._complete_stage("reopened") if holds else StepReward()
-        picked = action == "PickupObject" and subject in after.inventory and "reopened" in self._stages
+        picked = (
+            action == "PickupObject" and subject in after.inventory and "reopened" in self._stages
+        )
         return self._complete_stage("picked up", last=True) if picked else StepReward()
 
     # -- their parts
@@ -227,10 +257,14 @@ def count_actions_to_goal(
     """
     paths = _paths_to_goal(rules, target, grid)
     left = [math.inf if paths is None else paths.remaining(pose) for pose in poses]
-    return next((number for number, steps in enumerate(left, 1) if steps < rules.nearer_than), len(poses))
+    return next(
+        (number for number, steps in enumerate(left, 1) if steps < rules.nearer_than), len(poses)
+    )
 
 
-def _max_path_reward(rules: RewardRules, target: PlanTarget, start: SimulatorView, grid: Grid | None) -> float:
+def _max_path_reward(
+    rules: RewardRules, target: PlanTarget, start: SimulatorView, grid: Grid | None
+) -> float:
     """Return the reward of the shortest path up to where the plan is done, and of arriving.
 
     At least one step has to be taken, even from where the plan is done already: rewards are given with actions.
@@ -257,7 +291,9 @@ class _PathsToGoal:
         return steps + math.ceil(looks - _SMALL_LOOK)
 
 
-def _paths_to_goal(rules: RewardRules, target: PlanTarget, grid: Grid | None) -> _PathsToGoal | None:
+def _paths_to_goal(
+    rules: RewardRules, target: PlanTarget, grid: Grid | None
+) -> _PathsToGoal | None:
     """Return the paths to a plan's pose; None if it has none."""
     if target.goal_stand is None:
         return None
@@ -280,7 +316,11 @@ def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:
         return
     subject = subject_of(target, start)
     if subject not in start.objects:
-        problem = "has no object" if subject is None else f"is about {subject}, which the scene does not have"
+        problem = (
+            "has no object"
+            if subject is None
+            else f"is about {subject}, which the scene does not have"
+        )
         raise InfeasibleError(f"this {kind} plan {problem}; leave it out")
     if kind == PlanKind.PUT and target.receptacle_id not in start.objects:
         raise InfeasibleError(
@@ -288,7 +328,9 @@ def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:
         )
 
 
-_BY_KIND: dict[PlanKind, Callable[[PlanReward, str, str | None, SimulatorView, SimulatorView], StepReward]] = {
+_BY_KIND: dict[
+    PlanKind, Callable[[PlanReward, str, str | None, SimulatorView, SimulatorView], StepReward]
+] = {
     PlanKind.GOTO: PlanReward._goto,
     PlanKind.PICKUP: PlanReward._pickup,
     PlanKind.PUT: PlanReward._put_down,

@@ -8,8 +8,8 @@ import msgspec
 
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
-from infthor_eval.plans.actor_factory import ActorFactory
-from infthor_eval.plans.actors import Act, CountingActor, EndedActor, PlanSituation
+from infthor_eval.plans.actors.factory import ActorFactory
+from infthor_eval.plans.actors.protocols import Act, CountingActor, EndedActor, PlanSituation
 from infthor_eval.plans.environment import PlanEnvironment, StepOutcome
 from infthor_eval.plans.expert import ExpertRefusedError
 from infthor_eval.plans.plan import Plan
@@ -96,7 +96,9 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             SimulatorError: the simulator fails.
         """
         environment = self.environment
-        observation, info = environment.go_on(plan.index) if goes_on else environment.reset(plan.index)
+        observation, info = (
+            environment.go_on(plan.index) if goes_on else environment.reset(plan.index)
+        )
         record = plan_record(self._trajectory, plan)
         of_expert = info["expert_reward"]
         self.begun = msgspec.structs.replace(
@@ -104,7 +106,9 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             max_reward=round(info["max_reward"], _DIGITS),
             expert_reward=None if of_expert is None else round(of_expert, _DIGITS),
         )
-        self._actor.begin(PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation, goes_on))
+        self._actor.begin(
+            PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation, goes_on)
+        )
         self.begun = self._with_clue_tokens(self.begun, plan)
         acts: list[tuple[Act, StepOutcome]] = []
         while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):
@@ -139,7 +143,9 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             SimulatorError: as `run`.
         """
         self.environment.expert_actions(plan.index)
-        return EpisodeResult(msgspec.structs.replace(plan_record(self._trajectory, plan), ended=NOT_ATTEMPTED))
+        return EpisodeResult(
+            msgspec.structs.replace(plan_record(self._trajectory, plan), ended=NOT_ATTEMPTED)
+        )
 
 
 def _completed_record(begun: PlanRecord, acts: Sequence[tuple[Act, StepOutcome]]) -> PlanRecord:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
-from infthor_eval.plans.baselines import BASELINES
+from infthor_eval.plans.actors.baselines import BASELINES
 from infthor_eval.plans.config_form import PlansConfig
 from infthor_eval.plans.evaluation import PlansEvaluation
 from infthor_eval.plans.options import PlansOptions
@@ -12,7 +12,15 @@ from infthor_eval.plans.summary import PlansSummary, summarise_plans
 from infthor_eval.plans.tables import overview_table, result_tables
 from infthor_eval.plans.task import check_task_file
 from infthor_eval.rates import Rate
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord, check_config
+from infthor_eval.runs import (
+    RecordTypes,
+    RunHeader,
+    RunSummary,
+    TaskFile,
+    TaskRequest,
+    UnitRecord,
+    check_config,
+)
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
 from model_adapters import Subject
@@ -37,7 +45,9 @@ class PlansSuite:
         """See `Suite.prepare`."""
         return PlansEvaluation(request)
 
-    def summarise(self, header: RunHeader, records: Sequence[UnitRecord[PlanRecord]]) -> PlansSummary:
+    def summarise(
+        self, header: RunHeader, records: Sequence[UnitRecord[PlanRecord]]
+    ) -> PlansSummary:
         """See `Suite.summarise`; raises DataError for a journal whose config is of another form."""
         check_config(header, PlansConfig)
         return summarise_plans(header.config, records)
@@ -52,7 +62,11 @@ class PlansSuite:
 
     def primary_metrics(self, summary: PlansSummary) -> Mapping[str, Rate]:
         """See `Suite.primary_metrics`: share of completed plans."""
-        return {name: task.success["total"] for name, task in summary.tasks.items() if "total" in task.success}
+        return {
+            name: task.success["total"]
+            for name, task in summary.tasks.items()
+            if "total" in task.success
+        }
 
     def overview(self, runs: Sequence[RunSummary]) -> list[Table]:
         """See `Suite.overview`."""

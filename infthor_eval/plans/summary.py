@@ -13,7 +13,7 @@ from infthor_eval.episodes.summary import (
     summarise_episodes,
 )
 from infthor_eval.plans.plan import PlanKind
-from infthor_eval.plans.published_log import log_rows
+from infthor_eval.plans.published.log import log_rows
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.rates import Rate, clustered_rate, rate_over_clusters
 from infthor_eval.runs import UnitRecord
@@ -87,10 +87,18 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
         **common_results(config, records),
         n_plans=len(counted),
         n_tried=sum(record.payload.attempted for record in counted) if has_steps else None,
-        success={name: rate for name, kinds in _COLUMNS.items() if (rate := _success(counted, kinds))},
-        by_kind={str(kind): rate for kind in PlanKind if (rate := _success(counted, frozenset({kind})))},
-        path_weighted=clustered_rate([_path_weight(item.payload) for item in acted], [item.cluster for item in acted]),
-        reward_share=_rate_of_trajectories(acted, lambda reward, most: reward / most if most else 0.0),
+        success={
+            name: rate for name, kinds in _COLUMNS.items() if (rate := _success(counted, kinds))
+        },
+        by_kind={
+            str(kind): rate for kind in PlanKind if (rate := _success(counted, frozenset({kind})))
+        },
+        path_weighted=clustered_rate(
+            [_path_weight(item.payload) for item in acted], [item.cluster for item in acted]
+        ),
+        reward_share=_rate_of_trajectories(
+            acted, lambda reward, most: reward / most if most else 0.0
+        ),
         reward=_rate_of_trajectories(acted, lambda reward, _: reward),
         max_reward=_rate_of_trajectories(acted, lambda _, most: most),
         goals=_goals(acted),
@@ -113,11 +121,20 @@ def _logged(records: Sequence[Record]) -> dict[str, Rate]:
     by_trajectory: dict[str, list[PlanRecord]] = {}
     for record in records:
         by_trajectory.setdefault(record.cluster, []).append(record.payload)
-    if not all(plan.expert_reward is not None for plans in by_trajectory.values() for plan in plans):
+    if not all(
+        plan.expert_reward is not None for plans in by_trajectory.values() for plan in plans
+    ):
         return {}
     ends = [list(log_rows(plans))[-1] for _, plans in sorted(by_trajectory.items())]
-    totals = {"total_reward": [end.total_reward for end in ends], "agent_reward": [end.agent_reward for end in ends]}
-    return {name: rate for name, values in totals.items() if (rate := rate_over_clusters(values)) is not None}
+    totals = {
+        "total_reward": [end.total_reward for end in ends],
+        "agent_reward": [end.agent_reward for end in ends],
+    }
+    return {
+        name: rate
+        for name, values in totals.items()
+        if (rate := rate_over_clusters(values)) is not None
+    }
 
 
 def _success(records: Sequence[Record], kinds: frozenset[str]) -> Rate | None:
@@ -135,7 +152,9 @@ def _goals(records: Sequence[Record]) -> Rate | None:
     for record in records:
         key = record.cluster, record.payload.task
         reached[key] = reached.get(key, False) or record.payload.goal_reached
-    return clustered_rate([float(value) for value in reached.values()], [trajectory for trajectory, _ in reached])
+    return clustered_rate(
+        [float(value) for value in reached.values()], [trajectory for trajectory, _ in reached]
+    )
 
 
 def _goal_conditions(records: Sequence[Record]) -> Rate | None:
@@ -171,10 +190,15 @@ def _clue_tokens(plan: PlanRecord) -> str | None:
     return None if plan.clue_tokens is None else length_class(plan.clue_tokens)
 
 
-def _rate_of_trajectories(records: Sequence[Record], measure: Callable[[float, float], float]) -> Rate | None:
+def _rate_of_trajectories(
+    records: Sequence[Record], measure: Callable[[float, float], float]
+) -> Rate | None:
     """Return the mean over trajectories of a measure of their reward and highest possible reward."""
     sums: dict[str, tuple[float, float]] = {}
     for record in records:
         reward, most = sums.get(record.cluster, (0.0, 0.0))
-        sums[record.cluster] = reward + record.payload.reward, most + (record.payload.max_reward or 0.0)
+        sums[record.cluster] = (
+            reward + record.payload.reward,
+            most + (record.payload.max_reward or 0.0),
+        )
     return rate_over_clusters([measure(*sums[name]) for name in sorted(sums)])

@@ -29,7 +29,14 @@ _PUBLISHED_RULES = (
 def overview_table(runs: Sequence[RunSummary]) -> Table:
     """Return completed plans and reward, one number a task."""
     rows = [
-        Row((*names, format_percent(task.success.get("total")), format_percent(task.reward_share), *_sizes(task)[:3]))
+        Row(
+            (
+                *names,
+                format_percent(task.success.get("total")),
+                format_percent(task.reward_share),
+                *_sizes(task)[:3],
+            )
+        )
         for *names, task in named_tasks(runs)
     ]
     columns = (*NAME_COLUMNS, *map(Column, ("completed, %", "reward, % of the most", *_COUNTS[:3])))
@@ -43,7 +50,9 @@ def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
     return [_success_table(runs, tasks), *_distance_tables(tasks), _reward_table(tasks), endings]
 
 
-def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
+def _success_table(
+    runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, PlanTaskSummary]]
+) -> Table:
     """Return completed plans, by the columns of the published table of final tasks."""
     rows = [
         Row(
@@ -62,11 +71,17 @@ def _success_table(runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, P
             for row in table.rows:
                 cells = zip(table.columns, row.values, strict=True)
                 values = (f"{value:.1f}{_NEVER * (column == 'Put')}" for column, value in cells)
-                rows.append(Row((row.name, f"published, {table.title}", *values), is_published=True))
+                rows.append(
+                    Row((row.name, f"published, {table.title}", *values), is_published=True)
+                )
             notes += (f"Published, {table.title}: {note}" for note in table.notes)
-        notes.append(f"{_NEVER} Cannot be other than 0: the published script counts every put as failed.")
+        notes.append(
+            f"{_NEVER} Cannot be other than 0: the published script counts every put as failed."
+        )
     elif any(_has_final_task(run) for run in runs):
-        notes.append("Published rows stand beside runs with --protocol published --rewards published alone.")
+        notes.append(
+            "Published rows stand beside runs with --protocol published --rewards published alone."
+        )
     columns = (*NAME_COLUMNS, *map(Column, (*FINAL_COLUMNS, _PATH_WEIGHTED, *_COUNTS)))
     return Table("Plans completed, %", columns, tuple(rows), tuple(notes))
 
@@ -75,7 +90,11 @@ def _distance_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[
     """Return the final tasks' plans by the distance of their clues: in frames, and in tokens if they are counted."""
     tables = []
     for title, of_task, order in (
-        ("frames since what they need was in view", lambda task: task.by_distance, (*DISTANCES, NEVER)),
+        (
+            "frames since what they need was in view",
+            lambda task: task.by_distance,
+            (*DISTANCES, NEVER),
+        ),
         ("thousand tokens since then", lambda task: task.by_tokens, LENGTHS),
     ):
         names = [name for name in order if any(name in of_task(task) for *_, task in tasks)]
@@ -86,7 +105,9 @@ def _distance_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[
         ]
         if rows:
             columns = (*NAME_COLUMNS, *map(Column, names))
-            tables.append(Table(f"Final tasks: plans completed, % (plans), by {title}", columns, tuple(rows)))
+            tables.append(
+                Table(f"Final tasks: plans completed, % (plans), by {title}", columns, tuple(rows))
+            )
     return tables
 
 
@@ -96,15 +117,25 @@ def _rate_and_n(rate: Rate | None) -> str:
 
 def _conduct_notes(runs: Sequence[RunSummary]) -> list[str]:
     """Return how the runs went on after a failed plan; Algorithm 2 of the paper and its script differ in it."""
-    ways = {task.get("after_failure") for run in runs for task in run.header.config["tasks"].values()}
+    ways = {
+        task.get("after_failure") for run in runs for task in run.header.config["tasks"].values()
+    }
     return [text for way, text in _AFTER_FAILURE.items() if way in ways]
 
 
 def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
-    logged = [name for name in ("total_reward", "agent_reward") if any(name in task.logged for *_, task in tasks)]
+    logged = [
+        name
+        for name in ("total_reward", "agent_reward")
+        if any(name in task.logged for *_, task in tasks)
+    ]
     rows = []
     for *names, task in tasks:
-        of_trajectory = format_number(task.reward), format_number(task.max_reward), format_percent(task.reward_share)
+        of_trajectory = (
+            format_number(task.reward),
+            format_number(task.max_reward),
+            format_percent(task.reward_share),
+        )
         totals = (format_number(task.logged.get(name)) for name in logged)
         goals = format_percent(task.goals), format_percent(task.goal_conditions)
         rows.append(Row((*names, task.rules or "-", *of_trajectory, *goals, *totals)))
@@ -112,7 +143,10 @@ def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
     columns = (
         *NAME_COLUMNS,
         Column("rules", False),
-        *map(Column, ("reward", "at most", "% of it", "goals reached, %", "goal conditions, %", *of_log)),
+        *map(
+            Column,
+            ("reward", "at most", "% of it", "goals reached, %", "goal conditions, %", *of_log),
+        ),
     )
     notes = (_PUBLISHED_RULES,) if logged else ()
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows), notes)
@@ -124,7 +158,12 @@ def _actions(task: PlanTaskSummary) -> str:
 
 def _sizes(task: PlanTaskSummary) -> tuple[str, ...]:
     tried = "-" if task.n_tried is None else task.n_tried
-    others = (task.n_trajectories, sum(task.excluded.values()), sum(task.skipped.values()), task.n_failed)
+    others = (
+        task.n_trajectories,
+        sum(task.excluded.values()),
+        sum(task.skipped.values()),
+        task.n_failed,
+    )
     return tuple(map(str, (task.n_plans, tried, *others)))
 
 
@@ -136,7 +175,9 @@ def _has_final_task(run: RunSummary) -> bool:
 def _is_comparable(run: RunSummary) -> bool:
     """Return whether a run has a task that was run as the published final tasks were, or comes from their logs."""
     tasks = run.header.config["tasks"].values()
-    return any(task["rewards"] is None or _as_published(task) for task in tasks) and _has_final_task(run)
+    return any(
+        task["rewards"] is None or _as_published(task) for task in tasks
+    ) and _has_final_task(run)
 
 
 def _as_published(task: Mapping[str, Any]) -> bool:

@@ -39,7 +39,11 @@ def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarg
     Raises:
         InfeasibleError: the scene has no object for an id.
     """
-    return PlanTarget(plan.kind, _here(plan.object_id, grounding, view), _here(plan.receptacle_id, grounding, view))
+    return PlanTarget(
+        plan.kind,
+        _here(plan.object_id, grounding, view),
+        _here(plan.receptacle_id, grounding, view),
+    )
 
 
 def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
@@ -56,7 +60,9 @@ def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
 
 def in_hand(wanted: str, view: SimulatorView) -> bool:
     """Return whether an object of this name is held, whole or sliced: an agent's words cannot tell which one it is."""
-    return any(Words.PUBLISHED.name_of(held) == Words.PUBLISHED.name_of(wanted) for held in view.inventory)
+    return any(
+        Words.PUBLISHED.name_of(held) == Words.PUBLISHED.name_of(wanted) for held in view.inventory
+    )
 
 
 def _here(recorded: str | None, grounding: Grounding, view: SimulatorView) -> str | None:

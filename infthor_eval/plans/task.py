@@ -9,16 +9,16 @@ from infthor_eval.episodes.task_settings import task_settings
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.plans.chat_forms import chat_form
+from infthor_eval.plans.actors.model import AgentConfig
 from infthor_eval.plans.environment import MAX_STEPS
-from infthor_eval.plans.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
-from infthor_eval.plans.final_protocol import FinalForm, final_form
-from infthor_eval.plans.history import history_named
-from infthor_eval.plans.model_actor import AgentConfig
+from infthor_eval.plans.history.forms import history_named
+from infthor_eval.plans.history.recalled import MemoryChoice, RecalledHistory
+from infthor_eval.plans.history.retrieved import require_retrieved
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
-from infthor_eval.plans.recalled_history import MemoryChoice, RecalledHistory
-from infthor_eval.plans.retrieved_frames import require_retrieved
+from infthor_eval.plans.published.chat_forms import chat_form
+from infthor_eval.plans.published.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
+from infthor_eval.plans.published.final_protocol import FinalForm, final_form
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -34,7 +34,13 @@ _CHOICES = {
     "words": tuple(map(str, Words)),
 }
 
-_GIVEN = ("rewards", "words", "history", "protocol", "after_failure")  # settings that are options too
+_GIVEN = (
+    "rewards",
+    "words",
+    "history",
+    "protocol",
+    "after_failure",
+)  # settings that are options too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,16 +113,22 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             self.history, self.decoding = self._form.history, self._form.decoding(request.seed)
         super().__init__(file, request, settings, partial(read_plan_trajectory, words=self.words))
         having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
-        self.evaluated_trajectories = limit_items(having_plans, lambda item: item.traj_id, request.seed, request.limit)
+        self.evaluated_trajectories = limit_items(
+            having_plans, lambda item: item.traj_id, request.seed, request.limit
+        )
         if not self.evaluated_trajectories:
-            raise UsageError(f"{self.name}: no trajectory there has a final task; make some with --test-set")
+            raise UsageError(
+                f"{self.name}: no trajectory there has a final task; make some with --test-set"
+            )
         if settings.history.startswith("retrieved:"):
             require_retrieved((item.data for item in self.evaluated_trajectories), self.name)
 
     def _memory_choice(self) -> MemoryChoice:
         options = self._options
         blank = options.frames == "blank"
-        return MemoryChoice(options.memory, options.memory_args, options.budget, options.retriever, blank)
+        return MemoryChoice(
+            options.memory, options.memory_args, options.budget, options.retriever, blank
+        )
 
     def _final_form(self, settings: PlanTaskSettings) -> FinalForm | None:
         """Return the published form of final tasks; None without it."""
@@ -128,13 +140,19 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
 
     def plans(self, trajectory: PlanTrajectory) -> list[Plan]:
         """Return the plans of a trajectory that are evaluated."""
-        wanted = [plan for plan in trajectory.plans if plan.is_final or self.settings.plans == "all"]
+        wanted = [
+            plan for plan in trajectory.plans if plan.is_final or self.settings.plans == "all"
+        ]
         return [plan for plan in wanted if plan.in_task]
 
     @property
     def max_steps(self) -> int:
         """Number of actions after which a plan is over."""
-        return self.settings.max_steps if self.final_form is None else max(self.settings.max_steps, MAX_FINAL_STEPS)
+        return (
+            self.settings.max_steps
+            if self.final_form is None
+            else max(self.settings.max_steps, MAX_FINAL_STEPS)
+        )
 
     def agent_config(self) -> AgentConfig:
         """Return how a model is prompted."""
@@ -150,7 +168,9 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
 
     def _recalling(self) -> dict[str, Any]:
         """Return the identity of a memory of one's own choice; the published forms have theirs in their name."""
-        return {"recall": self.history.identity()} if isinstance(self.history, RecalledHistory) else {}
+        return (
+            {"recall": self.history.identity()} if isinstance(self.history, RecalledHistory) else {}
+        )
 
     def config(self) -> dict[str, Any]:
         """See `EpisodeTask`."""

@@ -6,12 +6,12 @@ from functools import cached_property
 
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
 from infthor_eval.errors import DataError
-from infthor_eval.formats.digests import digest
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import ObjectLog
 from infthor_eval.formats.trajectory import TrajectorySource
-from infthor_eval.plans.clue_steps import clue_step, object_logs
+from infthor_eval.plans.history.clue_steps import clue_step, object_logs
 from infthor_eval.plans.plan import Plan, TrajectoryTask, plans_of, tasks_of
+from infthor_eval.storage.digests import digest
 
 __all__ = ["PlanTrajectory", "read_plan_trajectory"]
 
@@ -25,7 +25,9 @@ class PlanTrajectory(TaskTrajectory):
 
     def first_frame(self, plan: Plan) -> int:
         """Return the frame that the task of a plan begins with."""
-        return next(other.low[0] for other in self.plans if other.task == plan.task and other.in_task)
+        return next(
+            other.low[0] for other in self.plans if other.task == plan.task and other.in_task
+        )
 
     def clue(self, plan: Plan) -> int | None:
         """Return the last frame, up to the first of its task, with what a plan needs in view; see `clue_step`."""

@@ -48,7 +48,9 @@ class Comparison:
     drawing: float | None
 
 
-def compare(suite: Suite, presenter: Presenter, first: Iterable[Record], second: Iterable[Record]) -> list[Comparison]:
+def compare(
+    suite: Suite, presenter: Presenter, first: Iterable[Record], second: Iterable[Record]
+) -> list[Comparison]:
     """Compare the records of two runs of a suite on the units that both evaluated.
 
     Raises:
@@ -57,7 +59,9 @@ def compare(suite: Suite, presenter: Presenter, first: Iterable[Record], second:
     ours, theirs = map(_by_unit, (first, second))
     shared = ours.keys() & theirs.keys()
     if not shared:
-        raise DataError("the two runs share no unit of the same task; compare runs on the same data")
+        raise DataError(
+            "the two runs share no unit of the same task; compare runs on the same data"
+        )
     comparisons: list[Comparison] = []
     for task in sorted({key.task for key in shared}):
         pairs = [(ours[key], theirs[key]) for key in ours if key in shared and key.task == task]
@@ -69,7 +73,9 @@ def compare(suite: Suite, presenter: Presenter, first: Iterable[Record], second:
 def _compare_task(
     suite: Suite, presenter: Presenter, task: str, pairs: Sequence[_Pair], n_unshared: int
 ) -> Iterator[Comparison]:
-    scores = [(list(map(suite.scores, ours)), list(map(suite.scores, theirs))) for ours, theirs in pairs]
+    scores = [
+        (list(map(suite.scores, ours)), list(map(suite.scores, theirs))) for ours, theirs in pairs
+    ]
     clusters = [ours[0].cluster for ours, _ in pairs]
     for metric in _shared_metrics(scores):
         # A unit without results has no scores, and counts as 0.
@@ -79,20 +85,40 @@ def _compare_task(
         (list(map(presenter.further_scores, ours)), list(map(presenter.further_scores, theirs)))
         for ours, theirs in pairs
     ]
-    scored = [pair for pair, (ours, theirs) in zip(further, scores, strict=True) if ours[0] and theirs[0]]
-    for metric in dict.fromkeys(name for ours, theirs in scored or further for name in ours[0] if name in theirs[0]):
+    scored = [
+        pair for pair, (ours, theirs) in zip(further, scores, strict=True) if ours[0] and theirs[0]
+    ]
+    for metric in dict.fromkeys(
+        name for ours, theirs in scored or further for name in ours[0] if name in theirs[0]
+    ):
         # Whether a unit has such a score depends on the unit, not on the reply.
-        chosen = [place for place, (ours, theirs) in enumerate(further) if metric in ours[0] and metric in theirs[0]]
-        both = [(_values(further[place][0], metric), _values(further[place][1], metric)) for place in chosen]
-        yield _compare_metric(presenter, task, metric, both, [clusters[place] for place in chosen], n_unshared)
+        chosen = [
+            place
+            for place, (ours, theirs) in enumerate(further)
+            if metric in ours[0] and metric in theirs[0]
+        ]
+        both = [
+            (_values(further[place][0], metric), _values(further[place][1], metric))
+            for place in chosen
+        ]
+        yield _compare_metric(
+            presenter, task, metric, both, [clusters[place] for place in chosen], n_unshared
+        )
 
 
-def _shared_metrics(scores: Sequence[tuple[Sequence[Mapping[str, float]], Sequence[Mapping[str, float]]]]) -> list[str]:
+def _shared_metrics(
+    scores: Sequence[tuple[Sequence[Mapping[str, float]], Sequence[Mapping[str, float]]]],
+) -> list[str]:
     """Return the metrics that both runs have; all of the other run's if one has no unit with a result."""
     first, second = (
-        dict.fromkeys(name for of_run in runs for one in of_run for name in one) for runs in zip(*scores, strict=True)
+        dict.fromkeys(name for of_run in runs for one in of_run for name in one)
+        for runs in zip(*scores, strict=True)
     )
-    return [name for name in first | second if (not first or name in first) and (not second or name in second)]
+    return [
+        name
+        for name in first | second
+        if (not first or name in first) and (not second or name in second)
+    ]
 
 
 def _by_unit(records: Iterable[Record]) -> dict[UnitKey, list[Record]]:
@@ -127,7 +153,11 @@ def _drawing(scores: Sequence[tuple[Sequence[float], Sequence[float]]]) -> float
     samples = [values for pair in scores for values in pair]
     if any(len(values) < 2 for values in samples):
         return None
-    return _NORMAL_95 * math.sqrt(sum(variance(values) / len(values) for values in samples)) / len(scores)
+    return (
+        _NORMAL_95
+        * math.sqrt(sum(variance(values) / len(values) for values in samples))
+        / len(scores)
+    )
 
 
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
@@ -135,8 +165,17 @@ def comparison_table(comparisons: Sequence[Comparison], first: str, second: str)
     repeated = any(comparison.drawing is not None for comparison in comparisons)
     numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "only in one"]
     numbers += ["drawing"] if repeated else []
-    notes = ("drawing: what the difference moves by if both are asked the same again (95 %).",) if repeated else ()
-    columns = (Column("task", False), Column("metric", False), Column("unit", False), *map(Column, numbers))
+    notes = (
+        ("drawing: what the difference moves by if both are asked the same again (95 %).",)
+        if repeated
+        else ()
+    )
+    columns = (
+        Column("task", False),
+        Column("metric", False),
+        Column("unit", False),
+        *map(Column, numbers),
+    )
     rows = tuple(_row(comparison, repeated=repeated) for comparison in comparisons)
     return Table(f"{second} against {first}", columns, rows, notes)
 

@@ -54,7 +54,11 @@ def _csv(table: Table, *, with_words: bool) -> str:
 
 def _csv_columns(column: Column, cells: Sequence[str]) -> Iterator[list[str]]:
     """Yield a column with its heading, or one for each of the numbers that its cells hold."""
-    names = list(dict.fromkeys(name for cell in cells if isinstance(cell, TableCell) for name in cell.numbers)) or [""]
+    names = list(
+        dict.fromkeys(
+            name for cell in cells if isinstance(cell, TableCell) for name in cell.numbers
+        )
+    ) or [""]
     for place, name in enumerate(names):
         heading = _in_one_line(f"{column.name} {name}")
         yield [heading, *(_csv_cell(cell, name, column, is_first=place == 0) for cell in cells)]
@@ -92,8 +96,15 @@ def _latex(table: Table) -> str:
     aligned = "".join("r" if column.is_number else "l" for column in table.columns)
     lines = [rf"\begin{{tabular}}{{{aligned}}}", r"\toprule", _latex_row(heading), r"\midrule"]
     for cells, row in zip(rows, table.rows, strict=True):
-        lines += [_latex_row(cells), *([r"\midrule"] if row.ends_section and cells is not rows[-1] else [])]
-    lines += [r"\bottomrule", r"\end{tabular}", *(f"% {_in_one_line(note)}" for note in table.notes)]
+        lines += [
+            _latex_row(cells),
+            *([r"\midrule"] if row.ends_section and cells is not rows[-1] else []),
+        ]
+    lines += [
+        r"\bottomrule",
+        r"\end{tabular}",
+        *(f"% {_in_one_line(note)}" for note in table.notes),
+    ]
     title = [f"% {_in_one_line(table.title)}"] if table.title else []
     return "\n".join([*title, *lines]) + "\n"
 

@@ -10,7 +10,7 @@ from jinja2 import Environment
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.nieh.validation import DECISIONS, JudgedQuestion
+from infthor_eval.nieh.validation.cross_validation import DECISIONS, JudgedQuestion
 
 __all__ = ["write_inspection_page"]
 
@@ -26,11 +26,15 @@ def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: Nie
     template = resources.files(__package__).joinpath("inspection.html").read_text(encoding="utf-8")
     # Questions and replies come from data files and models: whatever they hold is shown as text.
     page = Environment(autoescape=True).from_string(template)
-    text = page.render(items=[_describe(item, data, path.parent) for item in items], choices=DECISIONS)
+    text = page.render(
+        items=[_describe(item, data, path.parent) for item in items], choices=DECISIONS
+    )
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise DataError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+        raise DataError(
+            f"{path}: cannot be written ({error.strerror}); give another --out"
+        ) from error
 
 
 def _describe(item: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, object]:
@@ -40,6 +44,10 @@ def _describe(item: JudgedQuestion, data: NiehSet, folder: Path) -> dict[str, ob
         "id": question.id,
         "question": question.text,
         "answer": ", ".join(map(str, question.answers)),
-        "replies": [(model, "(failed)" if reply is None else reply) for model, reply in item.replies.items()],
-        "frames": [{"index": i, "url": quote(os.path.relpath(frame.path, folder))} for i, frame in frames],
+        "replies": [
+            (model, "(failed)" if reply is None else reply) for model, reply in item.replies.items()
+        ],
+        "frames": [
+            {"index": i, "url": quote(os.path.relpath(frame.path, folder))} for i, frame in frames
+        ],
     }

@@ -60,7 +60,9 @@ class PlainPresenter:
     def details(self, record: UnitRecord[Any]) -> Mapping[str, str]:
         """See `Presenter.details`: the fields of the record's payload."""
         payload = record.payload
-        fields = {field.name: getattr(payload, field.name) for field in msgspec.structs.fields(payload)}
+        fields = {
+            field.name: getattr(payload, field.name) for field in msgspec.structs.fields(payload)
+        }
         return {name: _text(value) for name, value in fields.items() if value is not None}
 
     def steps(self, record: UnitRecord[Any]) -> Sequence[StepRow]:
@@ -71,11 +73,17 @@ class PlainPresenter:
         """See `Presenter.prompts`: none."""
         return {}
 
-    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
+    def timelines(
+        self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
+    ) -> Timelines:
         """See `Presenter.timelines`: none."""
         return Timelines()
 
 
 def _text(value: Any) -> str:
-    text = value if isinstance(value, str) else json.dumps(msgspec.to_builtins(value), ensure_ascii=False)
+    text = (
+        value
+        if isinstance(value, str)
+        else json.dumps(msgspec.to_builtins(value), ensure_ascii=False)
+    )
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"

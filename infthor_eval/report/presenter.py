@@ -258,5 +258,7 @@ class Presenter(Protocol):
     def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
         """Return the requests of a run's records, equal ones as one object; `data` is as for `timelines`."""
 
-    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
+    def timelines(
+        self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
+    ) -> Timelines:
         """Find the frames that the samples are about; `data` is the set's folder, None for the one a run names."""

@@ -10,10 +10,10 @@ import msgspec
 
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, Usage, read_header
-from infthor_eval.runs.run_labels import label_runs
-from infthor_eval.runs.run_search import read_results
-from infthor_eval.runs.shards import read_shards
-from infthor_eval.runs.stored_command import read_stored_command
+from infthor_eval.runs.journals.shards import read_shards
+from infthor_eval.runs.stored.command import read_stored_command
+from infthor_eval.runs.stored.labels import label_runs
+from infthor_eval.runs.stored.search import read_results
 
 if TYPE_CHECKING:
     from infthor_eval.report.presenter import Presenter
@@ -68,8 +68,12 @@ class ReportRun:
     @property
     def simulator(self) -> str:
         """Name of the simulator that the frames are from, or names separated by commas; empty if it is not known."""
-        of_tasks = {about.get("simulator") for about in self.tasks.values() if isinstance(about, Mapping)}
-        return str(self.header.config.get("simulator", "") or ", ".join(sorted(filter(None, of_tasks))))
+        of_tasks = {
+            about.get("simulator") for about in self.tasks.values() if isinstance(about, Mapping)
+        }
+        return str(
+            self.header.config.get("simulator", "") or ", ".join(sorted(filter(None, of_tasks)))
+        )
 
     def dataset(self, task: str) -> Mapping[str, Any]:
         """Return the settings of a task's data (`dataset_kwargs` of its file)."""
@@ -94,7 +98,9 @@ class ReportRun:
 
 
 def read_report_runs(
-    folders: Sequence[Path], find_suite: Callable[[str], Suite], find_presenter: Callable[[str], "Presenter"]
+    folders: Sequence[Path],
+    find_suite: Callable[[str], Suite],
+    find_presenter: Callable[[str], "Presenter"],
 ) -> list[ReportRun]:
     """Read runs from their folders, at least one; suites and their presenters are looked up by the suite's name.
 
@@ -107,11 +113,15 @@ def read_report_runs(
     headers = [read_header(folder) for folder in folders]
     return [
         _read(folder, header, name, find_suite(header.suite), find_presenter(header.suite))
-        for folder, header, name in zip(folders, headers, _distinct_names(folders, headers), strict=True)
+        for folder, header, name in zip(
+            folders, headers, _distinct_names(folders, headers), strict=True
+        )
     ]
 
 
-def _read(folder: Path, header: RunHeader, name: str, suite: Suite, presenter: "Presenter") -> ReportRun:
+def _read(
+    folder: Path, header: RunHeader, name: str, suite: Suite, presenter: "Presenter"
+) -> ReportRun:
     log = read_shards(folder, suite.records.decoder())
     results, command = read_results(folder), read_stored_command(folder)
     return ReportRun(
@@ -135,14 +145,22 @@ def label_report_runs(folders: Sequence[Path], headers: Sequence[RunHeader]) -> 
     Raises:
         DataError: the `run.yaml` of a run is not what it should be.
     """
-    return [_with_frames(*named) for named in zip(_distinct_names(folders, headers), headers, strict=True)]
+    return [
+        _with_frames(*named)
+        for named in zip(_distinct_names(folders, headers), headers, strict=True)
+    ]
 
 
 def _distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
     """Return a name per run; the frames are not part of it, since tables add them to the name."""
     names = label_runs(list(zip(folders, headers, strict=True)), ignore={"frames"})
-    tasks = ["+".join(sorted(header.config.get("tasks", {})))[:_LONGEST_TASKS] for header in headers]
-    keys = [(name, header.suite, header.config.get("frames")) for name, header in zip(names, headers, strict=True)]
+    tasks = [
+        "+".join(sorted(header.config.get("tasks", {})))[:_LONGEST_TASKS] for header in headers
+    ]
+    keys = [
+        (name, header.suite, header.config.get("frames"))
+        for name, header in zip(names, headers, strict=True)
+    ]
     with_tasks = list(zip(keys, tasks, strict=True))
     for place, key in enumerate(keys):
         if keys.count(key) > 1:

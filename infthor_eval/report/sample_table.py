@@ -76,13 +76,23 @@ def sample_table(runs: Sequence[ReportRun]) -> Table:
 def _table_of(run: ReportRun) -> Table:
     import pyarrow
 
-    types = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_()}
+    types = {
+        str: pyarrow.string(),
+        int: pyarrow.int64(),
+        float: pyarrow.float64(),
+        bool: pyarrow.bool_(),
+    }
     name, suite = run.label, run.suite.name
-    run_columns = (SampleColumn("run", str, lambda _: name), SampleColumn("suite", str, lambda _: suite))
+    run_columns = (
+        SampleColumn("run", str, lambda _: name),
+        SampleColumn("suite", str, lambda _: suite),
+    )
     columns = (*run_columns, *ENVELOPE, *_score_columns(run), *run.presenter.columns)
     return pyarrow.table(
         {
-            column.name: pyarrow.array([column.value(record) for record in run.records], types[column.form])
+            column.name: pyarrow.array(
+                [column.value(record) for record in run.records], types[column.form]
+            )
             for column in columns
         }
     )
@@ -90,7 +100,9 @@ def _table_of(run: ReportRun) -> Table:
 
 def _score_columns(run: ReportRun) -> list[SampleColumn]:
     metrics = dict.fromkeys(metric for record in run.records for metric in run.suite.scores(record))
-    return [SampleColumn(f"score_{metric}", float, partial(_score, run, metric)) for metric in metrics]
+    return [
+        SampleColumn(f"score_{metric}", float, partial(_score, run, metric)) for metric in metrics
+    ]
 
 
 def _score(run: ReportRun, metric: str, record: UnitRecord[Any]) -> float | None:
@@ -120,6 +132,10 @@ def _with_safe_texts(table: Table) -> Table:
 
     for place, column in enumerate(table.columns):
         if pyarrow.types.is_string(column.type):
-            texts = [None if text is None else shield(printable(text)) for text in column.to_pylist()]
-            table = table.set_column(place, table.column_names[place], pyarrow.array(texts, pyarrow.string()))
+            texts = [
+                None if text is None else shield(printable(text)) for text in column.to_pylist()
+            ]
+            table = table.set_column(
+                place, table.column_names[place], pyarrow.array(texts, pyarrow.string())
+            )
     return table

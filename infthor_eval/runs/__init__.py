@@ -2,12 +2,17 @@
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.config_form import check_config
-from infthor_eval.runs.driver import Observer, RunOutcome, Silent, execute
-from infthor_eval.runs.estimate import Estimate, TaskEstimate, estimate_run
-from infthor_eval.runs.records import RecordTypes, RunHeader, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.journals.records import (
+    RecordTypes,
+    RunHeader,
+    Tokens,
+    Unit,
+    UnitKey,
+    UnitRecord,
+)
+from infthor_eval.runs.journals.shards import read_header, read_run
 from infthor_eval.runs.request import PreparedRun, RunRequest, prepare
-from infthor_eval.runs.shards import read_header, read_run
-from infthor_eval.runs.stored_command import StoredCommand, read_stored_command
+from infthor_eval.runs.stored.command import StoredCommand, read_stored_command
 from infthor_eval.runs.suite import (
     BoundEvaluation,
     Cost,
@@ -22,6 +27,8 @@ from infthor_eval.runs.suite import (
     Workload,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
+from infthor_eval.runs.work.driver import Observer, RunOutcome, Silent, execute
+from infthor_eval.runs.work.estimate import Estimate, TaskEstimate, estimate_run
 
 __all__ = [
     "NOTHING",

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
-from infthor_eval.formats.digests import canonical_json
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import PlainLoader, read_yaml
+from infthor_eval.storage.digests import canonical_json
+from infthor_eval.storage.packaged import packaged_folder
 
 __all__ = ["ENTRY_POINTS", "Catalog", "TaskFile"]
 
@@ -55,7 +55,9 @@ class TaskFile:
         """
         missing = [key for key in keys if key not in self.settings]
         if missing:
-            raise DataError(f"{self.path}: no {', '.join(missing)}; tasks of {self.suite} need {', '.join(keys)}")
+            raise DataError(
+                f"{self.path}: no {', '.join(missing)}; tasks of {self.suite} need {', '.join(keys)}"
+            )
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,11 @@ class Catalog:
     @cached_property
     def groups(self) -> dict[str, list[str]]:
         """All groups by name, with the names of their tasks."""
-        return {name: settings["task"] for name, (_, settings) in self._entries.items() if "group" in settings}
+        return {
+            name: settings["task"]
+            for name, (_, settings) in self._entries.items()
+            if "group" in settings
+        }
 
     def expand(self, names: Sequence[str]) -> list[TaskFile]:
         """Return the single tasks behind names of tasks and groups, each once, in the order given.
@@ -118,8 +124,12 @@ class Catalog:
         members: list[TaskFile] = []
         for name in self.groups[group]:
             if name in inside:
-                raise DataError(f"{self._entries[group][0]}: the group {name} is in itself; take it out")
-            members += self._members(name, (*inside, name)) if name in self.groups else self.expand([name])
+                raise DataError(
+                    f"{self._entries[group][0]}: the group {name} is in itself; take it out"
+                )
+            members += (
+                self._members(name, (*inside, name)) if name in self.groups else self.expand([name])
+            )
         return members
 
     @cached_property
@@ -128,22 +138,32 @@ class Catalog:
         reader = _Reader(self._shared)
         for path in self._files():
             settings = reader.settings(path)
-            with wrap_errors(f"{path}: holds what JSON cannot", _HINT, catch=(TypeError, ValueError)):
+            with wrap_errors(
+                f"{path}: holds what JSON cannot", _HINT, catch=(TypeError, ValueError)
+            ):
                 canonical_json(settings)  # a part of the run's config
             name = settings.get("group") or settings.get("task")
             if not isinstance(name, str):
-                raise DataError(f"{path}: neither a task nor a group name; a task file has a key 'task' or 'group'")
+                raise DataError(
+                    f"{path}: neither a task nor a group name; a task file has a key 'task' or 'group'"
+                )
             if name in entries:
-                raise DataError(f"{path}: {name!r} is the name of another task file too; rename one")
+                raise DataError(
+                    f"{path}: {name!r} is the name of another task file too; rename one"
+                )
             names = settings.get("task")
-            if "group" in settings and not (isinstance(names, list) and all(isinstance(task, str) for task in names)):
+            if "group" in settings and not (
+                isinstance(names, list) and all(isinstance(task, str) for task in names)
+            ):
                 raise DataError(f"{path}: 'task' of a group must be a list of task names")
             entries[name] = path, settings
         return entries
 
     def _files(self) -> Iterator[Path]:
         for folder in (self.folder, *self.more):
-            yield from (path for path in sorted(folder.rglob("*.yaml")) if not path.name.startswith("_"))
+            yield from (
+                path for path in sorted(folder.rglob("*.yaml")) if not path.name.startswith("_")
+            )
 
     @cached_property
     def _shared(self) -> dict[str, Path]:
@@ -167,11 +187,17 @@ def _folder_of(point: EntryPoint) -> Path:
 def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
     metadata = settings.get("metadata")
     if not isinstance(metadata, Mapping) or not isinstance(metadata.get("suite"), str):
-        raise DataError(f"{path}: no suite; write it as metadata: {{suite: NAME}} (NIEH tasks include _nieh.yaml)")
+        raise DataError(
+            f"{path}: no suite; write it as metadata: {{suite: NAME}} (NIEH tasks include _nieh.yaml)"
+        )
     # The description changes no number, so it is no part of the settings, which the run's hash depends on.
     others = {key: value for key, value in metadata.items() if key != "description"}
     return TaskFile(
-        name, metadata["suite"], path, {**settings, "metadata": others}, str(metadata.get("description", ""))
+        name,
+        metadata["suite"],
+        path,
+        {**settings, "metadata": others},
+        str(metadata.get("description", "")),
     )
 
 
@@ -195,7 +221,11 @@ class _Reader:
             raise DataError(f"{path}: include is {included!r:.60}, not the name of a file; {_HINT}")
         beside = path.parent / included
         # ValueError: a null character in the name
-        with wrap_errors(f"{path}: include is {included!r:.60}, no name of a file", _HINT, catch=(OSError, ValueError)):
+        with wrap_errors(
+            f"{path}: include is {included!r:.60}, no name of a file",
+            _HINT,
+            catch=(OSError, ValueError),
+        ):
             other = (beside if beside.exists() else self._shared.get(included, beside)).resolve()
         if other in (*including, path.resolve()):
             raise DataError(f"{path}: includes {included}, which includes it; {_HINT}")

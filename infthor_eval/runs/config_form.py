@@ -7,7 +7,7 @@ anything is summed up, the part of it that its summary and tables read.
 import msgspec
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.runs.records import RunHeader
+from infthor_eval.runs.journals.records import RunHeader
 
 __all__ = ["check_config"]
 
@@ -18,6 +18,9 @@ def check_config(header: RunHeader, form: type[msgspec.Struct]) -> None:
     Raises:
         DataError: names the run, and the place in its config.
     """
-    problem, hint = f"{header.name}: not the config of a run of {header.suite}", "run the evaluation again"
+    problem, hint = (
+        f"{header.name}: not the config of a run of {header.suite}",
+        "run the evaluation again",
+    )
     with wrap_errors(problem, hint, catch=msgspec.ValidationError):
         msgspec.convert(header.config, form)

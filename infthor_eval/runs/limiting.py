@@ -23,9 +23,20 @@ def spread(items: Sequence[T], cluster_of: Callable[[T], str], seed: int) -> lis
     for cluster in clusters:  # each with its own seed: a further trajectory changes no other
         random.Random(f"{seed} {cluster}").shuffle(places[cluster])
     longest = max(map(len, places.values()), default=0)
-    return [places[cluster][turn] for turn in range(longest) for cluster in clusters if turn < len(places[cluster])]
+    return [
+        places[cluster][turn]
+        for turn in range(longest)
+        for cluster in clusters
+        if turn < len(places[cluster])
+    ]
 
 
-def limit_items(items: Sequence[T], cluster_of: Callable[[T], str], seed: int, limit: int | None) -> list[T]:
+def limit_items(
+    items: Sequence[T], cluster_of: Callable[[T], str], seed: int, limit: int | None
+) -> list[T]:
     """Return the items that a limit selects, in their order; all items without a limit."""
-    return [items[place] for place in sorted(spread(items, cluster_of, seed)[:limit])] if limit else list(items)
+    return (
+        [items[place] for place in sorted(spread(items, cluster_of, seed)[:limit])]
+        if limit
+        else list(items)
+    )

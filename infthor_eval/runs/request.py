@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any, Generic
 
 from infthor_eval.errors import UsageError, unknown_name
-from infthor_eval.formats.digests import fingerprint
-from infthor_eval.formats.files import require_writable
-from infthor_eval.runs.records import P, RunHeader, U
+from infthor_eval.runs.journals.records import P, RunHeader, U
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
+from infthor_eval.storage.digests import fingerprint
+from infthor_eval.storage.files import require_writable
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
 
@@ -80,8 +80,12 @@ def prepare(request: RunRequest, suite: Suite[U, P]) -> PreparedRun[U, P]:
     if request.model not in suite.baselines and not is_known(request.model):
         raise unknown_name("model", request.model, [*suite.baselines, *names()])
     if request.model not in suite.baselines:
-        check_options(request.model, request.model_options)  # before the data are read, which may take minutes
+        check_options(
+            request.model, request.model_options
+        )  # before the data are read, which may take minutes
     elif request.model_options:
-        raise UsageError(f"{request.model} has no option {next(iter(request.model_options))}, nor any other")
+        raise UsageError(
+            f"{request.model} has no option {next(iter(request.model_options))}, nor any other"
+        )
     require_writable(request.output / request.label, "--output")
     return PreparedRun(request, suite, suite.prepare(request.tasks))

@@ -9,10 +9,10 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.formats.files import write_atomically
-from infthor_eval.runs.records import UnitRecord
+from infthor_eval.runs.journals.records import UnitRecord
 from infthor_eval.runs.suite import RunSummary, Suite
 from infthor_eval.runs.usage import Usage
+from infthor_eval.storage.files import write_atomically
 
 __all__ = [
     "RESULTS",
@@ -29,7 +29,9 @@ _SCORES = "scores.jsonl"
 _USAGE = "usage.json"
 
 
-def results_document(run: RunSummary, suite: Suite[Any, Any], n_missing: int | None, usage: Usage) -> dict[str, Any]:
+def results_document(
+    run: RunSummary, suite: Suite[Any, Any], n_missing: int | None, usage: Usage
+) -> dict[str, Any]:
     """Return the contents of `results.json`, see docs/formats.md; `n_missing` is None if it is not known."""
     header = run.header
     return {

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import infthor_eval
-from infthor_eval.runs.records import P, RunHeader, U
+from infthor_eval.runs.journals.records import P, RunHeader, U
 from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Workload
 from model_adapters import Subject, adapter_identity
@@ -20,7 +20,9 @@ def header_of(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -
     tasks = request.tasks
     ours = {"suite_code": dict(request.suite_code)} if request.suite_code else {}
     model = {"name": subject.name, **subject.identity()}
-    config = run_config(suite.name, model, code, {**ours, **workload.config}, tasks.limit, tasks.seed)
+    config = run_config(
+        suite.name, model, code, {**ours, **workload.config}, tasks.limit, tasks.seed
+    )
     return RunHeader(suite=suite.name, name=request.label, config=config, n_units=workload.n_units)
 
 

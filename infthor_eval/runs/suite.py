@@ -19,7 +19,16 @@ import msgspec
 
 from infthor_eval.rates import Rate
 from infthor_eval.runs.catalog import TaskFile
-from infthor_eval.runs.records import A, P, RecordTypes, RunHeader, U, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.journals.records import (
+    A,
+    P,
+    RecordTypes,
+    RunHeader,
+    U,
+    Unit,
+    UnitKey,
+    UnitRecord,
+)
 from infthor_eval.runs.usage import NOTHING, Usage
 from infthor_eval.tables import Table
 from model_adapters import Subject

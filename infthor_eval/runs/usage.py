@@ -34,7 +34,13 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
     def of(cls, replies: Iterable[Reply]) -> "Usage":
         """Return the usage of replies."""
         return cls.total(
-            cls(1, reply.n_context_tokens or 0, reply.n_cached_tokens or 0, reply.n_reply_tokens or 0, reply.cost)
+            cls(
+                1,
+                reply.n_context_tokens or 0,
+                reply.n_cached_tokens or 0,
+                reply.n_reply_tokens or 0,
+                reply.cost,
+            )
             for reply in replies
         )
 

@@ -82,12 +82,17 @@ def parse_action(text: str) -> ActionText:
         raise UngroundedError(Misuse.NO_ACTION, f"unknown action '{action}'")
     n_names = 0 if action in _PLAIN else 2 if action == "PutObject" else 1
     if len(names) != n_names:
-        raise UngroundedError(Misuse.NO_ACTION, f"{action} takes {n_names} object types, got {len(names)}")
+        raise UngroundedError(
+            Misuse.NO_ACTION, f"{action} takes {n_names} object types, got {len(names)}"
+        )
     return ActionText(action, tuple(names))
 
 
 def text_of(
-    action: str, object_id: str | None = None, receptacle_id: str | None = None, words: Words = Words.NATURAL
+    action: str,
+    object_id: str | None = None,
+    receptacle_id: str | None = None,
+    words: Words = Words.NATURAL,
 ) -> ActionText:
     """Return the text of a call; the object of PutObject is the one that is put into the receptacle."""
     ids = [item for item in (object_id, receptacle_id) if item is not None]
@@ -125,7 +130,9 @@ def ground(
     for name in text.names:
         if name not in known:
             raise UngroundedError(Misuse.UNKNOWN_OBJECT, f"{text}: {name}: none in this scene")
-    if text.action == "PutObject" and not any(text.names[0] in named.get(key, ()) for key in view.inventory):
+    if text.action == "PutObject" and not any(
+        text.names[0] in named.get(key, ()) for key in view.inventory
+    ):
         raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: no {text.names[0]} in the hand")
     meant = [item for key, item in view.objects.items() if text.names[-1] in named[key]]
     return {"action": text.action, "objectId": _choose_object(text, meant, preferred).object_id}
@@ -139,7 +146,9 @@ def applicable_actions(view: SimulatorView, words: Words = Words.NATURAL) -> lis
 def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
     """Return all calls possible now, in a fixed order: each action with each visible object, looks by `degrees`."""
     calls = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]
-    visible = sorted((item.object_type, item.object_id) for item in view.objects.values() if item.visible)
+    visible = sorted(
+        (item.object_type, item.object_id) for item in view.objects.values() if item.visible
+    )
     for action, applies in _APPLIES.items():
         if action == "PutObject" and not view.inventory:
             continue
@@ -148,7 +157,9 @@ def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> lis
     return calls
 
 
-def text_of_call(call: Mapping[str, Any], view: SimulatorView, words: Words = Words.NATURAL) -> ActionText:
+def text_of_call(
+    call: Mapping[str, Any], view: SimulatorView, words: Words = Words.NATURAL
+) -> ActionText:
     """Return the text of a call in a state; the object of PutObject is the held one."""
     if call["action"] == "Pass":
         return ActionText("NoOp")
@@ -163,7 +174,9 @@ def _names_of(item: ThorObject, words: Words) -> set[str]:
     return {words.name_of(item.object_id), item.object_type}
 
 
-def _choose_object(text: ActionText, meant: Sequence[ThorObject], preferred: Container[str]) -> ThorObject:
+def _choose_object(
+    text: ActionText, meant: Sequence[ThorObject], preferred: Container[str]
+) -> ThorObject:
     """Return the object of a text among those that its last name can mean."""
     name, applies = text.names[-1], _APPLIES[text.action]
     visible = [item for item in meant if item.visible]
@@ -171,5 +184,9 @@ def _choose_object(text: ActionText, meant: Sequence[ThorObject], preferred: Con
     if not visible:
         raise UngroundedError(Misuse.NOT_IN_VIEW, f"{text}: {name}: none in sight")
     if not possible:
-        raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: {name}: none of those in sight allows it")
-    return min(possible, key=lambda item: (item.object_id not in preferred, item.distance, item.object_id))
+        raise UngroundedError(
+            Misuse.NOT_POSSIBLE, f"{text}: {name}: none of those in sight allows it"
+        )
+    return min(
+        possible, key=lambda item: (item.object_id not in preferred, item.distance, item.object_id)
+    )

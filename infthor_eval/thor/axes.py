@@ -40,4 +40,7 @@ def _angles(matrix: NDArray[np.float64]) -> dict[str, float]:
         y, z = math.atan2(-matrix[2, 0], matrix[0, 0]), 0.0
     else:
         y, z = math.atan2(matrix[0, 2], matrix[2, 2]), math.atan2(matrix[1, 0], matrix[1, 1])
-    return {axis: round(math.degrees(angle) % 360, 6) for axis, angle in zip("xyz", (x, y, z), strict=True)}
+    return {
+        axis: round(math.degrees(angle) % 360, 6)
+        for axis, angle in zip("xyz", (x, y, z), strict=True)
+    }

@@ -6,7 +6,7 @@ from typing import Any
 import ai2thor.controller
 
 from infthor_eval.errors import SceneError, SimulatorError
-from infthor_eval.formats.scratch import ScratchFolder
+from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.launch import Launch
 from infthor_eval.thor.transport import PeerFault, SafeFifoServer
 
@@ -50,12 +50,16 @@ class SafeController(ai2thor.controller.Controller):
         except OSError as error:
             self.stop()
             what = launch.executable or "AI2-THOR's own build"
-            raise SimulatorError(f"{what}: cannot be started ({error}); check the command, or the network") from error
+            raise SimulatorError(
+                f"{what}: cannot be started ({error}); check the command, or the network"
+            ) from error
         except (RuntimeError, ValueError) as error:
             # ai2thor raises the same classes for a scene and for a build that does not exist.
             self.stop()
             message = " ".join(str(error).split())[:300]
-            if "no build exists" in message:  # its message also if the download server cannot be reached
+            if (
+                "no build exists" in message
+            ):  # its message also if the download server cannot be reached
                 raise SimulatorError(
                     "AI2-THOR's Unity build is not installed and cannot be downloaded; go online once, "
                     "or name an executable"
@@ -106,18 +110,24 @@ class SafeController(ai2thor.controller.Controller):
     def unity_command(self, width: int, height: int, headless: bool) -> list[str]:
         """Return the command line of the simulator."""
         if self._folder is not None:
-            self.gpu_device = None  # for a GPU number ai2thor would run vulkaninfo, which many machines lack
+            self.gpu_device = (
+                None  # for a GPU number ai2thor would run vulkaninfo, which many machines lack
+            )
         return super().unity_command(width, height, headless)
 
     def _build_server(self, host: str, port: int, width: int, height: int) -> None:
         if self.server is None:
-            self.server = SafeFifoServer(width, height, self.server_timeout, self.depth_format, self.add_depth_noise)
+            self.server = SafeFifoServer(
+                width, height, self.server_timeout, self.depth_format, self.add_depth_noise
+            )
 
     def _with_log(self, fault: PeerFault) -> PeerFault:
         """Stop the simulator and return the fault with the last line of its log."""
         line = self._last_log_line()
         self.stop()
-        return PeerFault(fault.fault_type, f"{fault}; its log ends with: {line}" if line else str(fault))
+        return PeerFault(
+            fault.fault_type, f"{fault}; its log ends with: {line}" if line else str(fault)
+        )
 
     def _last_log_line(self) -> str:
         log = Path(self.log_dir) / "unity.log"

@@ -30,7 +30,9 @@ class Grounding:
 
     def __init__(self, view: SimulatorView) -> None:
         """Store the positions of all objects at the start of the episode, after the scene was restored."""
-        self._initial_positions = {key: astuple(item.position) for key, item in view.objects.items()}
+        self._initial_positions = {
+            key: astuple(item.position) for key, item in view.objects.items()
+        }
         self._chosen: dict[str, str] = {}
         self.distances: dict[str, float] = {}
 
@@ -63,5 +65,8 @@ class Grounding:
         if target is None:
             return 0.0
         # The id has the position at which the scene file has the object; restoring the scene may have moved it.
-        positions = [self._initial_positions.get(item.object_id, astuple(item.position)), id_position(item.object_id)]
+        positions = [
+            self._initial_positions.get(item.object_id, astuple(item.position)),
+            id_position(item.object_id),
+        ]
         return min(math.dist(target, position) for position in positions if position is not None)

@@ -5,7 +5,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from infthor_eval.formats.limits import ACTION_SECONDS, UNITY_ACTION_SECONDS
+from infthor_eval.storage.limits import ACTION_SECONDS, UNITY_ACTION_SECONDS
 
 __all__ = ["Launch", "embedded_launch", "unity_launch"]
 
@@ -46,7 +46,7 @@ def embedded_launch(
     Raises:
         UsageError: the time limit of an action, `limits.ACTION_SECONDS`, is set to no number.
     """
-    words = [sys.executable, "-m", "infthor_eval.sim"]
+    words = [sys.executable, "-m", "infthor_sim"]
     if data is not None:
         words += ["--data", str(Path(data).resolve())]
     if supplement is not None:

@@ -77,7 +77,9 @@ class Recorder:
     @staticmethod
     def _save(view: SimulatorView, path: Path) -> None:
         if view.frame is None:
-            raise SimulatorError(f"{path.name}: the simulator sent no frame; start it with rendering on")
+            raise SimulatorError(
+                f"{path.name}: the simulator sent no frame; start it with rendering on"
+            )
         Image.fromarray(view.frame).save(path, compress_level=_PNG_LEVEL)
 
 
@@ -123,7 +125,11 @@ def _types(items: list[ThorObject]) -> list[str]:
 def _pose(view: SimulatorView) -> LoggedPose:
     at = view.agent.position
     return LoggedPose(
-        round(at.x, 4), round(at.y, 4), round(at.z, 4), round(view.agent.rotation, 2), round(view.agent.horizon, 2)
+        round(at.x, 4),
+        round(at.y, 4),
+        round(at.z, 4),
+        round(view.agent.rotation, 2),
+        round(view.agent.horizon, 2),
     )
 
 

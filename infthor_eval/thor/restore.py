@@ -56,15 +56,23 @@ def restore(simulator: Simulator, scene: Scene) -> RestoreReport:
 def _state_calls(scene: Scene) -> list[dict[str, Any]]:
     calls: list[dict[str, Any]] = []
     if scene.object_toggles:
-        toggles = [{"objectType": item.object_type, "isOn": item.is_on} for item in scene.object_toggles]
+        toggles = [
+            {"objectType": item.object_type, "isOn": item.is_on} for item in scene.object_toggles
+        ]
         calls.append({"action": "SetObjectToggles", "objectToggles": toggles})
     if scene.dirty_and_empty:
-        calls.append({"action": "SetStateOfAllObjects", "StateChange": "CanBeDirty", "forceAction": True})
-        calls.append({"action": "SetStateOfAllObjects", "StateChange": "CanBeFilled", "forceAction": False})
+        calls.append(
+            {"action": "SetStateOfAllObjects", "StateChange": "CanBeDirty", "forceAction": True}
+        )
+        calls.append(
+            {"action": "SetStateOfAllObjects", "StateChange": "CanBeFilled", "forceAction": False}
+        )
     return calls
 
 
-def _poses(recorded: list[ObjectPose], view: SimulatorView) -> tuple[list[dict[str, Any]], list[str]]:
+def _poses(
+    recorded: list[ObjectPose], view: SimulatorView
+) -> tuple[list[dict[str, Any]], list[str]]:
     """Return the poses with this scene's object names, and the recorded names without an object."""
     known = {item.name for item in view.objects.values()}
     spare = defaultdict(list)
@@ -85,7 +93,11 @@ def _poses(recorded: list[ObjectPose], view: SimulatorView) -> tuple[list[dict[s
             dropped.append(name)
         else:
             # An unknown name is of another AI2-THOR version, so its object may have other axes too.
-            turned = modern_rotation(_type_of(name, spare), pose.rotation) if name in renamed else pose.rotation
+            turned = (
+                modern_rotation(_type_of(name, spare), pose.rotation)
+                if name in renamed
+                else pose.rotation
+            )
             poses.append({"objectName": target, "position": pose.position, "rotation": turned})
     return poses, dropped
 

@@ -66,7 +66,9 @@ def _promising_headings(view: SimulatorView, place: Vector) -> list[float]:
 
 def _n_before(view: SimulatorView, place: Vector, heading: float) -> int:
     """Return the number of objects in the field of view, walls aside."""
-    offsets = [(item.position.x - place.x, item.position.z - place.z) for item in view.objects.values()]
+    offsets = [
+        (item.position.x - place.x, item.position.z - place.z) for item in view.objects.values()
+    ]
     return sum(
         math.hypot(dx, dz) >= _NEAREST
         and abs((math.degrees(math.atan2(dx, dz)) - heading + 180) % 360 - 180) <= _HALF_FIELD
@@ -80,4 +82,6 @@ def _score(simulator: Simulator, pose: AgentPose, n_pixels: int) -> float:
     if not view.success or not view.instances:
         return -1.0
     shares = [instance.pixels / n_pixels for instance in view.instances.values()]
-    return sum(share >= _SEEN for share in shares) - _HIDDEN * sum(max(0.0, share - _LARGEST) for share in shares)
+    return sum(share >= _SEEN for share in shares) - _HIDDEN * sum(
+        max(0.0, share - _LARGEST) for share in shares
+    )

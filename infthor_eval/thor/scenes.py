@@ -24,8 +24,13 @@ def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8],
     """
     first = simulator.reset(scene).frame
     if first is None:
-        raise SimulatorError(f"scene {scene}: the simulator sends no frames; start it with rendering")
-    places = [msgspec.convert(place, Vector) for place in _query(simulator, "GetReachablePositions").result]
+        raise SimulatorError(
+            f"scene {scene}: the simulator sends no frames; start it with rendering"
+        )
+    places = [
+        msgspec.convert(place, Vector)
+        for place in _query(simulator, "GetReachablePositions").result
+    ]
     pose = find_room_view(simulator, places, first.shape[0] * first.shape[1])
     room = simulator.query(**teleport_call(pose)).frame
     above = _query(simulator, "ToggleMapView").frame
@@ -47,7 +52,9 @@ def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool =
     simulator.reset(scene)
     objects = simulator.metadata["objects"]
     reachable = _query(simulator, "GetReachablePositions").result
-    write_floor_plan(folder, scene, objects, [(place["x"], place["z"]) for place in reachable], overwrite)
+    write_floor_plan(
+        folder, scene, objects, [(place["x"], place["z"]) for place in reachable], overwrite
+    )
     return len(objects)
 
 

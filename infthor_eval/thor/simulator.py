@@ -22,8 +22,21 @@ __all__ = ["Simulator", "SimulatorMark"]
 _CallResult = tuple[dict[str, Any], bool]  # a call, and whether it succeeded
 _LOG = logging.getLogger(__name__)
 _INITIAL = {"gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5, "snapToGrid": True}
-_NO_RENDERING = {"renderImage": False, "renderInstanceSegmentation": False, "renderDepthImage": False}
-_WALKING = {"MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
+_NO_RENDERING = {
+    "renderImage": False,
+    "renderInstanceSegmentation": False,
+    "renderDepthImage": False,
+}
+_WALKING = {
+    "MoveAhead",
+    "MoveBack",
+    "MoveLeft",
+    "MoveRight",
+    "RotateLeft",
+    "RotateRight",
+    "LookUp",
+    "LookDown",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +99,10 @@ class Simulator:
         return self
 
     def __exit__(
-        self, error_type: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        error_type: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -268,7 +284,11 @@ class Simulator:
         self.close()
         self._failures += 1
         if self._failures > self._max_restarts:
-            hint = f"; {self._launch.timeout_hint}" if fault.fault_type == "hung" and self._launch.timeout_hint else ""
+            hint = (
+                f"; {self._launch.timeout_hint}"
+                if fault.fault_type == "hung" and self._launch.timeout_hint
+                else ""
+            )
             message = f"{fault} (failure {self._failures} since the last mark, giving up){hint}"
             raise SimulatorError(message) from fault
         self.restarts += 1

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import msgspec
 
-from infthor_eval.formats.scratch import ScratchFolder
 from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.thor.recorded import degrees_of
 
 __all__ = ["agent_path", "supplement_file", "write_supplement"]
@@ -43,7 +43,11 @@ def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
         plan.cells.update(agent_path(trajectory))
         plan.objects.update(_fixed_objects(trajectory))
     document = {
-        name: {"cells": sorted(plan.cells), "floor_y": plan.floor_y, "objects": sorted(plan.objects)}
+        name: {
+            "cells": sorted(plan.cells),
+            "floor_y": plan.floor_y,
+            "objects": sorted(plan.objects),
+        }
         for name, plan in sorted(plans.items())
     }
     path.write_bytes(msgspec.json.encode(document))

@@ -31,7 +31,9 @@ class _State(NamedTuple):
 
 _STATES = (
     _State(lambda item: item.is_broken, {"action": "BreakObject"}, {}),
-    _State(lambda item: item.is_toggled, {"action": "ToggleObjectOn"}, {"action": "ToggleObjectOff"}),
+    _State(
+        lambda item: item.is_toggled, {"action": "ToggleObjectOn"}, {"action": "ToggleObjectOff"}
+    ),
     _State(lambda item: item.is_dirty, {"action": "DirtyObject"}, {"action": "CleanObject"}),
     _State(lambda item: item.is_cooked, {"action": "CookObject"}, {}),
     _State(
@@ -53,7 +55,9 @@ def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
     Raises:
         SimulatorError: the simulator fails.
     """
-    for key in _objects_to_slice(simulator.view, target):  # first, so that the slices exist when objects are moved
+    for key in _objects_to_slice(
+        simulator.view, target
+    ):  # first, so that the slices exist when objects are moved
         simulator.step("SliceObject", objectId=key, forceAction=True)
     for call in _door_calls(simulator.view, target):
         simulator.step(**call)
@@ -71,7 +75,11 @@ def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
 def _objects_to_slice(current: SimulatorView, target: SimulatorView) -> list[str]:
     # By the ids of new slices: the embedded simulator no longer reports the sliced object itself.
     sliced = {key.rpartition("|")[0] for key in target.objects.keys() - current.objects.keys()}
-    return [key for key, item in current.objects.items() if key in sliced and item.sliceable and not item.is_sliced]
+    return [
+        key
+        for key, item in current.objects.items()
+        if key in sliced and item.sliceable and not item.is_sliced
+    ]
 
 
 def _set_state(simulator: Simulator, target: SimulatorView, state: _State) -> None:
@@ -87,19 +95,30 @@ def _door_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[
         item = current.objects.get(key)
         if item is None or not goal.openable or item.openness == goal.openness:
             continue
-        if item.is_toggled and goal.is_open:  # a running appliance cannot be opened; `_STATES` switches it on again
+        if (
+            item.is_toggled and goal.is_open
+        ):  # a running appliance cannot be opened; `_STATES` switches it on again
             yield {"action": "ToggleObjectOff", "objectId": key, "forceAction": True}
         if item.is_open:  # AI2-THOR changes `openness` only of closed objects
             yield {"action": "CloseObject", "objectId": key, "forceAction": True}
         if goal.is_open:
-            yield {"action": "OpenObject", "objectId": key, "openness": goal.openness, "forceAction": True}
+            yield {
+                "action": "OpenObject",
+                "objectId": key,
+                "openness": goal.openness,
+                "forceAction": True,
+            }
 
 
 def _move_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[str, Any]]:
     # Receptacles before their contents, which move along with them.
     for key, goal in sorted(target.objects.items(), key=lambda pair: not pair[1].receptacle):
         item = current.objects.get(key)
-        if item is None or not goal.pickupable or (_is_at(item, goal) and _is_turned_like(item, goal)):
+        if (
+            item is None
+            or not goal.pickupable
+            or (_is_at(item, goal) and _is_turned_like(item, goal))
+        ):
             continue
         yield {
             "action": "TeleportObject",

@@ -211,7 +211,10 @@ def view_of(event: Any) -> SimulatorView:
         agent = _pose(metadata["agent"])
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)
         # The inventory of arm agents is always empty; what they hold is in the arm's state.
-        in_hand = [item.object_id for item in msgspec.convert(metadata["inventoryObjects"], list[_InHand] | None) or ()]
+        in_hand = [
+            item.object_id
+            for item in msgspec.convert(metadata["inventoryObjects"], list[_InHand] | None) or ()
+        ]
         outcome = msgspec.convert(metadata, _Outcome)
     except (ValueError, KeyError, TypeError) as error:  # msgspec's errors are ValueErrors
         raise SimulatorError(
@@ -273,4 +276,8 @@ def _instances(event: Any) -> dict[str, Instance] | None:
     instances = instances_of(pixels[..., 0] << 16 | pixels[..., 1] << 8 | pixels[..., 2])
     names = {r << 16 | g << 8 | b: name for (r, g, b), name in event.color_to_object_id.items()}
     # A name without "|" is a class of the structure (walls, floor), not an object.
-    return {names[code]: instance for code, instance in instances.items() if code in names and "|" in names[code]}
+    return {
+        names[code]: instance
+        for code, instance in instances.items()
+        if code in names and "|" in names[code]
+    }

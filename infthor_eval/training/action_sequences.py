@@ -11,11 +11,11 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import Step
 from infthor_eval.formats.trajectory import Trajectory
-from infthor_eval.plans.habits import expert_texts
+from infthor_eval.plans.actors.habits import expert_texts
+from infthor_eval.plans.history.segments import PlanSegment, restart_at, segment_parts
 from infthor_eval.plans.plan import plans_of, tasks_of
-from infthor_eval.plans.segments import PlanSegment, restart_at, segment_parts
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
-from model_adapters.hf.prompt import n_tokens
+from model_adapters.hf.prompting.prompt import n_tokens
 
 __all__ = ["recorded_segments", "single_plans", "windows"]
 
@@ -44,16 +44,27 @@ def recorded_segments(
         else:
             after[step.step] = frame
     if before is None:
-        raise DataError(f"trajectory {trajectory.traj_id}: no frame before the first action; replay it again")
+        raise DataError(
+            f"trajectory {trajectory.traj_id}: no frame before the first action; replay it again"
+        )
     segments: list[PlanSegment] = []
     for plan in plans:
         missing = next((number for number in range(*plan.low) if number not in after), None)
         if missing is not None:
-            raise DataError(f"trajectory {trajectory.traj_id}: no frame of action {missing}; replay it again")
+            raise DataError(
+                f"trajectory {trajectory.traj_id}: no frame of action {missing}; replay it again"
+            )
         begins = not segments or plans[plan.index - 1].task != plan.task
         goal = tasks[plan.task].text if begins else None
-        texts, shown = expert_texts(trajectory, plan, words), [after[number] for number in range(*plan.low)]
-        segments.append(PlanSegment(plan.text, goal, before, tuple(zip(texts, shown, strict=True)), plan.in_task))
+        texts, shown = (
+            expert_texts(trajectory, plan, words),
+            [after[number] for number in range(*plan.low)],
+        )
+        segments.append(
+            PlanSegment(
+                plan.text, goal, before, tuple(zip(texts, shown, strict=True)), plan.in_task
+            )
+        )
         before = segments[-1].steps[-1][1]
     return segments
 
@@ -85,7 +96,9 @@ def windows(
         first = end
 
 
-def single_plans(encoder: Encoder, name: str, segments: Sequence[PlanSegment]) -> Iterator[TrainingSequence]:
+def single_plans(
+    encoder: Encoder, name: str, segments: Sequence[PlanSegment]
+) -> Iterator[TrainingSequence]:
     """Cut a history into sequences of one plan each, with its goal and the frame that it begins with.
 
     Raises:
@@ -94,7 +107,9 @@ def single_plans(encoder: Encoder, name: str, segments: Sequence[PlanSegment]) -
     """
     for number, segment in enumerate(segments):
         if segment.steps:
-            yield encoder.actions(f"{name}, plan {number + 1}", restart_at(segments, number, number + 1))
+            yield encoder.actions(
+                f"{name}, plan {number + 1}", restart_at(segments, number, number + 1)
+            )
 
 
 def _window_end(encoder: Encoder, segments: Sequence[PlanSegment], first: int, limit: int) -> int:

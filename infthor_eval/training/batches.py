@@ -9,7 +9,7 @@ from torch.nn.utils.rnn import pad_sequence
 from infthor_eval.errors import DataError
 from infthor_eval.training.encoding import TrainingSequence
 from model_adapters.hf.family import Family
-from model_adapters.hf.prompt import Frame, token_ids
+from model_adapters.hf.prompting.prompt import Frame, token_ids
 
 __all__ = ["IGNORED", "Batch", "collate", "n_labels"]
 
@@ -51,7 +51,9 @@ def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) 
         position_ids=_positions(sequences, ids, family),
         attention_mask=None if bool(masks.all()) else masks,
         labels=pad_sequence(labels, batch_first=True, padding_value=IGNORED),
-        slots=pad_sequence([_slots(sequence, family.slot_id) for sequence in sequences], batch_first=True),
+        slots=pad_sequence(
+            [_slots(sequence, family.slot_id) for sequence in sequences], batch_first=True
+        ),
         frames=[frame for sequence in sequences for frame in sequence.frames],
     )
 
@@ -72,18 +74,24 @@ def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
     return ids.where(mask, IGNORED)
 
 
-def _positions(sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family) -> torch.Tensor:
+def _positions(
+    sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family
+) -> torch.Tensor:
     """Return the positions of whole sequences, each from 0; padding has position 0, which never lengthens RoPE."""
     rows = [
         family.positions(own, [frame.size for frame in sequence.frames], 0)
         for sequence, own in zip(sequences, ids, strict=True)
     ]
     longest = max(len(own) for own in ids)
-    return torch.cat([torch.nn.functional.pad(row, (0, longest - row.shape[-1])) for row in rows], dim=-2)
+    return torch.cat(
+        [torch.nn.functional.pad(row, (0, longest - row.shape[-1])) for row in rows], dim=-2
+    )
 
 
 def _slots(sequence: TrainingSequence, slot_id: int) -> torch.Tensor:
     slots: list[bool] = []
     for piece in sequence.pieces:
-        slots.extend([False] if isinstance(piece, int) else [token == slot_id for token in piece.ids])
+        slots.extend(
+            [False] if isinstance(piece, int) else [token == slot_id for token in piece.ids]
+        )
     return torch.tensor(slots)

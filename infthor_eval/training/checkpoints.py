@@ -11,7 +11,7 @@ import torch
 from safetensors.torch import load_model, save_model
 
 from infthor_eval.errors import UsageError, wrap_errors
-from infthor_eval.formats.files import prepare_folder, write_atomically
+from infthor_eval.storage.files import prepare_folder, write_atomically
 
 __all__ = ["Checkpoints"]
 
@@ -41,7 +41,9 @@ class Checkpoints:
         """
         place = prepare_folder(self.folder) / f"step-{step:06d}"
         with (
-            wrap_errors(f"{place}: cannot be written", "free some space; the last checkpoint is still there"),
+            wrap_errors(
+                f"{place}: cannot be written", "free some space; the last checkpoint is still there"
+            ),
             write_atomically(place) as folder,
         ):
             folder.mkdir()
@@ -71,7 +73,9 @@ class Checkpoints:
         with wrap_errors(f"{last}: cannot be read", _HINT, catch=Exception):
             load_model(model, last / _WEIGHTS)
             device = next(model.parameters()).device
-            optimizer.load_state_dict(torch.load(last / _OPTIMIZER, map_location=device, weights_only=True))
+            optimizer.load_state_dict(
+                torch.load(last / _OPTIMIZER, map_location=device, weights_only=True)
+            )
         return step
 
     def _places(self) -> list[Path]:

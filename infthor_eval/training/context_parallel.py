@@ -22,7 +22,7 @@ from transformers.modeling_utils import ALL_ATTENTION_FUNCTIONS
 from infthor_eval.errors import ModelError
 from infthor_eval.training.batches import IGNORED, Batch
 from infthor_eval.training.network import SequenceModel, next_labels
-from model_adapters.hf.prompt import Frame
+from model_adapters.hf.prompting.prompt import Frame
 
 __all__ = ["ContextParallel", "SequenceSplit", "causal_attention", "context_parallel"]
 
@@ -110,7 +110,9 @@ class ContextParallel:
         sizes = [[self._model.n_slots(frame) for frame in share] for share in shares]
         own = self._own_features(shares[self._rank], max(map(sum, sizes)))
         by_frame: dict[Frame, Tensor] = {}
-        for share, lengths, features in zip(shares, sizes, _GatherStacked.apply(own, self._group), strict=True):
+        for share, lengths, features in zip(
+            shares, sizes, _GatherStacked.apply(own, self._group), strict=True
+        ):
             pieces = features[: sum(lengths)].split(lengths)
             by_frame.update(zip(share, pieces, strict=True))
         return [by_frame[frame] for frame in frames]
@@ -162,8 +164,16 @@ class ContextParallel:
         keys, values = _GatherTokens.apply(torch.stack([key, value]), self._group)
         n_tokens = query.shape[-2] // 2
         outputs = [
-            causal_attention(own, keys[..., : end * n_tokens, :], values[..., : end * n_tokens, :], dropout, scaling)
-            for own, end in zip(query.chunk(2, dim=-2), (number + 1 for number in self._split.chunks), strict=True)
+            causal_attention(
+                own,
+                keys[..., : end * n_tokens, :],
+                values[..., : end * n_tokens, :],
+                dropout,
+                scaling,
+            )
+            for own, end in zip(
+                query.chunk(2, dim=-2), (number + 1 for number in self._split.chunks), strict=True
+            )
         ]
         return torch.cat(outputs, dim=-2).transpose(1, 2), None
 
@@ -186,7 +196,9 @@ def context_parallel(model: SequenceModel, group: dist.ProcessGroup) -> Iterator
         del ALL_ATTENTION_FUNCTIONS[name]
 
 
-def causal_attention(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
+def causal_attention(
+    query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None
+) -> Tensor:
     """Return causal attention of the last tokens of a sequence to the whole sequence, in the shape of the queries.
 
     Args:
@@ -204,20 +216,30 @@ def causal_attention(query: Tensor, key: Tensor, value: Tensor, dropout: float, 
     for rows in query.split(_MASK_ROWS, dim=-2):
         n_keys += rows.shape[-2]
         states = key[..., :n_keys, :], value[..., :n_keys, :]
-        outputs.append(checkpoint(_masked_attention, rows, *states, dropout, scaling, use_reentrant=False))
+        outputs.append(
+            checkpoint(_masked_attention, rows, *states, dropout, scaling, use_reentrant=False)
+        )
     return torch.cat(outputs, dim=-2)
 
 
-def _flash_attention(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
+def _flash_attention(
+    query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None
+) -> Tensor:
     """Use a kernel that aligns the causal mask with the last token."""
     mask = causal_lower_right(query.shape[-2], key.shape[-2])
     grouped = query.shape[1] != key.shape[1]
-    return scaled_dot_product_attention(query, key, value, mask, dropout, scale=scaling, enable_gqa=grouped)
+    return scaled_dot_product_attention(
+        query, key, value, mask, dropout, scale=scaling, enable_gqa=grouped
+    )
 
 
-def _masked_attention(query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None) -> Tensor:
+def _masked_attention(
+    query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None
+) -> Tensor:
     n_rows, n_columns = query.shape[-2], key.shape[-2]
-    mask = torch.ones(n_rows, n_columns, dtype=torch.bool, device=query.device).tril(n_columns - n_rows)
+    mask = torch.ones(n_rows, n_columns, dtype=torch.bool, device=query.device).tril(
+        n_columns - n_rows
+    )
     n_groups = query.shape[1] // key.shape[1]
     key, value = (states.repeat_interleave(n_groups, dim=1) for states in (key, value))
     return scaled_dot_product_attention(query, key, value, mask, dropout, scale=scaling)

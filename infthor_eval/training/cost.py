@@ -46,7 +46,9 @@ class TrainingCost:
         return self.flop / (tflops * 1e12) / 3600
 
 
-def estimate_cost(recipe: Recipe, network: SequenceModel, data: TrainingData, n_processes: int) -> TrainingCost:
+def estimate_cost(
+    recipe: Recipe, network: SequenceModel, data: TrainingData, n_processes: int
+) -> TrainingCost:
     """Estimate the work and memory of a run; the network must have its frozen parts."""
     parts = parameters_by_part(network)
     total = sum(parameter.nbytes for parameter in network.parameters())
@@ -67,19 +69,27 @@ def estimate_cost(recipe: Recipe, network: SequenceModel, data: TrainingData, n_
     )
 
 
-def _flop(recipe: Recipe, network: SequenceModel, data: TrainingData, parts: dict[str, Any]) -> float:
+def _flop(
+    recipe: Recipe, network: SequenceModel, data: TrainingData, parts: dict[str, Any]
+) -> float:
     """Return the operations of one epoch: forward, backward through layers and to weights, and recomputation."""
     config = network.decoder.config
     n_weights = sum(parameter.numel() for parameter in parts["decoder"])
-    width = config.num_attention_heads * getattr(config, "head_dim", config.hidden_size // config.num_attention_heads)
+    width = config.num_attention_heads * getattr(
+        config, "head_dim", config.hidden_size // config.num_attention_heads
+    )
     forward = sum(
         2 * n_weights * item.n_tokens + 2 * config.num_hidden_layers * width * item.n_tokens**2
         for item in data.sequences
     )
-    trains_decoder = recipe.lora is None and any(parameter.requires_grad for parameter in parts["decoder"])
+    trains_decoder = recipe.lora is None and any(
+        parameter.requires_grad for parameter in parts["decoder"]
+    )
     times = 2 + int(trains_decoder) + int(recipe.gradient_checkpointing)
     n_frames = sum(len(item.frames) for item in data.sequences)
-    return times * forward + n_frames * _flop_of_frame(network) * (3 if network.trains_vision else 1)
+    return times * forward + n_frames * _flop_of_frame(network) * (
+        3 if network.trains_vision else 1
+    )
 
 
 @torch.no_grad()
@@ -99,5 +109,7 @@ def _activations(recipe: Recipe, network: SequenceModel, n_tokens: float) -> flo
     # Norm, queries, keys, values, attention, projection, norm; gate, up, product, activation; and the residual sums.
     within = (6 + 2 * heads) * config.hidden_size + 4 * config.intermediate_size
     layers = config.num_hidden_layers
-    per_token = layers * config.hidden_size + within if recipe.gradient_checkpointing else layers * within
+    per_token = (
+        layers * config.hidden_size + within if recipe.gradient_checkpointing else layers * within
+    )
     return per_token * n_tokens * size

@@ -12,7 +12,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.plans.segments import PlanSegment
+from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.training.action_sequences import recorded_segments, windows
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 from infthor_eval.training.goal_sequences import goal_windows
@@ -20,7 +20,13 @@ from infthor_eval.training.memory_sequences import memory_sequences
 from infthor_eval.training.question_sequences import question_sequences
 from infthor_eval.training.recipe import ActionData, Recipe
 
-__all__ = ["TrainingData", "action_sequences", "read_history", "read_training_data", "trajectory_names"]
+__all__ = [
+    "TrainingData",
+    "action_sequences",
+    "read_history",
+    "read_training_data",
+    "trajectory_names",
+]
 
 
 @dataclass(frozen=True)
@@ -68,11 +74,15 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
     skipped = [item for item in items if isinstance(item, SkippedItem)]
     if not sequences:
         why = skipped[0].reason if skipped else "there are no trajectories and no questions"
-        raise DataError(f"{', '.join(map(str, folders))}: no sequence to train on ({why}); give another set")
+        raise DataError(
+            f"{', '.join(map(str, folders))}: no sequence to train on ({why}); give another set"
+        )
     return TrainingData(sequences, skipped)
 
 
-def _read_set(recipe: Recipe, encoder: Encoder, folder: Path) -> Iterator[TrainingSequence | SkippedItem]:
+def _read_set(
+    recipe: Recipe, encoder: Encoder, folder: Path
+) -> Iterator[TrainingSequence | SkippedItem]:
     if recipe.actions is not None:
         yield from _sample_share(
             _action_items(recipe, recipe.actions, encoder, NiehSet(folder, needs_questions=False)),
@@ -99,7 +109,9 @@ def _action_items(
             if actions.form == "goals":
                 yield from goal_windows(encoder, name, segments, recipe.max_tokens)
             else:
-                yield from memory_sequences(encoder, data, trajectory, segments, actions.form, recipe.max_tokens)
+                yield from memory_sequences(
+                    encoder, data, trajectory, segments, actions.form, recipe.max_tokens
+                )
         except DataError as error:
             yield SkippedItem(name, str(error))
 

@@ -10,10 +10,10 @@ from typing import Any
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import ACT, action_part, plan_part
-from infthor_eval.plans.segments import PlanSegment, segment_parts
+from infthor_eval.plans.history.segments import PlanSegment, segment_parts
 from model_adapters import Part, Turn
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.prompt import Frame, Piece, Prompter, n_tokens
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.prompt import Frame, Piece, Prompter, n_tokens
 
 __all__ = ["Encoder", "SkippedItem", "TrainingSequence", "within"]
 
@@ -63,7 +63,11 @@ class SkippedItem:
 
 def within(sequence: TrainingSequence, limit: int) -> TrainingSequence | SkippedItem:
     """Return the sequence, or a skipped item if it has more tokens than the limit, frames expanded."""
-    return SkippedItem(sequence.name, f"longer than {limit} tokens") if sequence.n_tokens > limit else sequence
+    return (
+        SkippedItem(sequence.name, f"longer than {limit} tokens")
+        if sequence.n_tokens > limit
+        else sequence
+    )
 
 
 class Encoder:
@@ -74,7 +78,9 @@ class Encoder:
         self._prompter = Prompter(loaded.tokenizer, loaded.template, loaded.family)
         self._mark: int = loaded.tokenizer.convert_tokens_to_ids(ACT)
         ends = loaded.generation.end_ids
-        self._end: int = loaded.tokenizer.eos_token_id if loaded.tokenizer.eos_token_id in ends else min(ends)
+        self._end: int = (
+            loaded.tokenizer.eos_token_id if loaded.tokenizer.eos_token_id in ends else min(ends)
+        )
 
     def pieces(self, parts: Sequence[Part], system: str | None = None) -> list[Piece]:
         """Return the prompt of a user turn with these parts, after a system's turn if there is one.
@@ -93,7 +99,9 @@ class Encoder:
             DataError: a frame cannot be read, or a text of the history contains a mark.
             ModelError: the template refuses the history.
         """
-        return self._encode_actions(name, segment_parts(segments), sum(len(segment.steps) for segment in segments))
+        return self._encode_actions(
+            name, segment_parts(segments), sum(len(segment.steps) for segment in segments)
+        )
 
     def chat_actions(self, name: str, system: str, parts: Sequence[Part]) -> TrainingSequence:
         """Encode a user's turn of goals, actions and frames after a system prompt, with loss as in a history.
@@ -120,17 +128,23 @@ class Encoder:
             DataError: a text contains a mark.
             ModelError: the template refuses the texts.
         """
-        return self._encode_actions(name, [plan_part(plan), *map(action_part, actions)], len(actions))
+        return self._encode_actions(
+            name, [plan_part(plan), *map(action_part, actions)], len(actions)
+        )
 
     def _encode_actions(self, name: str, parts: Sequence[Part], n_actions: int) -> TrainingSequence:
         return self._with_loss(name, self.pieces(parts), n_actions)
 
     def _with_loss(self, name: str, pieces: Sequence[Piece], n_actions: int) -> TrainingSequence:
         if pieces.count(self._mark) != 2 * n_actions:
-            raise DataError(f"{name}: a goal, a plan or an action contains {ACT}; leave the trajectory out")
+            raise DataError(
+                f"{name}: a goal, a plan or an action contains {ACT}; leave the trajectory out"
+            )
         return TrainingSequence(name, tuple(pieces), tuple(self._is_between_marks(pieces)))
 
-    def answer(self, name: str, parts: Sequence[Part], answer: str, system: str | None = None) -> TrainingSequence:
+    def answer(
+        self, name: str, parts: Sequence[Part], answer: str, system: str | None = None
+    ) -> TrainingSequence:
         """Encode a question and its answer, with loss on the answer and the token that ends the turn.
 
         Raises:
@@ -138,8 +152,13 @@ class Encoder:
             ModelError: the template refuses the question.
         """
         prompt = self.pieces(parts, system)
-        reply: list[int] = [*self._tokenizer(answer, add_special_tokens=False)["input_ids"], self._end]
-        return TrainingSequence(name, (*prompt, *reply), (False,) * len(prompt) + (True,) * len(reply))
+        reply: list[int] = [
+            *self._tokenizer(answer, add_special_tokens=False)["input_ids"],
+            self._end,
+        ]
+        return TrainingSequence(
+            name, (*prompt, *reply), (False,) * len(prompt) + (True,) * len(reply)
+        )
 
     def _is_between_marks(self, pieces: Sequence[Piece]) -> Iterator[bool]:
         within = False

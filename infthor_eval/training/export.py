@@ -8,10 +8,10 @@ from torch.distributed.tensor import DTensor
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.object_ids import Words
-from model_adapters.hf.card import WORDS
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.quiet import hide_transformers_output
-from model_adapters.hf.tower_names import with_published_names
+from model_adapters.hf.loading.card import WORDS
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.quiet import hide_transformers_output
+from model_adapters.hf.loading.tower_names import with_published_names
 
 __all__ = ["export", "gather_weights"]
 
@@ -34,7 +34,10 @@ def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
     weights = model.state_dict()
     if not any(isinstance(tensor, DTensor) for tensor in weights.values()):
         return None
-    return {name: item.full_tensor().cpu() if isinstance(item, DTensor) else item for name, item in weights.items()}
+    return {
+        name: item.full_tensor().cpu() if isinstance(item, DTensor) else item
+        for name, item in weights.items()
+    }
 
 
 def export(
@@ -53,7 +56,9 @@ def export(
     Raises:
         DataError: the checkpoint cannot be written.
     """
-    with wrap_errors(f"{folder}: the checkpoint cannot be written", "free some space, or choose another folder"):
+    with wrap_errors(
+        f"{folder}: the checkpoint cannot be written", "free some space, or choose another folder"
+    ):
         folder.mkdir(parents=True, exist_ok=True)
         loaded.tokenizer.chat_template = loaded.template
         with hide_transformers_output():

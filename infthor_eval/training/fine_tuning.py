@@ -14,8 +14,8 @@ import torch
 import torch.distributed as dist
 
 from infthor_eval.errors import UsageError, wrap_errors
-from infthor_eval.formats.digests import digest
-from infthor_eval.formats.files import prepare_folder, write_atomically
+from infthor_eval.storage.digests import digest
+from infthor_eval.storage.files import prepare_folder, write_atomically
 from infthor_eval.training.batches import collate
 from infthor_eval.training.data import TrainingData, read_training_data
 from infthor_eval.training.encoding import Encoder
@@ -27,7 +27,7 @@ from infthor_eval.training.ranks import assign_ranks
 from infthor_eval.training.recipe import Recipe
 from infthor_eval.training.starting_model import load_starting_model
 from infthor_eval.training.trainer import train_with_trainer
-from model_adapters.hf.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 __all__ = ["StepCallback", "TrainingRun", "fine_tune", "prepare_run"]
 
@@ -51,7 +51,9 @@ class TrainingRun:
 
     def document(self) -> dict[str, Any]:
         """Return everything that identifies the run, as JSON values."""
-        names = "\n".join(f"{item.name} {item.n_tokens} {item.n_loss_tokens}" for item in self.data.sequences)
+        names = "\n".join(
+            f"{item.name} {item.n_tokens} {item.n_loss_tokens}" for item in self.data.sequences
+        )
         return {
             "recipe": msgspec.to_builtins(self.recipe),
             "model": self.loaded.identity,
@@ -71,7 +73,9 @@ def prepare_run(recipe: Recipe, folders: Sequence[Path]) -> TrainingRun:
         ModelError: the model cannot be loaded.
         DataError: there is nothing to train on.
     """
-    loaded = load_starting_model(recipe.model, recipe.model_args, recipe.prompt, recipe.seed, recipe.max_tokens)
+    loaded = load_starting_model(
+        recipe.model, recipe.model_args, recipe.prompt, recipe.seed, recipe.max_tokens
+    )
     return TrainingRun(recipe, loaded, read_training_data(recipe, Encoder(loaded), folders))
 
 
@@ -108,7 +112,13 @@ def fine_tune(run: TrainingRun, out: Path, on_step: StepCallback) -> Path:
         weights = gather_weights(run.loaded.model)
         if is_first:
             recipe = run.recipe
-            export(run.loaded, out / _CHECKPOINT, title=recipe.title, words=recipe.words, weights=weights)
+            export(
+                run.loaded,
+                out / _CHECKPOINT,
+                title=recipe.title,
+                words=recipe.words,
+                weights=weights,
+            )
     return out / _CHECKPOINT
 
 
@@ -116,7 +126,9 @@ def _train(run: TrainingRun, network: SequenceModel, states: Path, on_step: Step
     recipe, sequences, pad_id = run.recipe, run.data.sequences, run.loaded.tokenizer.pad_token_id
     if recipe.parallel.context == 1:
         to_batch = partial(collate, family=run.loaded.family, pad_id=pad_id)
-        train_with_trainer(network, sequences, lambda items: dict(to_batch(items)), recipe, states, on_step)
+        train_with_trainer(
+            network, sequences, lambda items: dict(to_batch(items)), recipe, states, on_step
+        )
         return
     if recipe.lora is not None:
         raise UsageError("lora and parallel.context cannot be combined; leave one of them out")
@@ -158,11 +170,15 @@ def _claim_folder(out: Path, document: dict[str, Any]) -> None:
     path = out / _DESCRIPTION
     if not path.exists():
         with write_atomically(path) as partial_file:
-            partial_file.write_text(json.dumps(document, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+            partial_file.write_text(
+                json.dumps(document, indent=2, sort_keys=True) + "\n", encoding="utf-8"
+            )
         return
     with wrap_errors(f"{path}: not JSON", "give another folder", catch=(OSError, ValueError)):
         earlier = json.loads(path.read_text(encoding="utf-8"))
     current = json.loads(json.dumps(document))
     if earlier != current:
         changed = sorted(name for name in current if earlier.get(name) != current[name])
-        raise UsageError(f"{out} is a run of another {', '.join(changed)}; give another folder with --out")
+        raise UsageError(
+            f"{out} is a run of another {', '.join(changed)}; give another folder with --out"
+        )

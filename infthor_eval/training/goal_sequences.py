@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import ACT, action_part, task_goal_part
-from infthor_eval.plans.segments import Part, PlanSegment
-from infthor_eval.plans.system_prompts import system_prompt
+from infthor_eval.plans.history.segments import Part, PlanSegment
+from infthor_eval.plans.published.system_prompts import system_prompt
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
 
 __all__ = ["goal_windows", "goals_of_actions"]
@@ -50,19 +50,29 @@ def goal_windows(
     if not segments:
         return
     frame_tokens = encoder.frame_tokens(segments[0].before)
-    windows = [parts for parts in goals_of_actions(segments, limit, frame_tokens) if ACT in "".join(_texts(parts))]
+    windows = [
+        parts
+        for parts in goals_of_actions(segments, limit, frame_tokens)
+        if ACT in "".join(_texts(parts))
+    ]
     for number, parts in enumerate(windows, start=1):
-        yield encoder.chat_actions(f"{name}, window {number} of {len(windows)}", system_prompt("goals"), parts)
+        yield encoder.chat_actions(
+            f"{name}, window {number} of {len(windows)}", system_prompt("goals"), parts
+        )
 
 
-def goals_of_actions(segments: Sequence[PlanSegment], limit: int, frame_tokens: int) -> Iterator[list[Part]]:
+def goals_of_actions(
+    segments: Sequence[PlanSegment], limit: int, frame_tokens: int
+) -> Iterator[list[Part]]:
     """Yield the texts and frames of each window; `frame_tokens` is the number of tokens of a frame.
 
     Raises:
         DataError: not one action with its frame fits.
     """
     if 1 + frame_tokens >= limit:
-        raise DataError(f"max_tokens is {limit}, too few for one action and its frame ({1 + frame_tokens})")
+        raise DataError(
+            f"max_tokens is {limit}, too few for one action and its frame ({1 + frame_tokens})"
+        )
     window, goal, last = _Window(), "", segments[0].before
     for segment in segments:
         if segment.goal is not None:
@@ -71,7 +81,11 @@ def goals_of_actions(segments: Sequence[PlanSegment], limit: int, frame_tokens: 
         if not segment.in_task:
             continue
         n_actions = min(len(segment.steps), _most_actions(limit, frame_tokens))
-        plan = [part for action, frame in segment.steps[:n_actions] for part in (action_part(action), frame)]
+        plan = [
+            part
+            for action, frame in segment.steps[:n_actions]
+            for part in (action_part(action), frame)
+        ]
         n_tokens = n_actions * (1 + frame_tokens)
         if window.n_tokens + n_tokens >= limit - _FEWER:
             yield window.parts

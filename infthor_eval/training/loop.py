@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn.utils import clip_grad_norm_
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.digests import digest, seed_of
+from infthor_eval.storage.digests import digest, seed_of
 from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.checkpoints import Checkpoints
 from infthor_eval.training.context_parallel import context_parallel
@@ -121,7 +121,9 @@ class Loop:
     def _step(self, step: int, loss: _Loss) -> Progress:
         start = time.perf_counter()
         # A seed per step, so that a state need not contain the generator.
-        torch.manual_seed(seed_of(f"{self._settings.seed} step {step} rank {self._ranks.rank}") % 2**63)
+        torch.manual_seed(
+            seed_of(f"{self._settings.seed} step {step} rank {self._ranks.rank}") % 2**63
+        )
         batches = self._batches(step)
         n_items, n_tokens = self._count_tokens(batches)
         total = torch.zeros((), device=self._model.device)
@@ -143,19 +145,25 @@ class Loop:
         self._optimizer.step()
         self._optimizer.zero_grad()
         seconds = time.perf_counter() - start
-        return Progress(step + 1, self._n_steps, total.item(), learning_rate, norm.item(), n_tokens / seconds)
+        return Progress(
+            step + 1, self._n_steps, total.item(), learning_rate, norm.item(), n_tokens / seconds
+        )
 
     def _batches(self, step: int) -> list[Batch]:
         """Return this process's sequences of a step, one per batch, so that nothing is padded."""
         numbers = self._settings.sequences_of(step, len(self._sequences))
         own = numbers[self._ranks.data_rank :: self._ranks.n_data]
-        return [collate([self._sequences[number]], self._model.family, self._pad_id) for number in own]
+        return [
+            collate([self._sequences[number]], self._model.family, self._pad_id) for number in own
+        ]
 
     def _count_tokens(self, batches: Sequence[Batch]) -> tuple[int, int]:
         """Return the labels and tokens of a step's sequences on all processes."""
         counts = torch.zeros(2, dtype=torch.int64, device=self._model.device)
         if self._ranks.context_rank == 0:
-            counts += counts.new_tensor([sum(map(n_labels, batches)), sum(b["input_ids"].numel() for b in batches)])
+            counts += counts.new_tensor(
+                [sum(map(n_labels, batches)), sum(b["input_ids"].numel() for b in batches)]
+            )
         if self._ranks.n_ranks > 1:
             dist.all_reduce(counts)
         n_items, n_tokens = counts.tolist()
@@ -189,11 +197,22 @@ class Loop:
         """Return the settings that identify a run; saving and the number of processes do not count."""
         settings = asdict(self._settings)
         del settings["save_every"]
-        names = digest("\n".join(f"{sequence.name} {sequence.n_tokens}" for sequence in self._sequences))
+        names = digest(
+            "\n".join(f"{sequence.name} {sequence.n_tokens}" for sequence in self._sequences)
+        )
         n_trained = sum(parameter.numel() for parameter in self._trained)
-        return {**settings, "betas": list(self._settings.betas), "sequences": names, "n_trained": n_trained}
+        return {
+            **settings,
+            "betas": list(self._settings.betas),
+            "sequences": names,
+            "n_trained": n_trained,
+        }
 
 
-def _optimizer(parameters: Sequence[torch.nn.Parameter], settings: LoopSettings) -> torch.optim.AdamW:
+def _optimizer(
+    parameters: Sequence[torch.nn.Parameter], settings: LoopSettings
+) -> torch.optim.AdamW:
     decay = settings.weight_decay
-    return torch.optim.AdamW(parameters, lr=settings.learning_rate, betas=settings.betas, weight_decay=decay)
+    return torch.optim.AdamW(
+        parameters, lr=settings.learning_rate, betas=settings.betas, weight_decay=decay
+    )

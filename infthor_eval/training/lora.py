@@ -18,7 +18,9 @@ def add_adapters(network: SequenceModel, settings: Lora) -> Any:
     try:
         import peft
     except ImportError as error:
-        raise UsageError("a recipe with lora needs peft; pip install 'infthor-eval[train]'") from error
+        raise UsageError(
+            "a recipe with lora needs peft; pip install 'infthor-eval[train]'"
+        ) from error
     in_decoder = {id(module) for module in network.decoder.modules()}
     names = [
         name
@@ -26,8 +28,13 @@ def add_adapters(network: SequenceModel, settings: Lora) -> Any:
         if id(module) in in_decoder and name.rpartition(".")[2] in settings.targets
     ]
     config = peft.LoraConfig(
-        r=settings.rank, lora_alpha=settings.alpha, lora_dropout=settings.dropout, target_modules=names
+        r=settings.rank,
+        lora_alpha=settings.alpha,
+        lora_dropout=settings.dropout,
+        target_modules=names,
     )
     problem = f"lora.targets {', '.join(settings.targets)}: the decoder has no such layers"
-    with wrap_errors(problem, "name some of its linear layers", catch=ValueError, raise_as=UsageError):
+    with wrap_errors(
+        problem, "name some of its linear layers", catch=ValueError, raise_as=UsageError
+    ):
         return peft.LoraModel(network.model, {"default": config}, "default")

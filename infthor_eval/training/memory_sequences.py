@@ -16,9 +16,9 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import action_text
+from infthor_eval.plans.history.segments import Part, PlanSegment
 from infthor_eval.plans.plan import tasks_of
-from infthor_eval.plans.segments import Part, PlanSegment
-from infthor_eval.plans.system_prompts import system_prompt
+from infthor_eval.plans.published.system_prompts import system_prompt
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence, within
 
 __all__ = ["MemoryForm", "memory_sequences"]
@@ -82,7 +82,9 @@ class _State:
     def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
         self._states = data.states(trajectory.traj_id)
         if not self._states:
-            raise DataError("the trajectory has no state_summary, which actions of the form text need")
+            raise DataError(
+                "the trajectory has no state_summary, which actions of the form text need"
+            )
 
     @property
     def actions(self) -> Sequence[int]:
@@ -100,12 +102,22 @@ class _Retrieved:
     def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
         place, hint = f"trajectory {trajectory.traj_id}", "restore the file"
         if not trajectory.retrieved_image:
-            raise DataError("the trajectory has no retrieved_image, which actions of the form frames need")
+            raise DataError(
+                "the trajectory has no retrieved_image, which actions of the form frames need"
+            )
         with wrap_errors(
-            f"{place}: retrieved_image is no list {_NAMES} for each action", hint, catch=msgspec.ValidationError
+            f"{place}: retrieved_image is no list {_NAMES} for each action",
+            hint,
+            catch=msgspec.ValidationError,
         ):
-            self._retrieved = msgspec.convert(trajectory.retrieved_image, dict[int, _Entry], strict=False)
-        with wrap_errors(f"{place}: images is no list of low_idx and image_name", hint, catch=msgspec.ValidationError):
+            self._retrieved = msgspec.convert(
+                trajectory.retrieved_image, dict[int, _Entry], strict=False
+            )
+        with wrap_errors(
+            f"{place}: images is no list of low_idx and image_name",
+            hint,
+            catch=msgspec.ValidationError,
+        ):
             images = msgspec.convert(trajectory.images, list[_Image])
         self._of_actions = _by_action(images)
         self._frames = {frame.path.stem: frame for frame in data.frames(trajectory.traj_id)}
@@ -117,7 +129,9 @@ class _Retrieved:
     def parts(self, action: int) -> list[Part]:
         names = self._retrieved[action].top20
         if not names:
-            names = [name for earlier in range(action) for name in self._of_actions.get(earlier, ())]
+            names = [
+                name for earlier in range(action) for name in self._of_actions.get(earlier, ())
+            ]
         return ["Previous states: ", *map(self._frame, names), "\nCurrent state: "]
 
     def _frame(self, name: str) -> FrameRef:
@@ -137,11 +151,18 @@ def _by_action(images: Sequence[_Image]) -> Mapping[int, Sequence[str]]:
     found: dict[int, list[str]] = {}
     for image in images:
         found.setdefault(image.low_idx, []).append(image.image_name)
-    return {action: names if len(names) == 1 else [names[0], names[-1]] for action, names in found.items()}
+    return {
+        action: names if len(names) == 1 else [names[0], names[-1]]
+        for action, names in found.items()
+    }
 
 
 def _goals(trajectory: Trajectory) -> Mapping[int, str]:
     """Return the goal of each low-level action of a task."""
     spans = trajectory.sub_trajs
     tasks = tasks_of(trajectory) if spans else []
-    return {action: task.text for task, span in zip(tasks, spans, strict=True) for action in range(*span.low_pddl_idx)}
+    return {
+        action: task.text
+        for task, span in zip(tasks, spans, strict=True)
+        for action in range(*span.low_pddl_idx)
+    }

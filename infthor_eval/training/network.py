@@ -11,13 +11,15 @@ from torch.utils.checkpoint import checkpoint
 
 from infthor_eval.errors import ModelError, UsageError, unknown_name
 from infthor_eval.training.batches import IGNORED
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.prompt import Frame
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.prompt import Frame
 
 __all__ = ["PARTS", "SequenceModel", "decay_groups", "freeze", "next_labels", "parameters_by_part"]
 
 PARTS = ("vision", "embeddings", "decoder", "head")
-_FRAME_BATCH = 32  # frames in the vision tower at once; 1,000 frames would need more memory than the decoder
+_FRAME_BATCH = (
+    32  # frames in the vision tower at once; 1,000 frames would need more memory than the decoder
+)
 _LOGIT_ROWS = 1024  # rows of logits at once; each has as many values as the vocabulary
 
 
@@ -125,7 +127,9 @@ class SequenceModel(torch.nn.Module):
         embeds: Tensor = self.model.get_input_embeddings()(input_ids.to(self.device))
         if not features:
             return embeds
-        return embeds.masked_scatter(slots[..., None].to(self.device), torch.cat(list(features)).to(embeds))
+        return embeds.masked_scatter(
+            slots[..., None].to(self.device), torch.cat(list(features)).to(embeds)
+        )
 
     def decode(self, embeds: Tensor, position_ids: Tensor, attention_mask: Tensor | None) -> Tensor:
         """Return the decoder's last hidden states, (batch, tokens, hidden)."""
@@ -153,7 +157,9 @@ class SequenceModel(torch.nn.Module):
         # Without targets there is still one, empty, chunk: every rank of a split sequence needs a backward pass.
         chunks = (values[has_target].split(_LOGIT_ROWS) for values in (hidden, targets))
         for states, chunk_targets in zip(*chunks, strict=True):
-            total = total + checkpoint(self._cross_entropy, states, chunk_targets, use_reentrant=False)
+            total = total + checkpoint(
+                self._cross_entropy, states, chunk_targets, use_reentrant=False
+            )
         return total
 
     def _cross_entropy(self, states: Tensor, targets: Tensor) -> Tensor:
@@ -195,7 +201,9 @@ def parameters_by_part(model: SequenceModel) -> dict[str, list[Parameter]]:
     embeddings = list(model.model.get_input_embeddings().parameters())
     head = list(model.model.get_output_embeddings().parameters())
     in_embeddings = set(map(id, embeddings))
-    decoder = [parameter for parameter in model.decoder.parameters() if id(parameter) not in in_embeddings]
+    decoder = [
+        parameter for parameter in model.decoder.parameters() if id(parameter) not in in_embeddings
+    ]
     language = in_embeddings | set(map(id, decoder)) | set(map(id, head))
     vision = [parameter for parameter in model.model.parameters() if id(parameter) not in language]
     return {"vision": vision, "embeddings": embeddings, "decoder": decoder, "head": head}
@@ -204,8 +212,14 @@ def parameters_by_part(model: SequenceModel) -> dict[str, list[Parameter]]:
 def decay_groups(parameters: Sequence[Parameter], weight_decay: float) -> list[dict[str, Any]]:
     """Return parameter groups of an optimizer: matrices decay, biases and norms do not."""
     groups = [
-        {"params": [parameter for parameter in parameters if parameter.ndim > 1], "weight_decay": weight_decay},
-        {"params": [parameter for parameter in parameters if parameter.ndim <= 1], "weight_decay": 0.0},
+        {
+            "params": [parameter for parameter in parameters if parameter.ndim > 1],
+            "weight_decay": weight_decay,
+        },
+        {
+            "params": [parameter for parameter in parameters if parameter.ndim <= 1],
+            "weight_decay": 0.0,
+        },
     ]
     return [group for group in groups if group["params"]]
 
@@ -227,7 +241,9 @@ def freeze(model: SequenceModel, parts: Collection[str]) -> None:
     by_part = parameters_by_part(model)
     shared = set(map(id, by_part["embeddings"])) & set(map(id, by_part["head"]))
     if shared and ("embeddings" in parts) != ("head" in parts):
-        raise UsageError("embeddings and head are the same weights in this model; freeze both of them or neither")
+        raise UsageError(
+            "embeddings and head are the same weights in this model; freeze both of them or neither"
+        )
     for name in parts:
         for parameter in by_part[name]:
             parameter.requires_grad_(False)

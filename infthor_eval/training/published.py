@@ -16,8 +16,8 @@ from torch.distributed.checkpoint.metadata import TensorStorageMetadata
 from transformers.core_model_loading import revert_weight_conversion
 
 from infthor_eval.errors import DataError, wrap_errors
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.tower_names import published_name
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.tower_names import published_name
 
 __all__ = ["ImportedWeights", "import_weights"]
 
@@ -55,7 +55,11 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     with wrap_errors(f"{folder}: not a distributed checkpoint", _HINT, catch=Exception):
         reader = dcp.FileSystemReader(folder)
         stored: Mapping[str, Any] = reader.read_metadata().state_dict_metadata
-        sizes = {name: item.size for name, item in stored.items() if isinstance(item, TensorStorageMetadata)}
+        sizes = {
+            name: item.size
+            for name, item in stored.items()
+            if isinstance(item, TensorStorageMetadata)
+        }
     weights = loaded.model.state_dict()
     stored_names = _stored_names(sizes, loaded.model, folder)
     for name, key in stored_names.items():
@@ -67,7 +71,9 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     tensors = {key: torch.empty_like(weights[name]) for name, key in stored_names.items()}
     with wrap_errors(f"{folder}: cannot be read", "restore its files", catch=Exception):
         dcp.load(tensors, storage_reader=reader, no_dist=True)
-    loaded.model.load_state_dict({name: tensors[key] for name, key in stored_names.items()}, strict=False)
+    loaded.model.load_state_dict(
+        {name: tensors[key] for name, key in stored_names.items()}, strict=False
+    )
     n_imported = len(stored_names)
     return ImportedWeights(n_imported, len(weights) - n_imported, len(sizes) - n_imported)
 
@@ -80,7 +86,8 @@ def _stored_names(sizes: Mapping[str, Any], model: Any, folder: Path) -> Mapping
     """
     weights = model.state_dict()
     of_hub = {
-        id(tensor): published_name(name) for name, tensor in revert_weight_conversion(model, dict(weights)).items()
+        id(tensor): published_name(name)
+        for name, tensor in revert_weight_conversion(model, dict(weights)).items()
     }
     tables = [
         {name: name for name in weights},

@@ -12,7 +12,9 @@ from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequenc
 __all__ = ["question_sequences"]
 
 
-def question_sequences(encoder: Encoder, task: TaskSamples, limit: int) -> Iterator[TrainingSequence | SkippedItem]:
+def question_sequences(
+    encoder: Encoder, task: TaskSamples, limit: int
+) -> Iterator[TrainingSequence | SkippedItem]:
     """Yield a sequence for each sample of a task in one context, or a skipped item if it cannot be used.
 
     Args:
@@ -40,7 +42,9 @@ def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) ->
     context, text = task.request(sample)
     if sample.awaits_recall:
         raise UsageError("training has no memory; use another context")
-    return encoder.answer(name, [*as_images(context), text], doc_target(sample.question))  # it has no video input
+    return encoder.answer(
+        name, [*as_images(context), text], doc_target(sample.question)
+    )  # it has no video input
 
 
 def _name(question: str, variant: str) -> str:

@@ -48,7 +48,9 @@ def assign_ranks(n_context: int = 1) -> Ranks:
     """
     world = dist.get_world_size() if dist.is_initialized() else 1
     if n_context < 1 or world % n_context:
-        raise UsageError(f"{world} processes cannot share sequences by {n_context}; give a divisor of {world}")
+        raise UsageError(
+            f"{world} processes cannot share sequences by {n_context}; give a divisor of {world}"
+        )
     if world == 1:
         return Ranks()
     rank = dist.get_rank()

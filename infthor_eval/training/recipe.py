@@ -8,11 +8,20 @@ import msgspec
 
 from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import read_yaml
+from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.training.nano.settings import NanoRecipe
 
-__all__ = ["ActionData", "Lora", "Optimizer", "Parallel", "QuestionData", "Recipe", "read_recipe", "recipe_names"]
+__all__ = [
+    "ActionData",
+    "Lora",
+    "Optimizer",
+    "Parallel",
+    "QuestionData",
+    "Recipe",
+    "read_recipe",
+    "recipe_names",
+]
 
 _FOLDER = "training/recipes"
 
@@ -75,7 +84,15 @@ class Lora(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     rank: int = 16
     alpha: int = 32
     dropout: float = 0.0
-    targets: tuple[str, ...] = ("q_proj", "k_proj", "v_proj", "o_proj", "gate_proj", "up_proj", "down_proj")
+    targets: tuple[str, ...] = (
+        "q_proj",
+        "k_proj",
+        "v_proj",
+        "o_proj",
+        "gate_proj",
+        "up_proj",
+        "down_proj",
+    )
 
 
 class Parallel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -125,7 +142,10 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     actions: ActionData | None = None
     words: Words = Words.PUBLISHED
     questions: QuestionData | None = None
-    freeze: tuple[Literal["vision", "embeddings", "decoder", "head"], ...] = ("vision", "embeddings")
+    freeze: tuple[Literal["vision", "embeddings", "decoder", "head"], ...] = (
+        "vision",
+        "embeddings",
+    )
     optimizer: Optimizer = Optimizer()
     lora: Lora | None = None
     epochs: int = 3
@@ -160,15 +180,21 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         if wrong is not None:
             raise ValueError(f"{wrong} is {positive[wrong]}; use a number above 0")
         if self.parallel.context > 1 and self.parallel.shard:
-            raise ValueError("parallel.shard and parallel.context cannot be combined; leave one of them out")
+            raise ValueError(
+                "parallel.shard and parallel.context cannot be combined; leave one of them out"
+            )
 
     def _check_actions(self, actions: ActionData) -> None:
         if actions.form == "plans" and self.prompt != "plain":
             raise ValueError("sequences of plans have no turns; set prompt to plain")
         if actions.form != "plans" and self.prompt != "chat":
-            raise ValueError(f"actions of the form {actions.form} follow a system prompt; set prompt to chat")
+            raise ValueError(
+                f"actions of the form {actions.form} follow a system prompt; set prompt to chat"
+            )
         if actions.form != "plans" and self.words is not Words.PUBLISHED:
-            raise ValueError(f"actions of the form {actions.form} are in the published words; leave words out")
+            raise ValueError(
+                f"actions of the form {actions.form} are in the published words; leave words out"
+            )
 
 
 def recipe_names() -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import torch
 
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.digests import seed_of
+from infthor_eval.storage.digests import seed_of
 
 __all__ = ["LoopSettings", "linear_share"]
 
@@ -54,12 +54,21 @@ class LoopSettings:
     save_every: int | None = None
 
     def __post_init__(self) -> None:
-        for name in ("learning_rate", "clip", "epochs", "max_steps", "sequences_per_step", "save_every"):
+        for name in (
+            "learning_rate",
+            "clip",
+            "epochs",
+            "max_steps",
+            "sequences_per_step",
+            "save_every",
+        ):
             value = getattr(self, name)
             if value is not None and not (value > 0 and math.isfinite(value)):
                 raise UsageError(f"{name}={value} is not a number above 0")
         if not all(0 <= beta < 1 for beta in self.betas):
-            raise UsageError(f"betas={self.betas[0]},{self.betas[1]} are not at least 0 and below 1")
+            raise UsageError(
+                f"betas={self.betas[0]},{self.betas[1]} are not at least 0 and below 1"
+            )
         if not 0 <= self.warmup_ratio <= 1:
             raise UsageError(f"warmup_ratio={self.warmup_ratio} is not between 0 and 1")
         if not (self.weight_decay >= 0 and math.isfinite(self.weight_decay)):
@@ -67,7 +76,11 @@ class LoopSettings:
 
     def n_steps(self, n_sequences: int) -> int:
         """Return the number of steps of a run."""
-        return self.epochs * self._epoch_steps(n_sequences) if self.max_steps is None else self.max_steps
+        return (
+            self.epochs * self._epoch_steps(n_sequences)
+            if self.max_steps is None
+            else self.max_steps
+        )
 
     def sequences_of(self, step: int, n_sequences: int) -> list[int]:
         """Return the numbers of a step's sequences; steps count from 0. Each epoch has its own random order."""

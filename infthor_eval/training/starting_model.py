@@ -7,8 +7,8 @@ import torch
 from infthor_eval.errors import UsageError
 from infthor_eval.household.sequence_text import MARKS
 from model_adapters import has_option, load
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.model import TransformersModel
+from model_adapters.hf.cached.model import TransformersModel
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 __all__ = ["load_starting_model"]
 
@@ -30,7 +30,9 @@ def load_starting_model(
         UsageError: a name or an option is unknown, or the model cannot be trained here.
         ModelError: the model cannot be loaded.
     """
-    loaded_model = load(model, {**options, "prompt": prompt}, seed) if has_option(model, "prompt") else None
+    loaded_model = (
+        load(model, {**options, "prompt": prompt}, seed) if has_option(model, "prompt") else None
+    )
     if not isinstance(loaded_model, TransformersModel):
         raise UsageError(f"{model} cannot be trained here; use a model of a transformers family")
     _add_marks(loaded_model.loaded)
@@ -56,7 +58,9 @@ def _add_marks(loaded: LoadedCheckpoint) -> None:
         model.resize_token_embeddings(len(loaded.tokenizer), mean_resizing=False)
     ids = loaded.tokenizer.convert_tokens_to_ids(new)
     layers = (model.get_input_embeddings(), model.get_output_embeddings())
-    tables = {id(layer.weight): layer.weight for layer in layers if layer is not None}  # one if the head is tied
+    tables = {
+        id(layer.weight): layer.weight for layer in layers if layer is not None
+    }  # one if the head is tied
     with torch.no_grad():
         for weight in tables.values():
             weight[ids] = weight[: min(ids)].float().mean(dim=0).to(weight)

@@ -42,10 +42,14 @@ class _SequenceTrainer(transformers.Trainer):
             def share(step: int) -> float:
                 return linear_share(step, num_training_steps, warmup_ratio)
 
-            self.lr_scheduler = torch.optim.lr_scheduler.LambdaLR(optimizer or cast(Any, self.optimizer), share)
+            self.lr_scheduler = torch.optim.lr_scheduler.LambdaLR(
+                optimizer or cast(Any, self.optimizer), share
+            )
         return self.lr_scheduler
 
-    def _save(self, output_dir: str | None = None, state_dict: dict[str, Any] | None = None) -> None:
+    def _save(
+        self, output_dir: str | None = None, state_dict: dict[str, Any] | None = None
+    ) -> None:
         folder = Path(output_dir or str(self.args.output_dir))
         folder.mkdir(parents=True, exist_ok=True)
         if state_dict is not None:  # gathered from shards
@@ -53,7 +57,9 @@ class _SequenceTrainer(transformers.Trainer):
         else:
             save_model(self.accelerator.unwrap_model(self.model).model, str(folder / _WEIGHTS))
 
-    def _load_from_checkpoint(self, resume_from_checkpoint: str, model: torch.nn.Module | None = None) -> None:
+    def _load_from_checkpoint(
+        self, resume_from_checkpoint: str, model: torch.nn.Module | None = None
+    ) -> None:
         if self.is_fsdp_enabled:
             super()._load_from_checkpoint(resume_from_checkpoint, model)
         else:
@@ -111,7 +117,10 @@ def train_with_trainer(
     )
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
     last = _last_complete_checkpoint(out)
-    problem, hint = f"{last}: the checkpoint cannot be read", "remove it to resume from the one before"
+    problem, hint = (
+        f"{last}: the checkpoint cannot be read",
+        "remove it to resume from the one before",
+    )
     with wrap_errors(problem, hint, catch=(OSError, ValueError, KeyError)):
         trainer.train(resume_from_checkpoint=last)
 
@@ -122,7 +131,9 @@ def _last_complete_checkpoint(out: Path) -> str | None:
     The Trainer itself would use the last folder, whatever it contains, and continue without the optimizer if that is
     missing. The state file is the last to be written.
     """
-    for place in sorted(out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True):
+    for place in sorted(
+        out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True
+    ):
         try:
             json.loads((place / "trainer_state.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):

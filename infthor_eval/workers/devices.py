@@ -15,7 +15,9 @@ def visible_gpus() -> list[str]:
     visible = os.environ.get(_VISIBLE)
     if visible is not None:
         return [name.strip() for name in visible.split(",") if name.strip()]
-    return [str(number) for number in range(len(list(_DRIVER.iterdir())))] if _DRIVER.is_dir() else []
+    return (
+        [str(number) for number in range(len(list(_DRIVER.iterdir())))] if _DRIVER.is_dir() else []
+    )
 
 
 def limit_devices(number: int, count: int) -> None:

@@ -48,5 +48,9 @@ def to_portable_error(error: BaseException) -> Exception:
         return MemoryError(str(error))
     if isinstance(error, OSError):
         return OSError(error.errno, error.strerror, error.filename)
-    description = describe_exception(error) if isinstance(error, Exception) else type(error).__name__
-    return InfthorError(f"a worker failed: {description}; fix the named code and run the same command again")
+    description = (
+        describe_exception(error) if isinstance(error, Exception) else type(error).__name__
+    )
+    return InfthorError(
+        f"a worker failed: {description}; fix the named code and run the same command again"
+    )

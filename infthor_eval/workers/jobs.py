@@ -12,7 +12,10 @@ __all__ = ["run_jobs"]
 
 
 def run_jobs(
-    open_worker: OpenWorker, jobs: Sequence[Any], worker_settings: WorkerSettings, report: Callable[[str], None]
+    open_worker: OpenWorker,
+    jobs: Sequence[Any],
+    worker_settings: WorkerSettings,
+    report: Callable[[str], None],
 ) -> Iterator[tuple[int, Any | InfthorError]]:
     """Yield the number of each job with its result, or with an error if worker after worker was lost at it.
 
@@ -27,14 +30,19 @@ def run_jobs(
     if worker_settings.is_local:
         yield from _run_here(open_worker, jobs)
         return
-    pool = Pool(worker_settings.connect(open_worker), min(worker_settings.workers, max(1, len(jobs))))
+    pool = Pool(
+        worker_settings.connect(open_worker), min(worker_settings.workers, max(1, len(jobs)))
+    )
     try:
         pool.open()
         for event in pool.run(len(jobs), lambda number: jobs[number]):
             if isinstance(event, JobResult):
                 yield event.job, event.result
             elif isinstance(event, JobFailed):
-                yield event.job, WorkerLostError(f"worker after worker was lost at it ({event.reason})")
+                yield (
+                    event.job,
+                    WorkerLostError(f"worker after worker was lost at it ({event.reason})"),
+                )
             elif isinstance(event, WorkerLost):
                 report(f"{event.reason}; its work goes to another")
             elif isinstance(event, WorkerWithdrawn):

@@ -111,19 +111,24 @@ class Pool:
         accept: called with each worker's greeting before its first job; an InfthorError that it raises ends the pool.
     """
 
-    def __init__(self, connect: Connect, count: int, accept: Callable[[Any], None] = lambda _: None) -> None:
+    def __init__(
+        self, connect: Connect, count: int, accept: Callable[[Any], None] = lambda _: None
+    ) -> None:
         self._links = {number: connect(number) for number in range(1, count + 1)}
         self._accept = accept
         self._jobs = _JobQueue()
         self._events: SimpleQueue[Event | _JobEnded | Exception] = SimpleQueue()
-        self._ready: SimpleQueue[Any] = SimpleQueue()  # greetings; an exception once no worker can be opened
+        self._ready: SimpleQueue[Any] = (
+            SimpleQueue()
+        )  # greetings; an exception once no worker can be opened
         self._max_losses = _MAX_LOSSES
         self._losses: Counter[int] = Counter()  # by job, since its last new result
         self._n_results: Counter[int] = Counter()  # by job, most of all its workers
         self._n_present = count
         self._withdrawing = Lock()
         self._threads = [
-            Thread(target=self._attend, args=(number, link), daemon=True) for number, link in self._links.items()
+            Thread(target=self._attend, args=(number, link), daemon=True)
+            for number, link in self._links.items()
         ]
 
     def open(self) -> Any:
@@ -222,7 +227,9 @@ class Pool:
                 greeting = link.open()
             except WorkerLostError as error:
                 reason = error
-            except InfthorError as error:  # it says why it cannot be created: another try would end the same way
+            except (
+                InfthorError
+            ) as error:  # it says why it cannot be created: another try would end the same way
                 reason = error
                 break
             else:
@@ -243,14 +250,18 @@ class Pool:
             job, create = taken
             try:
                 for count, result in enumerate(link.do(create()), 1):
-                    if count > self._n_results[job]:  # results that another worker gave before are no progress
+                    if (
+                        count > self._n_results[job]
+                    ):  # results that another worker gave before are no progress
                         self._n_results[job] = count
                         self._losses.pop(job, None)
                     self._events.put(JobResult(number, job, result))
             except WorkerLostError as error:
                 self._losses[job] += 1
                 is_given_up = self._losses[job] >= self._max_losses
-                self._events.put((JobFailed if is_given_up else WorkerLost)(number, job, str(error)))
+                self._events.put(
+                    (JobFailed if is_given_up else WorkerLost)(number, job, str(error))
+                )
                 return False
             self._events.put(_JobEnded(job))
         return True

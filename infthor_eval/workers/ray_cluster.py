@@ -34,7 +34,9 @@ def ray_actors(open_worker: OpenWorker, address: str, gpus_per_worker: float | N
         if not ray.is_initialized():
             ray.init(address=address, log_to_driver=False, logging_level="error")
     except (ConnectionError, RuntimeError, ValueError) as error:
-        raise UsageError(f"--ray-address {address}: no Ray cluster there ({in_one_line(error)}); start one") from error
+        raise UsageError(
+            f"--ray-address {address}: no Ray cluster there ({in_one_line(error)}); start one"
+        ) from error
     if gpus_per_worker is None:
         gpus_per_worker = 1.0 if ray.cluster_resources().get("GPU", 0) else 0.0
     # Two calls at a time: a job, and the call that stops it.
@@ -103,7 +105,9 @@ class RayLink:
         import ray
 
         if self._actor is not None:
-            with contextlib.suppress(ray.exceptions.RayError):  # it is gone, or busy; it is killed in either case
+            with contextlib.suppress(
+                ray.exceptions.RayError
+            ):  # it is gone, or busy; it is killed in either case
                 ray.get(self._actor.close.remote(), timeout=_CLOSE_WAIT_S)
             ray.kill(self._actor)
 
@@ -113,9 +117,13 @@ class RayLink:
         try:
             value = ray.get(reference)
         except (ray.exceptions.RayActorError, ray.exceptions.ObjectLostError) as error:
-            raise WorkerLostError(f"worker {self._number} is lost ({in_one_line(error)})") from error
+            raise WorkerLostError(
+                f"worker {self._number} is lost ({in_one_line(error)})"
+            ) from error
         except ray.exceptions.RayError as error:
-            raise InfthorError(f"worker {self._number} failed ({in_one_line(error)}); see Ray's logs") from error
+            raise InfthorError(
+                f"worker {self._number} failed ({in_one_line(error)}); see Ray's logs"
+            ) from error
         if isinstance(value, Exception):
             raise value
         return value

@@ -12,7 +12,14 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.protocols import Conversation, Model, Policy
 
-__all__ = ["ContractError", "check_identity", "check_members", "frames_of_one_colour", "raises", "require"]
+__all__ = [
+    "ContractError",
+    "check_identity",
+    "check_members",
+    "frames_of_one_colour",
+    "raises",
+    "require",
+]
 
 
 class ContractError(AssertionError):
@@ -25,7 +32,9 @@ def require(holds: bool, clause: str) -> None:
         raise ContractError(clause)
 
 
-def raises(error_type: type[Exception], call: Callable[..., Any], *args: Any, **kwargs: Any) -> bool:
+def raises(
+    error_type: type[Exception], call: Callable[..., Any], *args: Any, **kwargs: Any
+) -> bool:
     """Return whether a call raises an error of this type."""
     try:
         call(*args, **kwargs)
@@ -78,4 +87,7 @@ def _require_members(instance: object, protocol: type) -> None:
     bases = [base for base in protocol.__mro__ if base not in (Protocol, Generic, object)]
     names = {name for base in bases for name in vars(base) if not name.startswith("_")}
     missing = sorted(names - set(dir(instance)))
-    require(not missing, f"{type(instance).__name__} lacks a member of {protocol.__name__}: {', '.join(missing)}")
+    require(
+        not missing,
+        f"{type(instance).__name__} lacks a member of {protocol.__name__}: {', '.join(missing)}",
+    )

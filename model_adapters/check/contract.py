@@ -30,7 +30,9 @@ def check_adapter(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 3
             check()
 
 
-def run_checks(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)) -> Iterator[CheckResult]:
+def run_checks(
+    adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)
+) -> Iterator[CheckResult]:
     """Run all checks of `check_adapter`, also after a violation; only a missing member ends them.
 
     Args:
@@ -41,7 +43,9 @@ def run_checks(adapter: Model | Policy, frame_size: tuple[int, int] = (300, 300)
         yield from run_each(_checks(adapter, black, white))
 
 
-def _checks(adapter: Model | Policy, black: FrameRef, white: FrameRef) -> dict[str, Callable[[], None]]:
+def _checks(
+    adapter: Model | Policy, black: FrameRef, white: FrameRef
+) -> dict[str, Callable[[], None]]:
     if hasattr(adapter, "act"):
         return policy_checks(cast(Policy, adapter), black, white)
     return model_checks(adapter, black, white)

@@ -16,9 +16,18 @@ def check_parts(model: Model, frame: FrameRef) -> None:
     """Check that texts and frames can be appended, and nothing else."""
     split = start_conversation(model, frame, "\nWhat do", " you see?")
     whole = start_conversation(model, frame, "\nWhat do you see?")
-    require(_alike(model, split, whole), "a text appended in two pieces differs from the same text in one")
-    require(raises(TypeError, split.append, 3), "append() of neither text nor frame does not raise TypeError")
-    require(raises(ValueError, split.append, "x", role="narrator"), "append() in an unknown role does not raise")
+    require(
+        _alike(model, split, whole),
+        "a text appended in two pieces differs from the same text in one",
+    )
+    require(
+        raises(TypeError, split.append, 3),
+        "append() of neither text nor frame does not raise TypeError",
+    )
+    require(
+        raises(ValueError, split.append, "x", role="narrator"),
+        "append() in an unknown role does not raise",
+    )
     require(_alike(model, split, whole), "a refused append() changes the conversation")
 
 
@@ -27,7 +36,10 @@ def check_counts(model: Model, frame: FrameRef) -> None:
     if not model.capabilities.counts_tokens:
         n_tokens = start_conversation(model, frame, QUESTION).n_tokens
         require(n_tokens is None, "n_tokens is not None though counts_tokens is false")
-        require(model.tokens_per_frame(frame) is None, "tokens_per_frame() is not None though counts_tokens is false")
+        require(
+            model.tokens_per_frame(frame) is None,
+            "tokens_per_frame() is not None though counts_tokens is false",
+        )
         return
     talk, sizes = model.conversation(), []
     for parts in ((frame,), (frame,), ("\nThe first frame.",), (frame, frame), (QUESTION,)):
@@ -35,7 +47,10 @@ def check_counts(model: Model, frame: FrameRef) -> None:
         sizes.append(talk.n_tokens or 0)
     require(sizes == sorted(set(sizes)), f"n_tokens does not grow with every part: {sizes}")
     per_frame = model.tokens_per_frame(frame) or 0
-    require(0 < per_frame <= sizes[1] - sizes[0], "tokens_per_frame() is not within what a frame adds to n_tokens")
+    require(
+        0 < per_frame <= sizes[1] - sizes[0],
+        "tokens_per_frame() is not within what a frame adds to n_tokens",
+    )
 
 
 def check_turns(model: Model, frame: FrameRef) -> None:
@@ -47,13 +62,19 @@ def check_turns(model: Model, frame: FrameRef) -> None:
     _check_nothing_to_reply_to(talk, "a conversation whose last turn is the assistant's")
     talk.append("\nAre you sure?")
     talk.reply(GREEDY)
-    require(one_turn is None or one_turn < (talk.n_tokens or 0), "n_tokens of three turns is not above that of one")
+    require(
+        one_turn is None or one_turn < (talk.n_tokens or 0),
+        "n_tokens of three turns is not above that of one",
+    )
     _check_system(model, frame)
 
 
 def check_marks(model: Model, frame: FrameRef) -> None:
     """Check marks and rewinding."""
-    talk, unchanged = start_conversation(model, frame, QUESTION), start_conversation(model, frame, QUESTION)
+    talk, unchanged = (
+        start_conversation(model, frame, QUESTION),
+        start_conversation(model, frame, QUESTION),
+    )
     early = talk.mark()
     talk.append(" More.")
     late = talk.mark()
@@ -61,11 +82,17 @@ def check_marks(model: Model, frame: FrameRef) -> None:
     require(_alike(model, talk, unchanged), "rewind() does not bring back n_tokens or the reply")
     talk.append("Yes.", role="assistant")
     talk.append(" More and more.")
-    require(raises(ValueError, talk.rewind, late), "rewind() to a mark behind the point rewound to does not raise")
+    require(
+        raises(ValueError, talk.rewind, late),
+        "rewind() to a mark behind the point rewound to does not raise",
+    )
     talk.rewind(early)
     require(_alike(model, talk, unchanged), "a second rewind() to the same mark fails")
     foreign = start_conversation(model, frame).mark()
-    require(raises(ValueError, talk.rewind, foreign), "rewind() to another conversation's mark does not raise")
+    require(
+        raises(ValueError, talk.rewind, foreign),
+        "rewind() to another conversation's mark does not raise",
+    )
 
 
 def _check_nothing_to_reply_to(talk: Conversation, what: str) -> None:
@@ -88,4 +115,6 @@ def _alike(model: Model, one: Conversation, other: Conversation) -> bool:
     """Return whether two conversations look the same: by token count, or else by a deterministic reply."""
     if model.capabilities.counts_tokens:
         return one.n_tokens == other.n_tokens
-    return not model.capabilities.deterministic or same_reply(one.reply(GREEDY), other.reply(GREEDY))
+    return not model.capabilities.deterministic or same_reply(
+        one.reply(GREEDY), other.reply(GREEDY)
+    )

@@ -7,7 +7,12 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.check.claims import check_choices, check_flight, check_sampling, check_video
 from model_adapters.check.clauses import check_identity, check_members
 from model_adapters.check.conversation import check_counts, check_marks, check_parts, check_turns
-from model_adapters.check.replies import check_continuations, check_frames, check_reply, check_sharing
+from model_adapters.check.replies import (
+    check_continuations,
+    check_frames,
+    check_reply,
+    check_sharing,
+)
 from model_adapters.protocols import Model
 
 __all__ = ["model_checks"]

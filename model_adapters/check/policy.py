@@ -13,7 +13,9 @@ __all__ = ["policy_checks"]
 _INSTRUCTION = "pick up the mug"
 
 
-def policy_checks(policy: Policy, black: FrameRef, white: FrameRef) -> dict[str, Callable[[], None]]:
+def policy_checks(
+    policy: Policy, black: FrameRef, white: FrameRef
+) -> dict[str, Callable[[], None]]:
     """Return all checks of a policy by name; each raises `ContractError` if a clause does not hold."""
     return {
         "members": partial(check_members, policy),
@@ -37,11 +39,20 @@ def _run_episode(policy: Policy, frames: tuple[FrameRef, ...]) -> list[tuple[Arm
 
 
 def _check_chunk(chunk: tuple[ArmDelta, ...]) -> None:
-    require(isinstance(chunk, tuple) and len(chunk) > 0, "act() does not return a tuple of at least one ArmDelta")
+    require(
+        isinstance(chunk, tuple) and len(chunk) > 0,
+        "act() does not return a tuple of at least one ArmDelta",
+    )
     for step in chunk:
         require(isinstance(step, ArmDelta), "a step of act() is not an ArmDelta")
-        require(len(step.translation) == len(step.rotation) == 3, "a translation or rotation is not three numbers")
+        require(
+            len(step.translation) == len(step.rotation) == 3,
+            "a translation or rotation is not three numbers",
+        )
         numbers = (*step.translation, *step.rotation, step.gripper)
         finite = all(isinstance(number, float) and math.isfinite(number) for number in numbers)
         require(finite, f"a step of act() is not made of finite floats: {step}")
-        require(0 <= step.gripper <= 1, f"the gripper is not between 0 (closed) and 1 (open): {step.gripper}")
+        require(
+            0 <= step.gripper <= 1,
+            f"the gripper is not between 0 (closed) and 1 (open): {step.gripper}",
+        )

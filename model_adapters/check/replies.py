@@ -5,7 +5,14 @@ Each check raises `ContractError`, which names the clause that does not hold.
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.check.clauses import require
-from model_adapters.check.questions import GREEDY, NEW_TOKENS, QUESTION, ask, same_reply, start_conversation
+from model_adapters.check.questions import (
+    GREEDY,
+    NEW_TOKENS,
+    QUESTION,
+    ask,
+    same_reply,
+    start_conversation,
+)
 from model_adapters.protocols import Conversation, Decoding, Model, Part, Reply
 
 __all__ = ["check_continuations", "check_frames", "check_reply", "check_sharing"]
@@ -22,7 +29,10 @@ def check_reply(model: Model, frame: FrameRef) -> None:
     _check_ids(model, first)
     require(talk.n_tokens == size, "reply() changes the conversation")
     if model.capabilities.deterministic:
-        require(same_reply(first, talk.reply(GREEDY)), "the same question is not answered the same way twice")
+        require(
+            same_reply(first, talk.reply(GREEDY)),
+            "the same question is not answered the same way twice",
+        )
         _check_short(talk, first)
     _check_stop(model, talk, first)
 
@@ -30,9 +40,18 @@ def check_reply(model: Model, frame: FrameRef) -> None:
 def check_frames(model: Model, black: FrameRef, white: FrameRef) -> None:
     """Check that the model sees the frames."""
     # Equal replies to one question may be chance, so one of several replies has to differ.
-    questions = [QUESTION, "\nIs it bright or dark?", "\nWhat colour is it?", "\nDescribe the picture."]
-    differ = any(not same_reply(ask(model, black, text), ask(model, white, text)) for text in questions)
-    require(differ, "a black and a white frame get the same replies: the model does not see the frames")
+    questions = [
+        QUESTION,
+        "\nIs it bright or dark?",
+        "\nWhat colour is it?",
+        "\nDescribe the picture.",
+    ]
+    differ = any(
+        not same_reply(ask(model, black, text), ask(model, white, text)) for text in questions
+    )
+    require(
+        differ, "a black and a white frame get the same replies: the model does not see the frames"
+    )
 
 
 def check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
@@ -53,10 +72,16 @@ def check_sharing(model: Model, black: FrameRef, white: FrameRef) -> None:
 def check_continuations(model: Model, black: FrameRef, white: FrameRef) -> None:
     """Check that several continuations get the replies that each of them gets alone."""
     talk = start_conversation(model, black)
-    continuations: list[list[Part]] = [[QUESTION], [white, "\nWhat colours are the frames?"], ["\nWhy?"]]
+    continuations: list[list[Part]] = [
+        [QUESTION],
+        [white, "\nWhat colours are the frames?"],
+        ["\nWhy?"],
+    ]
     size, together = talk.n_tokens, talk.replies(continuations, GREEDY)
     require(talk.n_tokens == size, "replies() changes the conversation")
-    require(len(together) == len(continuations), "replies() does not give one reply per continuation")
+    require(
+        len(together) == len(continuations), "replies() does not give one reply per continuation"
+    )
     alone = [ask(model, black, *parts) for parts in continuations]
     alike = all(map(same_reply, together, alone)) or not model.capabilities.deterministic
     require(alike, "replies() differs from asking one by one")
@@ -64,10 +89,19 @@ def check_continuations(model: Model, black: FrameRef, white: FrameRef) -> None:
 
 
 def _check_counted(reply: Reply, size: int | None) -> None:
-    require(reply.n_context_tokens == size, "n_tokens before a reply is not the reply's n_context_tokens")
+    require(
+        reply.n_context_tokens == size,
+        "n_tokens before a reply is not the reply's n_context_tokens",
+    )
     cached, n_new = reply.n_cached_tokens, reply.n_reply_tokens
-    require(cached is not None and 0 <= cached < (size or 0), "n_cached_tokens is not between 0 and the context")
-    require(n_new is not None and 0 <= n_new <= NEW_TOKENS, "n_reply_tokens is not between 0 and max_new_tokens")
+    require(
+        cached is not None and 0 <= cached < (size or 0),
+        "n_cached_tokens is not between 0 and the context",
+    )
+    require(
+        n_new is not None and 0 <= n_new <= NEW_TOKENS,
+        "n_reply_tokens is not between 0 and max_new_tokens",
+    )
 
 
 def _check_ids(model: Model, reply: Reply) -> None:
@@ -83,7 +117,10 @@ def _check_ids(model: Model, reply: Reply) -> None:
 def _check_short(talk: Conversation, whole: Reply) -> None:
     if whole.token_ids is not None:
         short = talk.reply(Decoding(max_new_tokens=1))
-        require(short.token_ids == whole.token_ids[:1], "a shorter reply is not the start of a longer one")
+        require(
+            short.token_ids == whole.token_ids[:1],
+            "a shorter reply is not the start of a longer one",
+        )
 
 
 def _check_stop(model: Model, talk: Conversation, whole: Reply) -> None:
@@ -92,4 +129,6 @@ def _check_stop(model: Model, talk: Conversation, whole: Reply) -> None:
     stop = whole.text[len(whole.text) // 2 :]
     cut = talk.reply(Decoding(max_new_tokens=NEW_TOKENS, stop=(stop,))).text
     expected = whole.text[: whole.text.index(stop)] if model.capabilities.deterministic else cut
-    require(stop not in cut and cut == expected, "a stop string and what follows it are not cut off")
+    require(
+        stop not in cut and cut == expected, "a stop string and what follows it are not cut off"
+    )

@@ -8,9 +8,9 @@ import torch
 from PIL import Image
 
 from infthor_eval.errors import ModelError, wrap_errors
-from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, locate
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.family import MakeFamily
-from model_adapters.hf.model import TransformersModel
+from model_adapters.hf.loading.checkpoint import LocatedCheckpoint, load_checkpoint, locate
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading
 
 __all__ = ["CheckpointAdapter", "load_model", "wrap_mismatch_errors"]
@@ -58,7 +58,9 @@ class CheckpointAdapter:
         return located
 
 
-def load_model(name: str, located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily) -> TransformersModel:
+def load_model(
+    name: str, located: LocatedCheckpoint[CheckpointOptions], family: MakeFamily
+) -> TransformersModel:
     """Load a checkpoint of a known family and test it on one frame.
 
     Raises:
@@ -85,5 +87,7 @@ def wrap_mismatch_errors(pretrained: str) -> Iterator[None]:
     """
     # Any error is possible: the processor's settings come from a file and end up in arithmetic and shapes.
     problem = f"{pretrained}: the model fails on what the processor makes of a frame"
-    with wrap_errors(problem, "do they belong to one checkpoint?", catch=Exception, raise_as=ModelError):
+    with wrap_errors(
+        problem, "do they belong to one checkpoint?", catch=Exception, raise_as=ModelError
+    ):
         yield

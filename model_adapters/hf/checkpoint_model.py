@@ -9,8 +9,8 @@ import torch
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
 from model_adapters.hf.limits import wrap_model_errors
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.prompt import Piece, Prompter, n_tokens
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.prompt import Piece, Prompter, n_tokens
 from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
@@ -64,7 +64,9 @@ class CheckpointModel(ABC):
         return self.answer_each([turns], decoding)[0]
 
     @abstractmethod
-    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+    def answer_each(
+        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
+    ) -> list[Reply]:
         """Answer several conversations; see `Conversation.replies`."""
 
 
@@ -85,7 +87,9 @@ class HfModel(CheckpointModel):
             video_input=self._prompter.takes_videos,
             batch_size=self._batch_size,
             max_tokens=self._context_limit,
-            max_tokens_before_extension=None if self._options.rope is None else text_config.max_position_embeddings,
+            max_tokens_before_extension=None
+            if self._options.rope is None
+            else text_config.max_position_embeddings,
         )
 
     def identity(self) -> dict[str, Any]:
@@ -98,7 +102,10 @@ class HfModel(CheckpointModel):
             "share_prefix": options.share_prefix,
             "chunk_tokens": options.chunk_tokens,
             "batch_size": options.batch_size,
-            "generation": {"repetition_penalty": generation.repetition_penalty, "end_ids": sorted(generation.end_ids)},
+            "generation": {
+                "repetition_penalty": generation.repetition_penalty,
+                "end_ids": sorted(generation.end_ids),
+            },
         }
 
     def close(self) -> None:
@@ -115,4 +122,6 @@ class HfModel(CheckpointModel):
     def _context_limit(self) -> int | None:
         """Context limit of the options, else of the checkpoint, or None."""
         options = self._options
-        return (self._loaded.max_tokens if options.max_tokens is None else options.max_tokens) or None
+        return (
+            self._loaded.max_tokens if options.max_tokens is None else options.max_tokens
+        ) or None

@@ -46,7 +46,9 @@ class VideoInput(Protocol):
     def n_tokens(self, shape: ClipShape) -> int:
         """Return the number of tokens of a clip."""
 
-    def features(self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]) -> list[torch.Tensor]:
+    def features(
+        self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
+    ) -> list[torch.Tensor]:
         """Return the embeddings for the tokens of each clip, (tokens, hidden), on the embedding layer's device."""
 
 

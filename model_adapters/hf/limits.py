@@ -14,7 +14,9 @@ __all__ = ["check_limit", "wrap_memory_errors", "wrap_model_errors"]
 _FAILURES = (RuntimeError, ValueError, IndexError, ArithmeticError, MemoryError)
 
 
-def check_limit(name: str, n_context: int, max_new_tokens: int, limit: int | None, option: str = "max_tokens") -> None:
+def check_limit(
+    name: str, n_context: int, max_new_tokens: int, limit: int | None, option: str = "max_tokens"
+) -> None:
     """Check that context and reply, in tokens, are within the limit of both together; None for none.
 
     `option` is the model's option that sets the limit, for the message.
@@ -37,7 +39,10 @@ def wrap_model_errors(name: str) -> Iterator[None]:
         ModelError: the model failed on the request.
     """
     with wrap_errors(
-        f"{name} fails on the request", "change the request, or report it", catch=_FAILURES, raise_as=ModelError
+        f"{name} fails on the request",
+        "change the request, or report it",
+        catch=_FAILURES,
+        raise_as=ModelError,
     ):
         yield
 
@@ -54,10 +59,14 @@ def wrap_memory_errors(name: str, n_context: int) -> Iterator[None]:
     try:
         yield
     except (RuntimeError, MemoryError) as error:
-        traceback.clear_frames(error.__traceback__)  # its local variables hold the request's cache and activations
+        traceback.clear_frames(
+            error.__traceback__
+        )  # its local variables hold the request's cache and activations
         # torch has its own exception for GPUs only; on the CPU, only the allocator's name identifies the error.
         cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
         if not (cpu or isinstance(error, torch.OutOfMemoryError)):
             raise
         hint = "use fewer frames, kv_offload=true, or a smaller chunk_tokens"
-        raise ModelError(f"out of memory on a context of {n_context} tokens ({name}); {hint}") from error
+        raise ModelError(
+            f"out of memory on a context of {n_context} tokens ({name}); {hint}"
+        ) from error

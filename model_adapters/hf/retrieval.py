@@ -16,11 +16,16 @@ import torch
 import transformers
 
 from infthor_eval.errors import ModelError, UsageError
-from infthor_eval.formats.digests import digest
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.user_cache import user_cache
-from model_adapters.hf.checkpoint import origin, resolve_device, versions, wrap_loading_errors
-from model_adapters.hf.hub import fetch
+from infthor_eval.storage.digests import digest
+from infthor_eval.storage.user_cache import user_cache
+from model_adapters.hf.loading.checkpoint import (
+    origin,
+    resolve_device,
+    versions,
+    wrap_loading_errors,
+)
+from model_adapters.hf.loading.hub import fetch
 from model_adapters.hf.vectors import VectorFile
 from model_adapters.options.checkpoints import Placement
 
@@ -41,16 +46,23 @@ class Retriever:
         """
         try:
             # Old CLIP checkpoints on the hub have no safetensors.
-            folder, commit = fetch(name, revision, option="--retriever ", extra_patterns=["pytorch_model.bin"])
+            folder, commit = fetch(
+                name, revision, option="--retriever ", extra_patterns=["pytorch_model.bin"]
+            )
             with wrap_loading_errors(name):
                 model = _load_model(folder)
                 self._tokenizer = transformers.AutoTokenizer.from_pretrained(folder)
-                self._image_processor = transformers.AutoImageProcessor.from_pretrained(folder, backend="pil")
+                self._image_processor = transformers.AutoImageProcessor.from_pretrained(
+                    folder, backend="pil"
+                )
         except ModelError as error:
             raise UsageError(str(error)) from error
         self._model: Any = model.to(resolve_device(Placement())).eval()
         self._origin = origin(folder, commit, name)
-        file = user_cache("clip_vectors") / f"{digest(json.dumps(self.identity(), sort_keys=True))}.f32"
+        file = (
+            user_cache("clip_vectors")
+            / f"{digest(json.dumps(self.identity(), sort_keys=True))}.f32"
+        )
         self._vectors = VectorFile(file, model.config.projection_dim)
 
     def identity(self) -> dict[str, Any]:
@@ -71,7 +83,9 @@ class Retriever:
         keys = list(missing)
         for at in range(0, len(keys), _BATCH):
             batch = keys[at : at + _BATCH]
-            inputs = self._image_processor(images=[missing[key].load() for key in batch], return_tensors="pt")
+            inputs = self._image_processor(
+                images=[missing[key].load() for key in batch], return_tensors="pt"
+            )
             self._embed(self._model.get_image_features, inputs, batch)
         return self._vectors.get([frame.digest for frame in frames])
 
@@ -93,11 +107,15 @@ class Retriever:
 def _load_model(folder: Path) -> Any:
     model_type = transformers.AutoConfig.from_pretrained(folder).model_type
     if model_type != "clip":
-        raise ModelError(f"--retriever {folder} is a {model_type} checkpoint; retrieval needs one of CLIP")
+        raise ModelError(
+            f"--retriever {folder} is a {model_type} checkpoint; retrieval needs one of CLIP"
+        )
     clip: Any = transformers.CLIPModel
     model, report = clip.from_pretrained(folder, dtype=torch.float32, output_loading_info=True)
     if report["missing_keys"]:  # transformers would draw them at random and only warn
-        raise ModelError(f"--retriever {folder} lacks {len(report['missing_keys'])} weights; give a complete one")
+        raise ModelError(
+            f"--retriever {folder} lacks {len(report['missing_keys'])} weights; give a complete one"
+        )
     return model
 
 

@@ -10,16 +10,21 @@ from typing import Any
 
 import torch
 from PIL import Image
-from transformers import LogitsProcessor, LogitsProcessorList, StoppingCriteria, StoppingCriteriaList
+from transformers import (
+    LogitsProcessor,
+    LogitsProcessorList,
+    StoppingCriteria,
+    StoppingCriteriaList,
+)
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
+from model_adapters.hf.cached.decoding import ReplyState, extend_replies
+from model_adapters.hf.cached.replies import begin_reply, end_reply
 from model_adapters.hf.checkpoint_model import HfModel
-from model_adapters.hf.decoding import ReplyState, extend_replies
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.rendering import Marks, render, starts_with_bos
-from model_adapters.hf.replies import begin_reply, end_reply
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.rendering import Marks, render, starts_with_bos
 from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
@@ -54,13 +59,17 @@ def image_token(processor: Any) -> str:
     """
     token = getattr(processor, "boi_token", None) or getattr(processor, "image_token", None)
     if not isinstance(token, str):
-        raise ModelError(f"{type(processor).__name__} names no image token, so its frames cannot be counted")
+        raise ModelError(
+            f"{type(processor).__name__} names no image token, so its frames cannot be counted"
+        )
     return token
 
 
 def expand_image_token(processor: Any, image: Image.Image) -> list[int]:
     """Return the ids that the processor expands the token of one image to."""
-    inputs = processor(text=[image_token(processor)], images=[image], add_special_tokens=False, return_tensors="pt")
+    inputs = processor(
+        text=[image_token(processor)], images=[image], add_special_tokens=False, return_tensors="pt"
+    )
     return list(inputs["input_ids"][0].tolist())
 
 
@@ -83,14 +92,18 @@ class _StopWithReply(StoppingCriteria):
     def __init__(self, reply: ReplyState) -> None:
         self._reply = reply
 
-    def __call__(self, input_ids: torch.Tensor, scores: torch.Tensor, **kwargs: Any) -> torch.Tensor:
+    def __call__(
+        self, input_ids: torch.Tensor, scores: torch.Tensor, **kwargs: Any
+    ) -> torch.Tensor:
         return torch.tensor([self._reply.done], device=input_ids.device)
 
 
 class UncachedModel(HfModel):
     """A loaded checkpoint behind the `Model` protocol, without a shared prefix."""
 
-    def __init__(self, name: str, loaded: LoadedCheckpoint, processor: Any, options: HfOptions) -> None:
+    def __init__(
+        self, name: str, loaded: LoadedCheckpoint, processor: Any, options: HfOptions
+    ) -> None:
         super().__init__(name, loaded, options)
         self._processor = processor
 
@@ -113,7 +126,9 @@ class UncachedModel(HfModel):
         """Return the context size of a reply to these turns, in tokens."""
         return int(self._inputs(turns)["input_ids"].shape[1])
 
-    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+    def answer_each(
+        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
+    ) -> list[Reply]:
         """Answer several conversations, one after the other; see `Conversation.replies`."""
         with torch_threads(self._threads):
             return [self._answer(turns, decoding) for turns in conversations]

@@ -30,7 +30,9 @@ class VectorFile:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("a+b")
         except OSError as error:
-            raise DataError(f"{path}: cannot be written ({error.strerror}); set XDG_CACHE_HOME") from error
+            raise DataError(
+                f"{path}: cannot be written ({error.strerror}); set XDG_CACHE_HOME"
+            ) from error
         self._read_new_keys()
 
     def __contains__(self, key: str) -> bool:
@@ -51,11 +53,15 @@ class VectorFile:
         fcntl.flock(self._file, fcntl.LOCK_EX)
         try:
             size = os.fstat(self._file.fileno()).st_size
-            self._file.truncate(size - size % self._row_type.itemsize)  # drops a killed process's unfinished row
+            self._file.truncate(
+                size - size % self._row_type.itemsize
+            )  # drops a killed process's unfinished row
             self._file.write(rows.tobytes())
             self._file.flush()
         except OSError as error:
-            raise DataError(f"{self._file.name}: cannot be written ({error.strerror}); free some space") from error
+            raise DataError(
+                f"{self._file.name}: cannot be written ({error.strerror}); free some space"
+            ) from error
         finally:
             fcntl.flock(self._file, fcntl.LOCK_UN)
         self._read_new_keys()

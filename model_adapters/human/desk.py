@@ -89,7 +89,10 @@ class Desk:
             KeyboardInterrupt: the person stops the run from the page.
         """
         with self._changed:
-            self._question, self._answer = Question(next(self._numbers), asked, time.monotonic()), None
+            self._question, self._answer = (
+                Question(next(self._numbers), asked, time.monotonic()),
+                None,
+            )
             self._change()
             try:
                 while self._answer is None and not self._is_stopped:
@@ -109,7 +112,11 @@ class Desk:
             StaleError: it is not the one that is asked.
         """
         with self._changed:
-            if self._question is None or self._question.number != number or self._answer is not None:
+            if (
+                self._question is None
+                or self._question.number != number
+                or self._answer is not None
+            ):
                 raise StaleError
             self._answer = answer
             self._changed.notify_all()

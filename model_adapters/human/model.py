@@ -30,7 +30,9 @@ class HumanModel:
     @property
     def capabilities(self) -> Capabilities:
         """One question at a time; nothing is counted in tokens, and nobody answers the same twice for certain."""
-        return Capabilities(counts_tokens=False, token_ids=False, deterministic=False, sampling=True, choices=True)
+        return Capabilities(
+            counts_tokens=False, token_ids=False, deterministic=False, sampling=True, choices=True
+        )
 
     def identity(self) -> dict[str, Any]:
         """Return who answers, as JSON values."""
@@ -55,9 +57,13 @@ class HumanModel:
         self._open()
         answer = self._desk.ask(Asked(tuple(turns), decoding, self._notice))
         before_stop = None if decoding.choices else cut_at_stop(answer.text, decoding.stop)
-        return Reply(answer.text if before_stop is None else before_stop, n_watched=answer.n_watched)
+        return Reply(
+            answer.text if before_stop is None else before_stop, n_watched=answer.n_watched
+        )
 
-    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+    def answer_each(
+        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
+    ) -> list[Reply]:
         """Ask one after the other; see `Conversation.replies`."""
         return [self.answer(turns, decoding) for turns in conversations]
 

@@ -58,7 +58,9 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
         if seen.isdecimal():
             await run_in_threadpool(desk.wait_for_change, int(seen), _WAIT_S)
         told = state_of(desk)
-        return JSONResponse(told, background=BackgroundTask(desk.tell_closed) if told["closed"] else None)
+        return JSONResponse(
+            told, background=BackgroundTask(desk.tell_closed) if told["closed"] else None
+        )
 
     async def frame(request: Request) -> Response:
         """One frame of the question of a number."""
@@ -69,7 +71,11 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
         if request.path_params["place"] >= len(frames):
             return _problem("there is no such frame", 404)
         path = frames[request.path_params["place"]].path
-        return FileResponse(path) if path.is_file() else _problem(f"{path.name}: the frame is not there", 404)
+        return (
+            FileResponse(path)
+            if path.is_file()
+            else _problem(f"{path.name}: the frame is not there", 404)
+        )
 
     async def answer(request: Request) -> Response:
         """Take an answer."""
@@ -103,7 +109,11 @@ def _take(desk: Desk, given: _Given) -> Response:
         return _problem("write an answer first", 400)
     if len(text) > _LONGEST:
         return _problem(f"an answer has at most {_LONGEST} characters", 400)
-    if question is not None and question.asked.decoding.choices and text not in question.asked.decoding.choices:
+    if (
+        question is not None
+        and question.asked.decoding.choices
+        and text not in question.asked.decoding.choices
+    ):
         return _problem("only the listed replies are possible here", 400)
     try:
         desk.give(given.number, Answer(text, max(0, given.watched)))
@@ -118,4 +128,6 @@ def _problem(text: str, status: int) -> JSONResponse:
 
 def _has_screen() -> bool:
     """Return whether a browser can open a window; in a terminal without one it would take the terminal."""
-    return sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )

@@ -28,7 +28,12 @@ class OpenAI:
             ModelError: the client library is not installed, or a required key is missing.
         """
         hint = "pip install 'infthor-eval[openai]'"
-        with wrap_errors(f"{name} needs the package openai, 3 or newer", hint, catch=ImportError, raise_as=ModelError):
+        with wrap_errors(
+            f"{name} needs the package openai, 3 or newer",
+            hint,
+            catch=ImportError,
+            raise_as=ModelError,
+        ):
             from model_adapters.openai.model import ServedModel
         key = read_key(options.api_key_env, needed=urlsplit(options.url).hostname == _NEEDS_KEY)
         return ServedModel(name, options, key)

@@ -39,7 +39,9 @@ class TokenUsage(msgspec.Struct, frozen=True):
         """Tokens of the request in the server's cache, or None if it does not report them."""
         details = self.prompt_tokens_details
         return (
-            None if details is None or details.cached_tokens is None else min(details.cached_tokens, self.prompt_tokens)
+            None
+            if details is None or details.cached_tokens is None
+            else min(details.cached_tokens, self.prompt_tokens)
         )
 
     @property
@@ -95,7 +97,9 @@ class Completion(msgspec.Struct, frozen=True):
             return text
         if self.thinking is not None and choice.finish_reason == "length":
             return ""
-        raise ModelError(f"{where} gives no text{_WHY.get(choice.finish_reason or '', '; see its log')}")
+        raise ModelError(
+            f"{where} gives no text{_WHY.get(choice.finish_reason or '', '; see its log')}"
+        )
 
 
 def read_completion(where: str, content: bytes) -> Completion:

@@ -49,7 +49,9 @@ class _TransientError(Exception):
         busy: true if the server works and only has too many requests.
     """
 
-    def __init__(self, message: str, hint: str, wait_s: float | None = None, *, busy: bool = False) -> None:
+    def __init__(
+        self, message: str, hint: str, wait_s: float | None = None, *, busy: bool = False
+    ) -> None:
         super().__init__(message)
         self.hint = hint
         self.wait_s = wait_s
@@ -88,7 +90,9 @@ class Endpoint:
                 if len(faults) == n_attempts:
                     if not fault.busy:
                         self._is_down.set()
-                    raise ModelError(f"{self.where} {fault}, in {n_attempts} attempts; {fault.hint}") from fault
+                    raise ModelError(
+                        f"{self.where} {fault}, in {n_attempts} attempts; {fault.hint}"
+                    ) from fault
                 time.sleep(_pause_s(len(faults), fault))
             else:
                 self._is_down.clear()
@@ -103,7 +107,9 @@ class Endpoint:
             return self._wire.post(request)
         except TimeoutError as error:
             timeout_s = self._options.timeout_s
-            raise _TransientError(f"does not answer within {timeout_s:g} s", "raise timeout_s if it is slow") from error
+            raise _TransientError(
+                f"does not answer within {timeout_s:g} s", "raise timeout_s if it is slow"
+            ) from error
         except UnreadableError as error:
             raise ModelError(f"{self.where} {error}; is it a chat model's address?") from error
         except openai.APIConnectionError as error:
@@ -113,13 +119,17 @@ class Endpoint:
             raise self._classify(error) from error
         except openai.OpenAIError as error:
             reason = self._secret.redact(in_one_line(error))
-            raise ModelError(f"{self.where} cannot be asked ({reason}); check base_url and model") from error
+            raise ModelError(
+                f"{self.where} cannot be asked ({reason}); check base_url and model"
+            ) from error
 
     def _classify(self, error: openai.APIStatusError) -> _TransientError | ModelError:
         status, body = error.status_code, error.response.content
         phrase = f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
         problem = f"answers {status}{phrase}: {self._quote(body)}"
-        hint = _hint_of(body) or _HINTS.get(status) or _HINTS.get(status // 100 * 100) or _OTHER_HINT
+        hint = (
+            _hint_of(body) or _HINTS.get(status) or _HINTS.get(status // 100 * 100) or _OTHER_HINT
+        )
         is_transient = status in _TRANSIENT or status >= 500
         if not is_transient or (status == 429 and _QUOTA_EXCEEDED in body):
             return ModelError(f"{self.where} {problem}; {hint}")

@@ -14,7 +14,10 @@ from model_adapters.protocols import Part, Turn, Video
 __all__ = ["EncodedFrames", "to_messages"]
 
 _CACHE_BYTES = 256 * 2**20  # of encoded frames: a few thousand of the published size
-_SETTINGS: dict[str, dict[str, Any]] = {"png": {"compress_level": 6}, "jpeg": {"quality": 95, "subsampling": 0}}
+_SETTINGS: dict[str, dict[str, Any]] = {
+    "png": {"compress_level": 6},
+    "jpeg": {"quality": 95, "subsampling": 0},
+}
 
 
 class EncodedFrames:
@@ -36,7 +39,9 @@ class EncodedFrames:
         Raises:
             DataError: the frame cannot be read.
         """
-        with self._lock:  # held while encoding: threads with the same frames wait instead of encoding them again
+        with (
+            self._lock
+        ):  # held while encoding: threads with the same frames wait instead of encoding them again
             url = self._cache.get(frame.digest)
             if url is None:
                 url = self._encode(frame)
@@ -55,7 +60,9 @@ class EncodedFrames:
         return f"data:image/{self._format};base64,{base64.b64encode(content.getvalue()).decode('ascii')}"
 
 
-def to_messages(name: str, turns: Sequence[Turn], frames: EncodedFrames, detail: str | None) -> list[dict[str, Any]]:
+def to_messages(
+    name: str, turns: Sequence[Turn], frames: EncodedFrames, detail: str | None
+) -> list[dict[str, Any]]:
     """Return a conversation's messages, with texts and frames in order; each frame has this `detail` unless it is None.
 
     Raises:
@@ -65,11 +72,17 @@ def to_messages(name: str, turns: Sequence[Turn], frames: EncodedFrames, detail:
     return [{"role": turn.role, "content": _content(name, turn, frames, detail)} for turn in turns]
 
 
-def _content(name: str, turn: Turn, frames: EncodedFrames, detail: str | None) -> str | list[dict[str, Any]]:
-    if all(isinstance(part, str) for part in turn.parts):  # some servers accept only a string in system turns
+def _content(
+    name: str, turn: Turn, frames: EncodedFrames, detail: str | None
+) -> str | list[dict[str, Any]]:
+    if all(
+        isinstance(part, str) for part in turn.parts
+    ):  # some servers accept only a string in system turns
         return "".join(map(str, turn.parts))
     if turn.role != "user":
-        raise ModelError(f"{name} accepts frames in user turns only, not in a turn of the {turn.role}; move them")
+        raise ModelError(
+            f"{name} accepts frames in user turns only, not in a turn of the {turn.role}; move them"
+        )
     return [_part(part, frames, detail) for part in turn.parts]
 
 

@@ -71,7 +71,10 @@ class ServedModel:
             completion, faults = self._send(request, charge)
         text = self._secret.redact(completion.text(self._endpoint.where))
         thinking = None if completion.thinking is None else self._secret.redact(completion.thinking)
-        reply, usage = Reply(self._cut(text, decoding), faults=faults, thinking=thinking), completion.usage
+        reply, usage = (
+            Reply(self._cut(text, decoding), faults=faults, thinking=thinking),
+            completion.usage,
+        )
         if usage is None:
             return reply
         return replace(
@@ -82,7 +85,9 @@ class ServedModel:
             cost=self._cost(usage),
         )
 
-    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+    def answer_each(
+        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
+    ) -> list[Reply]:
         """Answer one after the other, because answers before a failure are paid for; see `Conversation.replies`."""
         return [self.answer(turns, decoding) for turns in conversations]
 

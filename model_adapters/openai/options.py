@@ -93,7 +93,9 @@ class OpenAIOptions:
         if not self.model:
             raise ValueError("it needs model=..., the server's name of the model")
         if not _NAME.fullmatch(self.api_key_env):
-            raise ValueError("api_key_env is not the name of an environment variable; put the key into one")
+            raise ValueError(
+                "api_key_env is not the name of an environment variable; put the key into one"
+            )
         self._check_address()
         self._check_values()
         self._check_money()
@@ -136,4 +138,6 @@ class OpenAIOptions:
         needed = (self.price_per_m_input, self.price_per_m_output)
         given = [name for name in ("max_cost", *_PRICES) if getattr(self, name) is not None]
         if given and None in needed:
-            raise ValueError(f"{given[0]} needs price_per_m_input and price_per_m_output; give both")
+            raise ValueError(
+                f"{given[0]} needs price_per_m_input and price_per_m_output; give both"
+            )

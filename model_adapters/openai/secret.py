@@ -36,8 +36,12 @@ def read_key(variable: str, *, needed: bool) -> Secret:
     value = os.environ.get(variable, "").strip()
     if not value:
         if needed:
-            raise ModelError("the environment variable that api_key_env names holds no key; set it (OPENAI_API_KEY)")
+            raise ModelError(
+                "the environment variable that api_key_env names holds no key; set it (OPENAI_API_KEY)"
+            )
         return Secret(None)
     if not (value.isascii() and value.isprintable()) or " " in value:
-        raise ModelError("the environment variable that api_key_env names holds no key (blanks, or not ASCII); fix it")
+        raise ModelError(
+            "the environment variable that api_key_env names holds no key (blanks, or not ASCII); fix it"
+        )
     return Secret(value)

@@ -28,7 +28,9 @@ class Prices:
 
     def cost(self, n_prompt: int, n_cached: int, n_reply: int) -> float:
         """Return the US dollars of one reply; the cached tokens are among those of the prompt."""
-        return ((n_prompt - n_cached) * self.prompt + n_cached * self.cached + n_reply * self.reply) / _MILLION
+        return (
+            (n_prompt - n_cached) * self.prompt + n_cached * self.cached + n_reply * self.reply
+        ) / _MILLION
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,11 @@ class Spend:
             return False
         tokens = self._tokens + self._in_flight * self._most_tokens
         cost = self._cost + self._in_flight * self._most_cost
-        return not self._most_tokens or _is_reached(tokens, self._caps.tokens) or _is_reached(cost, self._caps.cost)
+        return (
+            not self._most_tokens
+            or _is_reached(tokens, self._caps.tokens)
+            or _is_reached(cost, self._caps.cost)
+        )
 
     def _refusal(self) -> str | None:
         """Return why no more requests may be sent, or None if they may."""
@@ -127,7 +133,9 @@ class Spend:
         if _is_reached(self._tokens, self._caps.tokens):
             return f"not asked: {self._tokens} tokens reach max_tokens_total={self._caps.tokens}; {hint}"
         if _is_reached(self._cost, self._caps.cost):
-            return f"not asked: {self._cost:.4f} US dollars reach max_cost={self._caps.cost:g}; {hint}"
+            return (
+                f"not asked: {self._cost:.4f} US dollars reach max_cost={self._caps.cost:g}; {hint}"
+            )
         return None
 
 

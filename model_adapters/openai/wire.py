@@ -19,7 +19,10 @@ __all__ = ["UnreadableError", "Wire"]
 
 _LARGEST = 4 * 2**20  # bytes of the largest accepted reply
 _CONNECT_S = 30.0  # limit for a connection
-_LOGGERS = ("httpcore2", "httpx2")  # they log headers of replies, in which a server may repeat the key
+_LOGGERS = (
+    "httpcore2",
+    "httpx2",
+)  # they log headers of replies, in which a server may repeat the key
 
 
 class UnreadableError(Exception):
@@ -70,7 +73,9 @@ class Wire:
 
     async def _post(self, request: Mapping[str, Any]) -> bytes:
         async with asyncio.timeout(self._timeout_s):
-            reply = await self._client.chat.completions.with_raw_response.create(**request, extra_headers=self._headers)
+            reply = await self._client.chat.completions.with_raw_response.create(
+                **request, extra_headers=self._headers
+            )
             return bytes(reply.content)
 
     def close(self) -> None:

@@ -4,7 +4,14 @@ import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["CheckpointOptions", "CheckpointReading", "CheckpointSource", "HfOptions", "Placement", "parse_rope"]
+__all__ = [
+    "CheckpointOptions",
+    "CheckpointReading",
+    "CheckpointSource",
+    "HfOptions",
+    "Placement",
+    "parse_rope",
+]
 
 _ATTENTION = ("eager", "sdpa", "flex_attention", "flash_attention_2", "flash_attention_3")
 # Implementation to the module that has it, and the package to install for it.
@@ -30,7 +37,9 @@ def parse_rope(text: str) -> tuple[str, float]:
     except ValueError:
         factor = 0.0
     if rope_type not in _ROPES or not 1 < factor < 1000:
-        raise ValueError(f"rope={text} is not TYPE:FACTOR with TYPE one of {', '.join(_ROPES)} and FACTOR above 1")
+        raise ValueError(
+            f"rope={text} is not TYPE:FACTOR with TYPE one of {', '.join(_ROPES)} and FACTOR above 1"
+        )
     return rope_type, factor
 
 
@@ -56,9 +65,13 @@ class Placement:
             raise ValueError(f"threads={self.threads} is not from 1 to {_MOST_THREADS}")
         name = self.attn_implementation
         if "/" in name and not getattr(self, "trust_remote_code", False):
-            raise ValueError(f"attn_implementation={name} is code on the hub, which runs with trust_remote_code=true")
+            raise ValueError(
+                f"attn_implementation={name} is code on the hub, which runs with trust_remote_code=true"
+            )
         if "/" not in name and name not in _ATTENTION:
-            raise ValueError(f"attn_implementation={name} is not known; there are {', '.join(_ATTENTION)}")
+            raise ValueError(
+                f"attn_implementation={name} is not known; there are {', '.join(_ATTENTION)}"
+            )
         module, package = _PACKAGES.get(name, ("", ""))
         if module and importlib.util.find_spec(module) is None:
             raise ValueError(f"attn_implementation={name} needs the package {package}; use sdpa")
@@ -135,7 +148,12 @@ class HfOptions(Reading, Placement):
     max_tokens: int | None = None
 
     def __post_init__(self) -> None:
-        if self.chunk_tokens < 1 or self.batch_size < 1 or self.feature_cache_mb < 0 or (self.max_tokens or 0) < 0:
+        if (
+            self.chunk_tokens < 1
+            or self.batch_size < 1
+            or self.feature_cache_mb < 0
+            or (self.max_tokens or 0) < 0
+        ):
             raise ValueError(
                 "chunk_tokens and batch_size must be positive, feature_cache_mb and max_tokens not negative"
             )

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from infthor_eval.formats.limits import IMAGE_MEGAPIXELS
+from infthor_eval.storage.limits import IMAGE_MEGAPIXELS
 from model_adapters.options.checkpoints import CheckpointOptions
 
 __all__ = [
@@ -34,7 +34,11 @@ class PixelLimits:
             value = getattr(self, name)
             if value is not None and not 1 <= value <= most:
                 raise ValueError(f"{name}={value} is not between 1 and {most}")
-        if self.min_pixels is not None and self.max_pixels is not None and self.min_pixels > self.max_pixels:
+        if (
+            self.min_pixels is not None
+            and self.max_pixels is not None
+            and self.min_pixels > self.max_pixels
+        ):
             raise ValueError(f"min_pixels={self.min_pixels} is above max_pixels={self.max_pixels}")
         super().__post_init__()  # type: ignore[misc]  # the options that it is mixed into have one
 

@@ -65,7 +65,9 @@ class ActionOptions:
         if self.execute is not None and self.execute < 1:
             raise ValueError(f"execute={self.execute} returns no step; use 1 or more")
         if self.ensemble == "exp" and self.execute not in (None, 1):
-            raise ValueError(f"execute={self.execute} contradicts ensemble=exp, which returns one step a call")
+            raise ValueError(
+                f"execute={self.execute} contradicts ensemble=exp, which returns one step a call"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

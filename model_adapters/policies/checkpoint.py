@@ -10,8 +10,14 @@ from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.reading import read_json, require_file, require_plain_files
-from model_adapters.hf.checkpoint import origin, resolve_device, resolve_dtype, versions, wrap_loading_errors
-from model_adapters.hf.hub import fetch
+from model_adapters.hf.loading.checkpoint import (
+    origin,
+    resolve_device,
+    resolve_dtype,
+    versions,
+    wrap_loading_errors,
+)
+from model_adapters.hf.loading.hub import fetch
 from model_adapters.options.checkpoints import Placement
 
 __all__ = ["PolicyCheckpoint", "find_policy_checkpoint"]
@@ -90,11 +96,15 @@ class PolicyCheckpoint:
         if isinstance(dtype, str):
             config_dtype = getattr(torch, config.dtype or config.torch_dtype or "", None)
             if not (isinstance(config_dtype, torch.dtype) and config_dtype.is_floating_point):
-                raise UsageError(f"the config of {self.pretrained} has no type of weights; give dtype=")
+                raise UsageError(
+                    f"the config of {self.pretrained} has no type of weights; give dtype="
+                )
             dtype = config_dtype
         return resolve_device(options), dtype
 
-    def identity(self, device: torch.device, dtype: torch.dtype, options: Placement) -> dict[str, Any]:
+    def identity(
+        self, device: torch.device, dtype: torch.dtype, options: Placement
+    ) -> dict[str, Any]:
         """Return everything that results depend on, as JSON values."""
         return self.origin | {
             "dtype": str(dtype).removeprefix("torch."),

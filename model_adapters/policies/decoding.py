@@ -17,7 +17,11 @@ def embed_ids(model: Any, ids: Sequence[int]) -> torch.Tensor:
 
 
 def decode_greedily(
-    first: torch.Tensor, step: Callable[[int], torch.Tensor], action_ids: Sequence[range], *, constrained: bool
+    first: torch.Tensor,
+    step: Callable[[int], torch.Tensor],
+    action_ids: Sequence[range],
+    *,
+    constrained: bool,
 ) -> list[int]:
     """Decode action tokens, each the most likely one.
 
@@ -36,9 +40,13 @@ def decode_greedily(
     for place, allowed in enumerate(action_ids):
         scores = logits[allowed.start : allowed.stop] if constrained else logits
         if not torch.isfinite(scores.max()):  # the maximum is NaN if any score is
-            raise ModelError(f"action token {place + 1} has no finite score (NaN); try dtype=float32")
+            raise ModelError(
+                f"action token {place + 1} has no finite score (NaN); try dtype=float32"
+            )
         token = int(scores.argmax()) + (allowed.start if constrained else 0)
-        ids.append(min(max(token, allowed.start), allowed.stop - 1))  # the model is fed the token without clipping
+        ids.append(
+            min(max(token, allowed.start), allowed.stop - 1)
+        )  # the model is fed the token without clipping
         if place + 1 < len(action_ids):
             logits = step(token)
     return ids

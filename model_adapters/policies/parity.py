@@ -10,7 +10,7 @@ from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.scratch import ScratchFolder
+from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.tables import Column, Row, Table
 from model_adapters.options.policies import VlaHttpOptions
 from model_adapters.policies.http.adapter import HttpPolicy
@@ -70,9 +70,13 @@ class ParityReport:
         columns = ("instruction", "frames", "steps", "metres", "radians", "gripper")
         rows = tuple(Row(_cells(row)) for row in self.rows)
         verdict = "equal" if self.equal else "different"
-        note = f"Largest differences of actions; up to {self.tolerance:g} counts as equal: {verdict}."
+        note = (
+            f"Largest differences of actions; up to {self.tolerance:g} counts as equal: {verdict}."
+        )
         title = f"{self.name} and its reference"
-        return Table(title, tuple(Column(name, name != "instruction") for name in columns), rows, (note,))
+        return Table(
+            title, tuple(Column(name, name != "instruction") for name in columns), rows, (note,)
+        )
 
 
 def load_policy(name: str, options: Mapping[str, str]) -> Policy:
@@ -103,7 +107,11 @@ def reference_policy(url: str, unnorm_key: str | None) -> HttpPolicy:
 
 
 def compare_policies(
-    ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instructions: Sequence[str], tolerance: float
+    ours: Policy,
+    theirs: Policy,
+    frames: Sequence[FrameRef],
+    instructions: Sequence[str],
+    tolerance: float,
 ) -> ParityReport:
     """Compare the actions of both on the same frames and instructions, each frame as the first of an episode.
 
@@ -121,9 +129,15 @@ def frames_in_folder(folder: Path) -> list[FrameRef]:
     Raises:
         DataError: the folder has no pictures, or cannot be read.
     """
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _PICTURES) if folder.is_dir() else []
+    paths = (
+        sorted(path for path in folder.iterdir() if path.suffix.lower() in _PICTURES)
+        if folder.is_dir()
+        else []
+    )
     if not paths:
-        raise DataError(f"{folder}: has no pictures ({', '.join(_PICTURES)}); give a folder of frames")
+        raise DataError(
+            f"{folder}: has no pictures ({', '.join(_PICTURES)}); give a folder of frames"
+        )
     return [FrameRef(path) for path in paths]
 
 

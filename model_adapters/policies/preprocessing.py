@@ -13,7 +13,9 @@ def resize(image: Image.Image, size: int) -> torch.Tensor:
     return torch.from_numpy(pixels / 255).permute(2, 0, 1).contiguous()
 
 
-def normalise(pixels: torch.Tensor, mean: tuple[float, float, float], std: tuple[float, float, float]) -> torch.Tensor:
+def normalise(
+    pixels: torch.Tensor, mean: tuple[float, float, float], std: tuple[float, float, float]
+) -> torch.Tensor:
     """Return pixels, (..., 3, height, width), minus the mean and divided by the deviation of each channel."""
     shape = (3, 1, 1)
     return (pixels - pixels.new_tensor(mean).view(shape)) / pixels.new_tensor(std).view(shape)

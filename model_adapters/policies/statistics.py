@@ -55,15 +55,25 @@ def select_statistics(
     """
     listed = ", ".join(sorted(known)) or "none"
     if unnorm_key is None and len(known) != 1:
-        raise UsageError(f"{pretrained} was trained on several datasets; choose one with unnorm_key= of {listed}")
+        raise UsageError(
+            f"{pretrained} was trained on several datasets; choose one with unnorm_key= of {listed}"
+        )
     key = next(iter(known)) if unnorm_key is None else unnorm_key
     if key not in known:
         raise UsageError(f"unnorm_key={key} is not a dataset of {pretrained}; there are {listed}")
     try:
         statistics = msgspec.convert(known[key]["action"], ActionStatistics)
     except (msgspec.ValidationError, LookupError, TypeError) as error:
-        raise ModelError(f"the statistics of {key} in {pretrained} are damaged ({error}); restore them") from error
-    sizes = {len(values) for values in (statistics.q01, statistics.q99, statistics.mask) if values is not None}
+        raise ModelError(
+            f"the statistics of {key} in {pretrained} are damaged ({error}); restore them"
+        ) from error
+    sizes = {
+        len(values)
+        for values in (statistics.q01, statistics.q99, statistics.mask)
+        if values is not None
+    }
     if sizes != {ACTION_SIZE}:
-        raise ModelError(f"the actions of {key} in {pretrained} have {sorted(sizes)} numbers, not {ACTION_SIZE}")
+        raise ModelError(
+            f"the actions of {key} in {pretrained} have {sorted(sizes)} numbers, not {ACTION_SIZE}"
+        )
     return key, statistics

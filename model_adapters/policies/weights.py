@@ -50,7 +50,9 @@ class Layout:
     unused: Mapping[str, Shape]
 
     @classmethod
-    def of(cls, module: nn.Module, key_of: Callable[[str], str | None], unused: Mapping[str, Shape]) -> "Layout":
+    def of(
+        cls, module: nn.Module, key_of: Callable[[str], str | None], unused: Mapping[str, Shape]
+    ) -> "Layout":
         """Return the layout of a module's checkpoint.
 
         Args:
@@ -59,7 +61,9 @@ class Layout:
             unused: see `Layout.unused`.
         """
         entries = {
-            key: (name, value) for name, value in module.state_dict().items() if (key := key_of(name)) is not None
+            key: (name, value)
+            for name, value in module.state_dict().items()
+            if (key := key_of(name)) is not None
         }
         return cls(
             {key: name for key, (name, _) in entries.items()},
@@ -95,7 +99,13 @@ class Layout:
 
 
 def load_weights(
-    module: nn.Module, folder: Path, layout: Layout, *, pretrained: str, device: torch.device, dtype: torch.dtype
+    module: nn.Module,
+    folder: Path,
+    layout: Layout,
+    *,
+    pretrained: str,
+    device: torch.device,
+    dtype: torch.dtype,
 ) -> None:
     """Read a checkpoint's safetensors files into a module, one tensor at a time.
 
@@ -112,15 +122,22 @@ def load_weights(
     """
     paths = sorted(folder.glob("*.safetensors"))
     if not paths:
-        raise ModelError(f"{pretrained} has no *.safetensors file; give a checkpoint with weights in that format")
+        raise ModelError(
+            f"{pretrained} has no *.safetensors file; give a checkpoint with weights in that format"
+        )
     with ExitStack() as stack:
         files = [stack.enter_context(safe_open(path, framework="pt")) for path in paths]
         file_of = _files_by_key(files, pretrained)
-        layout.check({key: tuple(file.get_slice(key).get_shape()) for key, file in file_of.items()}, pretrained)
+        layout.check(
+            {key: tuple(file.get_slice(key).get_shape()) for key, file in file_of.items()},
+            pretrained,
+        )
         for key, name in layout.parameters.items():
             tensor = file_of[key].get_tensor(key)
             if not tensor.is_floating_point():
-                raise ModelError(f"{key} of {pretrained} is {tensor.dtype}; quantised weights are not supported")
+                raise ModelError(
+                    f"{key} of {pretrained} is {tensor.dtype}; quantised weights are not supported"
+                )
             _assign(module, name, tensor.to(device, dtype))
     # Not module.to(device): a tied parameter without a key has no memory yet, which `to` refuses.
     for part in module.modules():
@@ -134,7 +151,9 @@ def _files_by_key(files: Sequence[Any], pretrained: str) -> dict[str, Any]:
     for file in files:
         for key in file.keys():  # noqa: SIM118  # it is not a mapping
             if key in file_of:
-                raise ModelError(f"two files of {pretrained} have {key}; keep one checkpoint in a folder")
+                raise ModelError(
+                    f"two files of {pretrained} have {key}; keep one checkpoint in a folder"
+                )
             file_of[key] = file
     return file_of
 

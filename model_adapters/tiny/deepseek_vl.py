@@ -81,5 +81,10 @@ class DeepseekVLTiny(TinyAdapter):
         image_processor=DeepseekVLHybridImageProcessorPil,
         image_settings={"high_res_size": {"height": 256, "width": 256}},
         family=DeepseekVLFamily,
-        files={"processor_config.json": {"processor_class": "DeepseekVLHybridProcessor", "num_image_tokens": 576}},
+        files={
+            "processor_config.json": {
+                "processor_class": "DeepseekVLHybridProcessor",
+                "num_image_tokens": 576,
+            }
+        },
     )

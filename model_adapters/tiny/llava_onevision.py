@@ -37,7 +37,11 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
         image_token_index=ids["<image>"],
         video_token_index=ids["<video>"],
         text_config=text_config(
-            vocab_size, ids["<|im_end|>"], ids["<|endoftext|>"], model_type="qwen2", max_position_embeddings=32_768
+            vocab_size,
+            ids["<|im_end|>"],
+            ids["<|endoftext|>"],
+            model_type="qwen2",
+            max_position_embeddings=32_768,
         ),
         vision_config=siglip_config(patch_size=14),
     )

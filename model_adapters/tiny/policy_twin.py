@@ -11,7 +11,7 @@ import torch
 from safetensors.torch import save_file
 from tokenizers import Tokenizer
 
-from infthor_eval.formats.scratch import ScratchFolder
+from infthor_eval.storage.scratch import ScratchFolder
 from model_adapters.options.policies import PolicyOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.policy import VlaPolicy
@@ -67,7 +67,9 @@ class TinyPolicyAdapter:
         """Build a policy with random weights of this seed, loaded from a temporary checkpoint."""
         with ScratchFolder() as folder:
             cls.twin.save(folder, seed)
-            return cls.twin.load(name, PolicyCheckpoint(folder, name, {"checkpoint": name, "seed": seed}), options)
+            return cls.twin.load(
+                name, PolicyCheckpoint(folder, name, {"checkpoint": name, "seed": seed}), options
+            )
 
 
 def _draw_weights(shapes: Mapping[str, Shape], seed: int) -> dict[str, torch.Tensor]:

@@ -5,10 +5,10 @@
 
 from dataclasses import replace
 
-from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.storage.packaged import packaged_folder
 from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
-from model_adapters.hf.model import TransformersModel
 from model_adapters.options.checkpoints import CheckpointOptions
 from model_adapters.options.families import Qwen25VLNanoOptions
 

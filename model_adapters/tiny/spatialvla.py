@@ -31,7 +31,10 @@ _AXES = {  # number of bins, lowest and highest border, mean and deviation of th
     "pitch_bins": (16, -1.0, 1.0, 0.0, 0.5),
     "yaw_bins": (16, -1.0, 1.0, 0.0, 0.5),
 }
-_TRANSLATION, _ROTATION = ("theta_bins", "phi_bins", "r_bins"), ("roll_bins", "pitch_bins", "yaw_bins")
+_TRANSLATION, _ROTATION = (
+    ("theta_bins", "phi_bins", "r_bins"),
+    ("roll_bins", "pitch_bins", "yaw_bins"),
+)
 
 
 def _borders(n_bins: int, low: float, high: float, mean: float, deviation: float) -> list[float]:
@@ -118,7 +121,11 @@ _CONFIG: dict[str, Any] = {
 def _processor() -> dict[str, Any]:
     counts = {name: axis[0] for name, axis in _AXES.items()}
     borders = {name: _borders(*axis) for name, axis in _AXES.items()}
-    camera = {"width": 640, "height": 480, "intrinsic": [[623.588, 0, 319.501], [0, 623.588, 239.545], [0, 0, 1]]}
+    camera = {
+        "width": 640,
+        "height": 480,
+        "intrinsic": [[623.588, 0, 319.501], [0, 623.588, 239.545], [0, 0, 1]],
+    }
     return {
         "processor_class": "SpatialVLAProcessor",
         "action_chunk_size": 4,
@@ -149,7 +156,9 @@ def _tokenizer() -> Tokenizer:
 
 
 def _layout() -> Layout:
-    config = msgspec.convert(deepcopy(_CONFIG), SpatialVLAConfig)  # transformers' configs may change nested ones
+    config = msgspec.convert(
+        deepcopy(_CONFIG), SpatialVLAConfig
+    )  # transformers' configs may change nested ones
     with empty_parameters():
         return SpatialVLAWeights(config, "eager").layout()
 

@@ -9,17 +9,27 @@ from typing import Any, ClassVar, cast
 import torch
 from transformers import AutoModelForImageTextToText, GenerationConfig, PreTrainedTokenizerBase
 
-from model_adapters.hf.checkpoint import assemble, resolve_device, resolve_dtype
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.family import MakeFamily
-from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.quiet import hide_transformers_output
-from model_adapters.hf.rope import apply_rope
-from model_adapters.hf.templates import plain_template
-from model_adapters.hf.tower_names import with_published_names
+from model_adapters.hf.loading.checkpoint import assemble, resolve_device, resolve_dtype
+from model_adapters.hf.loading.quiet import hide_transformers_output
+from model_adapters.hf.loading.rope import apply_rope
+from model_adapters.hf.loading.tower_names import with_published_names
+from model_adapters.hf.prompting.templates import plain_template
 from model_adapters.options.tiny import TinyOptions
 from model_adapters.tiny.tokenizer import train_tokenizer
 
-__all__ = ["HEAD", "HIDDEN", "SPREAD", "TinyAdapter", "Twin", "draw_model", "siglip_config", "text_config", "token_ids"]
+__all__ = [
+    "HEAD",
+    "HIDDEN",
+    "SPREAD",
+    "TinyAdapter",
+    "Twin",
+    "draw_model",
+    "siglip_config",
+    "text_config",
+    "token_ids",
+]
 
 # Standard deviation of the weights. Ten times the usual one, so that replies of an untrained model differ from frame to
 # frame and from question to question.
@@ -63,14 +73,20 @@ class Twin:
     def tokenizer(self) -> PreTrainedTokenizerBase:
         """Train the tokenizer."""
         return train_tokenizer(
-            self.special, end=self.end, pad=self.pad, begin=self.begin, named={"image_token": self.image}
+            self.special,
+            end=self.end,
+            pad=self.pad,
+            begin=self.begin,
+            named={"image_token": self.image},
         )
 
     def model_config(self, tokenizer: PreTrainedTokenizerBase) -> Any:
         """Return the model's config for a tokenizer."""
         return self.config(token_ids(self.special, tokenizer), len(tokenizer))
 
-    def model(self, tokenizer: PreTrainedTokenizerBase, config: Any, seed: int, attn_implementation: str) -> Any:
+    def model(
+        self, tokenizer: PreTrainedTokenizerBase, config: Any, seed: int, attn_implementation: str
+    ) -> Any:
         """Return the model with random weights of this seed, in float32 on the CPU."""
         ids = token_ids((self.end, self.pad), tokenizer)
         return draw_model(config, seed, ids[self.end], ids[self.pad], attn_implementation)
@@ -97,7 +113,9 @@ def token_ids(tokens: Sequence[str], tokenizer: PreTrainedTokenizerBase) -> dict
     return {token: cast(int, tokenizer.convert_tokens_to_ids(token)) for token in tokens}
 
 
-def draw_model(config: Any, seed: int, end_id: int, pad_id: int, attn_implementation: str = "sdpa") -> Any:
+def draw_model(
+    config: Any, seed: int, end_id: int, pad_id: int, attn_implementation: str = "sdpa"
+) -> Any:
     """Return a transformers model with random weights, in float32 on the CPU.
 
     Args:
@@ -112,7 +130,9 @@ def draw_model(config: Any, seed: int, end_id: int, pad_id: int, attn_implementa
         model = cast(Any, AutoModelForImageTextToText).from_config(
             config, attn_implementation=attn_implementation, dtype=torch.float32
         )
-    model.generation_config = GenerationConfig(eos_token_id=list(dict.fromkeys([end_id, pad_id])), pad_token_id=pad_id)
+    model.generation_config = GenerationConfig(
+        eos_token_id=list(dict.fromkeys([end_id, pad_id])), pad_token_id=pad_id
+    )
     return model
 
 
@@ -162,14 +182,20 @@ class TinyAdapter:
         config = twin.model_config(tokenizer)
         max_tokens = apply_rope(config, options.rope)
         model = twin.model(tokenizer, config, seed, options.attn_implementation)
-        model = model.to(resolve_device(options), torch.float32 if isinstance(dtype, str) else dtype)
-        image_processor = twin.image_processor(**{**twin.image_settings, **options.image_settings()})
+        model = model.to(
+            resolve_device(options), torch.float32 if isinstance(dtype, str) else dtype
+        )
+        image_processor = twin.image_processor(
+            **{**twin.image_settings, **options.image_settings()}
+        )
         family = twin.family(model, image_processor, tokenizer)
         loaded = assemble(
             model,
             tokenizer,
             image_processor,
-            template=twin.template if options.prompt == "chat" else plain_template(tokenizer, family),
+            template=twin.template
+            if options.prompt == "chat"
+            else plain_template(tokenizer, family),
             family=family,
             max_tokens=max_tokens,
             origin={"checkpoint": name, "seed": seed},

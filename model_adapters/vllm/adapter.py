@@ -4,7 +4,6 @@ import functools
 from typing import Any, ClassVar
 
 from model_adapters.hf.adapter import CheckpointAdapter
-from model_adapters.hf.checkpoint import LocatedCheckpoint, build_meta_model, read_checkpoint
 from model_adapters.hf.families.hf_vlm import (
     HfVlm,
     ProcessorFamily,
@@ -17,6 +16,11 @@ from model_adapters.hf.families.pixtral import Pixtral
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VL
 from model_adapters.hf.family import MakeFamily
 from model_adapters.hf.limits import wrap_model_errors
+from model_adapters.hf.loading.checkpoint import (
+    LocatedCheckpoint,
+    build_meta_model,
+    read_checkpoint,
+)
 from model_adapters.vllm.arguments import frame_limit, model_arguments, token_limit
 from model_adapters.vllm.cpu import check_head_size, runs_on_cpu
 from model_adapters.vllm.engine import Engine, import_vllm
@@ -89,10 +93,14 @@ class HfVlmOnVllm:
         if family is not None:
             return _start(name, located, family)
         processor = load_processor(located)
-        return _start(name, located, functools.partial(ProcessorFamily, processor=processor), processor)
+        return _start(
+            name, located, functools.partial(ProcessorFamily, processor=processor), processor
+        )
 
 
-def _start(name: str, located: LocatedCheckpoint[Any], family: MakeFamily, processor: Any = None) -> VllmModel:
+def _start(
+    name: str, located: LocatedCheckpoint[Any], family: MakeFamily, processor: Any = None
+) -> VllmModel:
     options: VllmOptions = located.options
     if runs_on_cpu():
         check_head_size(name, located.config.get_text_config())
@@ -104,6 +112,8 @@ def _start(name: str, located: LocatedCheckpoint[Any], family: MakeFamily, proce
     with wrap_model_errors(name):
         per_frame = len(loaded.family.frame_ids((options.frame_size, options.frame_size)))
     max_frames = frame_limit(max_tokens, per_frame, options)
-    arguments = model_arguments(located.folder, located.config, options, max_tokens=max_tokens, max_frames=max_frames)
+    arguments = model_arguments(
+        located.folder, located.config, options, max_tokens=max_tokens, max_frames=max_frames
+    )
     engine = Engine(name, arguments, options.threads)
     return VllmModel(name, loaded, engine, options, max_tokens=max_tokens, max_frames=max_frames)

@@ -60,7 +60,10 @@ def model_arguments(
     }
     if options.rope is not None:
         arguments["hf_overrides"] = rope_overrides(config, options.rope)
-    arguments["mm_processor_kwargs"] = {"use_fast": options.image_backend == "torchvision", **options.image_settings()}
+    arguments["mm_processor_kwargs"] = {
+        "use_fast": options.image_backend == "torchvision",
+        **options.image_settings(),
+    }
     return arguments
 
 
@@ -95,13 +98,17 @@ def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
     _check_extension(config.model_type, rope_type, factor, has_axes=has_axes)
     overrides: dict[str, Any] = {"rope_parameters": dict(text.rope_parameters)}
     if has_axes:
-        overrides["rope_parameters"]["original_max_position_embeddings"] //= _FOURFOLD[config.model_type]
+        overrides["rope_parameters"]["original_max_position_embeddings"] //= _FOURFOLD[
+            config.model_type
+        ]
     if rope_type == "longrope":
         # vLLM ignores `factor` here, and scales attention by the ratio of the two lengths unless it is told a scale.
         overrides["rope_parameters"] |= {"short_mscale": 1.0, "long_mscale": 1.0}
     if rope_type in _LENGTH_IN_CONFIG:
         overrides["max_position_embeddings"] = int(text.max_position_embeddings * factor)
-    nested = next((name for name in config.sub_configs if getattr(config, name, None) is text), None)
+    nested = next(
+        (name for name in config.sub_configs if getattr(config, name, None) is text), None
+    )
     return overrides if nested is None else {nested: overrides}
 
 

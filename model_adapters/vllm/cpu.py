@@ -54,7 +54,10 @@ def check_head_size(name: str, text_config: Any) -> None:
     Raises:
         ModelError: there is no kernel.
     """
-    head = getattr(text_config, "head_dim", None) or text_config.hidden_size // text_config.num_attention_heads
+    head = (
+        getattr(text_config, "head_dim", None)
+        or text_config.hidden_size // text_config.num_attention_heads
+    )
     kernels = importlib.import_module("vllm.v1.attention.backends.cpu_attn").CPUAttentionBackend
     known = kernels.get_supported_head_sizes()
     if head not in known:

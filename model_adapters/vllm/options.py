@@ -122,13 +122,17 @@ class EngineOptions(Throughput):
         if self.dtype not in _DTYPES:
             raise ValueError(f"dtype={self.dtype} is not {', '.join(_DTYPES)}")
         if not 0 < self.gpu_memory_utilization <= 1:
-            raise ValueError(f"gpu_memory_utilization={self.gpu_memory_utilization} is not above 0 and at most 1")
+            raise ValueError(
+                f"gpu_memory_utilization={self.gpu_memory_utilization} is not above 0 and at most 1"
+            )
         for name, (least, most) in _RANGES.items():
             value = getattr(self, name, None)
             if value is not None and not least <= value <= most:
                 raise ValueError(f"{name}={value} is not from {least:,} to {most:,}")
         if self.mm_encoder_tp_mode not in (None, *_ENCODER_SPLITS):
-            raise ValueError(f"mm_encoder_tp_mode={self.mm_encoder_tp_mode} is not {' or '.join(_ENCODER_SPLITS)}")
+            raise ValueError(
+                f"mm_encoder_tp_mode={self.mm_encoder_tp_mode} is not {' or '.join(_ENCODER_SPLITS)}"
+            )
         if self.data_parallel_size > 1 and self.distributed_executor_backend != _LAUNCHED:
             raise ValueError(
                 f"data_parallel_size={self.data_parallel_size} needs distributed_executor_backend={_LAUNCHED} in vLLM; "
@@ -155,7 +159,9 @@ class VllmOptions(EngineOptions, CheckpointReading):
         super().__post_init__()
         CheckpointReading.__post_init__(self)
         if self.image_backend not in _IMAGE_BACKENDS:
-            raise ValueError(f"image_backend={self.image_backend} is not {' or '.join(_IMAGE_BACKENDS)}")
+            raise ValueError(
+                f"image_backend={self.image_backend} is not {' or '.join(_IMAGE_BACKENDS)}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from model_adapters.hf.tower_names import published_name
+from model_adapters.hf.loading.tower_names import published_name
 
 __all__ = ["ACTIVE", "register"]
 

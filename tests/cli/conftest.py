@@ -8,7 +8,7 @@ import pytest
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import RunHeader, UnitRecord, read_run
-from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.journals.journal import Journal
 
 from ..nieh.made import identity
 from .commands.rescored import REPLIES

@@ -31,7 +31,11 @@ def test_few_frames_lie_between_a_command_and_execute(arguments, tmp_path, monke
     monkeypatch.setattr("infthor_eval.cli.progress.runs.execute", execute)
     with pytest.raises(Reached) as reached:
         _infthor_eval.main([*arguments, str(tmp_path / "out")], standalone_mode=False)
-    frames = [frame for frame in traceback.extract_tb(reached.value.__traceback__) if "click" not in frame.filename]
+    frames = [
+        frame
+        for frame in traceback.extract_tb(reached.value.__traceback__)
+        if "click" not in frame.filename
+    ]
     names = [frame.name for frame in frames]
     after_click = names[names.index("command") :]
     assert after_click[-1] == "execute"

@@ -54,4 +54,9 @@ def test_the_overview_has_commands_in_groups(run):
     assert out.startswith("Example:\n  infthor-eval --model ")
     headings = re.findall(r"^(\w[\w ]*):$", out, re.MULTILINE)
     assert headings == ["Example", *GROUPS, "Options", "Options of a run"]
-    assert out.index("compare") > out.index("Look at results:") > out.index("  plan ") > out.index("Evaluate:")
+    assert (
+        out.index("compare")
+        > out.index("Look at results:")
+        > out.index("  plan ")
+        > out.index("Evaluate:")
+    )

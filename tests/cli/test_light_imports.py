@@ -27,11 +27,25 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}), file=sys.stderr
 
 
 @pytest.mark.parametrize(
-    "typed", ["--help", "run --help", "ls", "ls models", "ls tasks", "ls scenes", "ls runs tests", "--version"]
+    "typed",
+    [
+        "--help",
+        "run --help",
+        "ls",
+        "ls models",
+        "ls tasks",
+        "ls scenes",
+        "ls runs tests",
+        "--version",
+    ],
 )
 def test_listings_and_help_are_printed_at_once(typed: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *typed.split()], capture_output=True, text=True, check=False, timeout=600
+        [sys.executable, "-c", PROGRAM, *typed.split()],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout
@@ -53,8 +67,27 @@ main(sys.argv[1:])
 """
 AFTER_THE_QUESTIONS = {"lm_eval", "scipy.special"}  # for the results
 OF_OTHERS = {
-    *("ai2thor", "cv2", "datasets", "matplotlib", "networkx", "numba", "openai", "pandas", "peft", "ray", "sklearn"),
-    *("scipy.optimize", "scipy.stats", "torchvision", "vllm", "infthor_eval.report.figures", "infthor_eval.report.web"),
+    *(
+        "ai2thor",
+        "cv2",
+        "datasets",
+        "matplotlib",
+        "networkx",
+        "numba",
+        "openai",
+        "pandas",
+        "peft",
+        "ray",
+        "sklearn",
+    ),
+    *(
+        "scipy.optimize",
+        "scipy.stats",
+        "torchvision",
+        "vllm",
+        "infthor_eval.report.figures",
+        "infthor_eval.report.web",
+    ),
 }
 OF_MODELS = {"torch", "transformers", "tokenizers", "accelerate", "safetensors", "huggingface_hub"}
 
@@ -73,11 +106,15 @@ def test_the_first_question_is_asked_without_what_it_does_not_need(
 ) -> None:
     typed = ["--model", model, "--tasks", "nieh_mini", "--limit", "1", "--output", str(tmp_path)]
     done = subprocess.run(
-        [sys.executable, "-c", FIRST_QUESTION, *typed], capture_output=True, text=True, check=False, timeout=600
+        [sys.executable, "-c", FIRST_QUESTION, *typed],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     loaded = set(done.stdout.split())
-    assert "infthor_eval.nieh.answering" in loaded
+    assert "infthor_eval.nieh.asking.answering" in loaded
     assert sorted(not_needed & loaded) == []
 
 
@@ -105,7 +142,9 @@ def test_making_data_loads_nothing_of_runs(typed: str, tmp_path: Path) -> None:
     )
     loaded = done.stdout.split()
     assert "infthor_eval.cli.commands." + typed.split(maxsplit=1)[0] in loaded
-    assert not [name for name in loaded if name.startswith(("infthor_eval.runs", "infthor_eval.nieh"))]
+    assert not [
+        name for name in loaded if name.startswith(("infthor_eval.runs", "infthor_eval.nieh"))
+    ]
 
 
 @pytest.mark.parametrize("name", suites.suite_names())

@@ -47,7 +47,10 @@ class Command:
         """Why it cannot run here; None where it can."""
         if not self.is_ours:
             return f"{self.words[0]} is not this package's"
-        return next((reason for pattern, reason in CANNOT_RUN.items() if re.search(pattern, self.text)), None)
+        return next(
+            (reason for pattern, reason in CANNOT_RUN.items() if re.search(pattern, self.text)),
+            None,
+        )
 
 
 def command_blocks(page: str) -> list[list[Command]]:
@@ -58,8 +61,14 @@ def command_blocks(page: str) -> list[list[Command]]:
 
 def _commands(text: str) -> list[Command]:
     lines = text.replace("\\\n", " ").splitlines()
-    commands = [command for line in lines for part in line.split(" ; ") if (command := _command(part))]
-    return commands if commands and text.lstrip().startswith(commands[0].text.split(maxsplit=1)[0]) else []
+    commands = [
+        command for line in lines for part in line.split(" ; ") if (command := _command(part))
+    ]
+    return (
+        commands
+        if commands and text.lstrip().startswith(commands[0].text.split(maxsplit=1)[0])
+        else []
+    )
 
 
 def _command(line: str) -> Command | None:

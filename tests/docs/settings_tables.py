@@ -30,7 +30,9 @@ def _table(module: str, name: str) -> str:
     hints, said = typing.get_type_hints(settings), _attributes(settings)
     lines = ["| setting | is a | default | |", "|---|---|---|---|"]
     for item in fields(settings):
-        lines.append(f"| `{item.name}` | {_kind(hints[item.name])} | {_shown(_default(item))} | {said[item.name]} |")
+        lines.append(
+            f"| `{item.name}` | {_kind(hints[item.name])} | {_shown(_default(item))} | {said[item.name]} |"
+        )
     return "\n".join(lines) + "\n"
 
 

@@ -17,12 +17,20 @@ from model_adapters import has_option, is_known, name_on_engine, names
 from .blocks import ROOT, written_files
 from .commands import CANNOT_RUN, FLOOR_PLANS, Command, command_blocks
 
-RUN_PAGES = ("README.md", "docs/tutorial.md", "docs/own-models.md", "docs/own-tasks.md", "docs/training.md")
+RUN_PAGES = (
+    "README.md",
+    "docs/tutorial.md",
+    "docs/own-models.md",
+    "docs/own-tasks.md",
+    "docs/training.md",
+)
 PAGES = sorted(
     str(path.relative_to(ROOT))
     for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md"))
 )
-COMMANDS = [(page, command) for page in PAGES for block in command_blocks(page) for command in block]
+COMMANDS = [
+    (page, command) for page in PAGES for block in command_blocks(page) for command in block
+]
 BLOCKS = [
     pytest.param(page, block, id=f"{page}-{number}")
     for page in RUN_PAGES
@@ -53,30 +61,44 @@ def test_the_commands_of_a_page_run_one_after_the_other(page, block, folder_of, 
         if command.reason == FLOOR_PLANS:
             break  # what follows asks about what it makes
         if command.reason is None:
-            code, _, err = (_apart if "lm-eval" in command.words else run)(*_with_globs(command.words[1:]))
+            code, _, err = (_apart if "lm-eval" in command.words else run)(
+                *_with_globs(command.words[1:])
+            )
             assert code == 0, f"{page}: {command.text}\n{err}"
 
 
 def _apart(*words):
     """In a process of its own: lm-eval remembers which model it has loaded."""
     code = "import sys; from infthor_eval.cli import main; main(sys.argv[1:])"
-    done = subprocess.run([sys.executable, "-c", code, *words], check=False, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words], check=False, capture_output=True, text=True
+    )
     return done.returncode, done.stdout, done.stderr
 
 
 def _with_globs(words):
-    return [path for word in words for path in (sorted(map(str, Path().glob(word))) if "*" in word else [word])]
+    return [
+        path
+        for word in words
+        for path in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
+    ]
 
 
 @pytest.mark.parametrize(
     "command",
-    [pytest.param(command, id=f"{page}: {command.text}"[:110]) for page, command in COMMANDS if command.is_ours],
+    [
+        pytest.param(command, id=f"{page}: {command.text}"[:110])
+        for page, command in COMMANDS
+        if command.is_ours
+    ],
 )
 def test_the_options_of_every_command_are_known(command, monkeypatch):
     monkeypatch.setattr(click.Path, "convert", lambda self, value, parameter, context: Path(value))
     context = _infthor_eval.make_context("infthor-eval", list(command.words[1:]))
     while isinstance(context.command, click.Group):
-        name, inner, rest = context.command.resolve_command(context, [*context._protected_args, *context.args])
+        name, inner, rest = context.command.resolve_command(
+            context, [*context._protected_args, *context.args]
+        )
         assert inner is not None
         context = inner.make_context(name, rest, parent=context)
     if context.info_name in ("run", "plan"):

@@ -21,7 +21,9 @@ def venv(tmp_path):
 
 def test_the_shell_has_the_environment(venv):
     words = ["make", "--silent", "--no-print-directory", "shell", f"VENV={venv}", "SHELL=/bin/sh"]
-    done = subprocess.run(words, cwd=ROOT, input="infthor-eval\n", capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        words, cwd=ROOT, input="infthor-eval\n", capture_output=True, text=True, check=True
+    )
     assert done.stdout == "this one\n"
 
 

@@ -9,7 +9,14 @@ import pytest
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters import Capabilities, Decoding, adapter_identity, label, load, wrap_request_errors
+from model_adapters import (
+    Capabilities,
+    Decoding,
+    adapter_identity,
+    label,
+    load,
+    wrap_request_errors,
+)
 from model_adapters.check.model import model_checks
 from model_adapters.check.policy import policy_checks
 from model_adapters.check.questions import start_conversation
@@ -31,7 +38,11 @@ def rows(heading):
     """The words in the first column of the first table below a heading."""
     page = (ROOT / "docs/own-models.md").read_text().partition(f"## {heading}\n")[2]
     table = re.search(r"\n\|---.*?\n\n", page, re.DOTALL).group()
-    return [word for row in table.splitlines() for word in re.findall(r"`(\w+)`", row.split("|")[1] if row else "")]
+    return [
+        word
+        for row in table.splitlines()
+        for word in re.findall(r"`(\w+)`", row.split("|")[1] if row else "")
+    ]
 
 
 def test_the_pages_adapter_keeps_the_contract(folder, run):
@@ -63,7 +74,9 @@ def test_the_table_of_checks_has_all_of_them():
     assert rows("What is checked") == list(model_checks(None, *frames))
     policy = policy_checks(Scripted(), *frames)
     assert (
-        f"has {', '.join(f'`{name}`' for name in policy)}".replace(", `episodes`", " and `episodes`")
+        f"has {', '.join(f'`{name}`' for name in policy)}".replace(
+            ", `episodes`", " and `episodes`"
+        )
         in (ROOT / "docs/own-models.md").read_text()
     )
 
@@ -86,7 +99,9 @@ def test_the_table_of_capabilities_has_all_of_them_with_their_defaults():
     ],
 )
 @pytest.mark.parametrize("command", [("check-adapter",), ("--tasks", "nieh_mini_gt", "--model")])
-def test_a_file_that_is_no_adapter_is_refused_in_one_line(tmp_path, run, monkeypatch, command, source, name, said):
+def test_a_file_that_is_no_adapter_is_refused_in_one_line(
+    tmp_path, run, monkeypatch, command, source, name, said
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.py").write_text(source)
     code, _, err = run(*command, name)
@@ -104,14 +119,19 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
     )
     code, out, err = run("check-adapter", NAME)
     assert (code, err) == (1, "")
-    clauses = {line.split()[1]: line for line in out.splitlines() if line.startswith(("holds", "broken"))}
+    clauses = {
+        line.split()[1]: line for line in out.splitlines() if line.startswith(("holds", "broken"))
+    }
     assert len(clauses) == 14
     assert clauses["members"].startswith("holds")
     assert "it raises TypeError in my_adapter.py:" in clauses["reply"]
     assert out.splitlines()[-1].endswith("broken")
     source.write_text(source.read_text().replace("def close", "def shut"))
     code, out, err = run("check-adapter", NAME)
-    assert (code, out.splitlines()[0]) == (1, "broken  members         Brightness lacks a member of Model: close")
+    assert (code, out.splitlines()[0]) == (
+        1,
+        "broken  members         Brightness lacks a member of Model: close",
+    )
 
 
 @pytest.mark.parametrize(
@@ -119,8 +139,14 @@ def test_a_broken_clause_and_an_exception_are_reported_with_the_others(folder, r
     [
         (("def close", "def shut"), "Brightness lacks a member of Model: close"),
         (("capabilities = CAP", "able = CAP"), "Brightness lacks a member of Model: capabilities"),
-        (("    n_tokens = None", "    count = None"), "Talk lacks a member of Conversation: n_tokens"),
-        (("return Talk(self)", "return Talk(self, 1)"), "conversation() fails (TypeError in my_adapter.py:"),
+        (
+            ("    n_tokens = None", "    count = None"),
+            "Talk lacks a member of Conversation: n_tokens",
+        ),
+        (
+            ("return Talk(self)", "return Talk(self, 1)"),
+            "conversation() fails (TypeError in my_adapter.py:",
+        ),
         (("return cls(name", "return clas(name"), "build() fails (NameError in my_adapter.py:"),
     ],
 )
@@ -136,7 +162,9 @@ def test_an_incomplete_adapter_is_refused_by_a_run_in_one_line(folder, run, edit
 
 def test_an_error_in_an_adapter_says_where_and_keeps_its_traceback(folder, run):
     source = folder / "my_adapter.py"
-    source.write_text(source.read_text().replace('question = "".join(', 'question = None + "".join('))
+    source.write_text(
+        source.read_text().replace('question = "".join(', 'question = None + "".join(')
+    )
     code, _, err = run("--model", NAME, "--tasks", "nieh_mini_gt", "--limit", 2)
     assert code == 1
     assert "Brightness fails on the request (TypeError in my_adapter.py:" in err
@@ -150,12 +178,19 @@ def test_an_error_in_an_adapter_says_where_and_keeps_its_traceback(folder, run):
 def test_a_policy_is_checked_by_the_same_command(run):
     code, out, err = run("check-adapter", "openvla-tiny")
     assert (code, err) == (0, "")
-    assert [line.split()[1] for line in out.splitlines()[:-1]] == ["members", "identity", "episodes"]
+    assert [line.split()[1] for line in out.splitlines()[:-1]] == [
+        "members",
+        "identity",
+        "episodes",
+    ]
 
 
 def test_the_place_of_the_file_changes_neither_name_nor_fingerprint(folder, monkeypatch):
     here = adapter_identity(NAME), label(NAME, {})
     (folder / "deeper").mkdir()
     monkeypatch.chdir(folder / "deeper")
-    assert (adapter_identity("../my_adapter.py:Brightness"), label("../my_adapter.py:Brightness", {})) == here
+    assert (
+        adapter_identity("../my_adapter.py:Brightness"),
+        label("../my_adapter.py:Brightness", {}),
+    ) == here
     assert here[1] == "Brightness"

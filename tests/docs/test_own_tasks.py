@@ -16,7 +16,12 @@ def test_the_tables_of_settings_are_those_of_the_code():
 
 
 def test_all_contexts_are_named():
-    said = (ROOT / "docs/own-tasks.md").read_text().partition("`dataset_kwargs`: `context` (")[2].partition(";")[0]
+    said = (
+        (ROOT / "docs/own-tasks.md")
+        .read_text()
+        .partition("`dataset_kwargs`: `context` (")[2]
+        .partition(";")[0]
+    )
     assert re.findall(r"`(\w+)`", said) == list(CONTEXTS)
 
 

@@ -32,7 +32,9 @@ def rows() -> list[list[str]]:
 def options() -> frozenset[str]:
     """All options of all commands."""
     context = click.Context(_infthor_eval)
-    commands = [_infthor_eval.get_command(context, name) for name in _infthor_eval.list_commands(context)]
+    commands = [
+        _infthor_eval.get_command(context, name) for name in _infthor_eval.list_commands(context)
+    ]
     return frozenset(option for command in commands for option in _options(command))
 
 
@@ -58,8 +60,12 @@ def test_a_row_says_what_is_claimed_where_it_is_done_and_what_holds_it(row):
     assert len(row) == 4
     claim, place, _, held = row
     assert claim
-    assert FILE.search(place) or "not " in place, "a claim has a place, or it is said that it has none"
-    assert TEST.search(held) or FILE.search(held) or held.startswith("nothing"), "a claim is held by something"
+    assert FILE.search(place) or "not " in place, (
+        "a claim has a place, or it is said that it has none"
+    )
+    assert TEST.search(held) or FILE.search(held) or held.startswith("nothing"), (
+        "a claim is held by something"
+    )
 
 
 def test_every_file_is_there():

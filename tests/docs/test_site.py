@@ -35,7 +35,12 @@ def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     words = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", folder]
     done = subprocess.run(
-        words, check=False, cwd=ROOT, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}
+        words,
+        check=False,
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
     )
     assert done.returncode == 0, done.stderr
     return folder
@@ -47,7 +52,11 @@ def site(tmp_path_factory):
         ("cost.md", "../benchmarks/gpu.md", "benchmarks/gpu.md"),
         ("howto/long-contexts.md", "../../benchmarks/gpu.md", "../benchmarks/gpu.md"),
         ("benchmarks/gpu.md", "../docs/cost.md", "../cost.md"),
-        ("benchmarks/README.md", "../docs/own-models.md#as-a-package", "../own-models.md#as-a-package"),
+        (
+            "benchmarks/README.md",
+            "../docs/own-models.md#as-a-package",
+            "../own-models.md#as-a-package",
+        ),
         ("own-tasks.md", "nieh.md#tasks", "nieh.md#tasks"),
         ("plans.md", "plan-rewards.md", "plan-rewards.md"),
         ("plans.md", "#where-it-runs", "#where-it-runs"),
@@ -63,7 +72,8 @@ def test_a_link_in_the_repository_becomes_one_in_the_site(hook, place, link, exp
 def test_the_site_is_whole_and_takes_nothing_from_elsewhere(site):
     pages = {path.relative_to(site).as_posix(): path.read_text() for path in site.rglob("*.html")}
     loaded = [
-        re.findall(r"<(?:link|script|img|iframe)[^>]*?(?:href|src)=.?https?:[^>]*>", page) for page in pages.values()
+        re.findall(r"<(?:link|script|img|iframe)[^>]*?(?:href|src)=.?https?:[^>]*>", page)
+        for page in pages.values()
     ]
     assert not any(loaded)
     assert "--include-path" in pages["reference/cli.html"]
@@ -105,7 +115,9 @@ def test_search_finds_pages(browser, site, served, is_served, page):
     opened.get_by_role("textbox", name="Search").click()
     opened.keyboard.type("haystack")
     opened.locator(".md-search-result__item a").first.wait_for(timeout=60_000)
-    links = opened.locator(".md-search-result__item a").evaluate_all("links => links.map(link => link.href)")
+    links = opened.locator(".md-search-result__item a").evaluate_all(
+        "links => links.map(link => link.href)"
+    )
     assert any(link.startswith(f"{root}/nieh.html") for link in links)
     assert problems == []
     assert [url for url in asked if not url.startswith((root, "data:", "blob:", "about:"))] == []
@@ -134,7 +146,9 @@ def test_it_is_dark_where_the_system_is_and_where_it_is_asked_to_be(browser, sit
     for scheme in ("light", "dark"):
         opened = browser.new_page(color_scheme=scheme)
         opened.goto((site / "index.html").as_uri())
-        shade = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).slice(0, 3).map(Number)"
+        shade = (
+            "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).slice(0, 3).map(Number)"
+        )
         shades[scheme] = opened.evaluate(shade)
         if scheme == "light":
             for _ in range(2):  # as the system, light, dark

@@ -26,7 +26,9 @@ class Pool:
         try:
             simulator = idle.get_nowait()
         except Empty:
-            simulator = self.open.enter_context(Simulator(embedded_launch(), max_copies=64, **options))
+            simulator = self.open.enter_context(
+                Simulator(embedded_launch(), max_copies=64, **options)
+            )
         try:
             yield simulator
         finally:
@@ -37,7 +39,9 @@ class Pool:
         pool = self
 
         class Shared:
-            def __init__(self, name: str, scenes: Path | None, trajectories: object, **options: Any) -> None:
+            def __init__(
+                self, name: str, scenes: Path | None, trajectories: object, **options: Any
+            ) -> None:
                 self._options = options
 
             def one(self) -> Any:

@@ -16,7 +16,9 @@ def preparer(default_model: str, **defaults: Any) -> Callable[..., PreparedRun]:
     Its keyword arguments are the model, its options, those of `RunOptions`, which have these defaults, and the suite's.
     """
 
-    def make(model: str = default_model, model_options: dict[str, str] | None = None, **changes: Any) -> PreparedRun:
+    def make(
+        model: str = default_model, model_options: dict[str, str] | None = None, **changes: Any
+    ) -> PreparedRun:
         settings = {**defaults, **{name: changes.pop(name) for name in _OF_RUNS if name in changes}}
         models = (ModelSpec(model, model_options or {}),)
         ((request, suite),) = RunOptions(models, **settings, suite_options=changes).requests()

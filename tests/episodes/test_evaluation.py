@@ -20,13 +20,24 @@ KWARGS = {"dataset_kwargs": {}, "generation_kwargs": {"max_gen_toks": 1}}
 
 @pytest.mark.parametrize(
     ("suite", "evaluation", "options"),
-    [("plans", PlansEvaluation, PlansOptions()), ("manipulation", ManipulationEvaluation, ManipulationOptions())],
+    [
+        ("plans", PlansEvaluation, PlansOptions()),
+        ("manipulation", ManipulationEvaluation, ManipulationOptions()),
+    ],
 )
-def test_a_limit_changes_neither_floor_plans_nor_what_baselines_learn_from(tmp_path, suite, evaluation, options):
+def test_a_limit_changes_neither_floor_plans_nor_what_baselines_learn_from(
+    tmp_path, suite, evaluation, options
+):
     data = write(tmp_path / "data", cut(CANDLE), cut(MUG))
     file = TaskFile("a_task", suite, Path("a_task.yaml"), KWARGS)
-    limited, unlimited = (evaluation(TaskRequest([file], options, data, limit)) for limit in (1, None))
-    assert len({unit.cluster for unit in limited.units}) == 1 < len({unit.cluster for unit in unlimited.units})
+    limited, unlimited = (
+        evaluation(TaskRequest([file], options, data, limit)) for limit in (1, None)
+    )
+    assert (
+        len({unit.cluster for unit in limited.units})
+        == 1
+        < len({unit.cluster for unit in unlimited.units})
+    )
     assert limited.trajectories == unlimited.trajectories
 
 
@@ -37,5 +48,7 @@ def test_an_action_without_an_object_is_named_with_its_file(tmp_path):
     assert '"objectId"' in text
     path.write_text(text.replace('"objectId"', '"nothing"'))
     (source,) = iter_sources(path)
-    with pytest.raises(DataError, match=rf"{path.name}.*: action \d+ \(PickupObject\) names no object"):
+    with pytest.raises(
+        DataError, match=rf"{path.name}.*: action \d+ \(PickupObject\) names no object"
+    ):
         read_arm_trajectory(source)

@@ -7,7 +7,7 @@ import pytest
 
 from infthor_eval.episodes.retries import with_retries
 from infthor_eval.errors import SceneError, SimulatorError
-from infthor_eval.formats.limits import ACTION_SECONDS
+from infthor_eval.storage.limits import ACTION_SECONDS
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
@@ -27,7 +27,9 @@ def kill(simulator):
 
 def test_what_goes_well_is_done_once(simulator):
     anew = []
-    made = with_retries(simulator, lambda: simulator.step("RotateLeft").success, lambda: anew.append(1))
+    made = with_retries(
+        simulator, lambda: simulator.step("RotateLeft").success, lambda: anew.append(1)
+    )
     assert made == (True, ())
     assert anew == []
 
@@ -91,10 +93,15 @@ def test_a_simulator_that_stops_answering_is_replaced_and_told(monkeypatch):
         before = simulator.step("RotateRight").agent
         stopped = simulator._controller.server.unity_proc
         os.kill(stopped.pid, signal.SIGSTOP)
-        agent, faults = with_retries(simulator, lambda: simulator.step("RotateLeft").agent, lambda: None)
+        agent, faults = with_retries(
+            simulator, lambda: simulator.step("RotateLeft").agent, lambda: None
+        )
         assert faults[0].startswith("simulator started again: ")
         assert stopped.poll() is not None
-        assert (agent.position, agent.rotation) == (before.position, simulator.reset("bedroom-1").agent.rotation)
+        assert (agent.position, agent.rotation) == (
+            before.position,
+            simulator.reset("bedroom-1").agent.rotation,
+        )
 
 
 def test_a_hang_that_stays_names_the_limit(monkeypatch):
@@ -102,5 +109,7 @@ def test_a_hang_that_stays_names_the_limit(monkeypatch):
     with Simulator(embedded_launch(), image=False, instances=False, max_restarts=0) as simulator:
         simulator.reset("bedroom-1")
         os.kill(simulator._controller.server.unity_proc.pid, signal.SIGSTOP)
-        with pytest.raises(SimulatorError, match=r"no answer within 1 s .* set INFTHOR_EVAL_MAX_ACTION_SECONDS"):
+        with pytest.raises(
+            SimulatorError, match=r"no answer within 1 s .* set INFTHOR_EVAL_MAX_ACTION_SECONDS"
+        ):
             simulator.step("RotateLeft")

@@ -12,7 +12,9 @@ from infthor_eval.errors import ModelError, SceneError, SimulatorError
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.runs import Tokens, Unit, UnitKey, Usage
 
-UNIT = Unit(UnitKey("task", "a/0001"), "a", ArmRecord(index=1, kind="put", instruction="put it down"))
+UNIT = Unit(
+    UnitKey("task", "a/0001"), "a", ArmRecord(index=1, kind="put", instruction="put it down")
+)
 BEGUN = msgspec.structs.replace(UNIT.payload, object_id="Mug|1", start_distance=0.5)
 SESSION = SimpleNamespace(describe_failure=lambda unit, error: str(error))
 DONE = msgspec.structs.replace(BEGUN, ended="done")
@@ -40,7 +42,9 @@ def record(runner, *outcomes):
 
 
 def test_a_result_has_its_tokens_its_usage_and_the_faults_of_simulator_and_model(runner):
-    result = record(runner, SimulatorError("it hangs"), EpisodeResult(DONE, Tokens(context=7), ("asked again",)))
+    result = record(
+        runner, SimulatorError("it hangs"), EpisodeResult(DONE, Tokens(context=7), ("asked again",))
+    )
     assert (result.payload, result.tokens, result.fingerprint) == (DONE, Tokens(context=7), "print")
     assert result.faults == ("it hangs", "asked again")
     assert result.usage == Usage(2)  # the try that failed has its share
@@ -61,14 +65,22 @@ def test_a_subject_that_fails_leaves_what_was_known_of_the_episode_when_it_began
     failed = record(runner, ModelError("out of memory"))
     assert (failed.failure, failed.payload, failed.usage) == ("out of memory", BEGUN, Usage(1))
     runner.begun = BEGUN  # of the episode before
-    with_nothing = runner.record(UNIT, "", lambda: (_ for _ in ()).throw(ModelError("at once")), SESSION)
+    with_nothing = runner.record(
+        UNIT, "", lambda: (_ for _ in ()).throw(ModelError("at once")), SESSION
+    )
     assert (with_nothing.failure, with_nothing.payload) == ("at once", UNIT.payload)
 
 
-@pytest.mark.parametrize("error", [InfeasibleError("the expert is refused"), SceneError("no such scene")])
+@pytest.mark.parametrize(
+    "error", [InfeasibleError("the expert is refused"), SceneError("no such scene")]
+)
 def test_what_is_infeasible_is_excluded(runner, error):
     excluded = record(runner, error)
-    assert (excluded.excluded, excluded.failure, excluded.payload) == (str(error), None, UNIT.payload)
+    assert (excluded.excluded, excluded.failure, excluded.payload) == (
+        str(error),
+        None,
+        UNIT.payload,
+    )
 
 
 def test_a_simulator_that_fails_every_time_is_a_failure(runner):

@@ -16,10 +16,21 @@ def install(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Installs an example and gives the folder to import it from; nothing is downloaded."""
 
     def install(name: str) -> Path:
-        source = shutil.copytree(EXAMPLES / name, tmp_path_factory.mktemp("source") / name)  # setuptools writes into it
+        source = shutil.copytree(
+            EXAMPLES / name, tmp_path_factory.mktemp("source") / name
+        )  # setuptools writes into it
         target = tmp_path_factory.mktemp("installed")
-        quietly = ("--quiet", "--disable-pip-version-check", "--no-index", "--no-deps", "--no-build-isolation")
-        subprocess.run([sys.executable, "-m", "pip", "install", *quietly, "--target", target, source], check=True)
+        quietly = (
+            "--quiet",
+            "--disable-pip-version-check",
+            "--no-index",
+            "--no-deps",
+            "--no-build-isolation",
+        )
+        subprocess.run(
+            [sys.executable, "-m", "pip", "install", *quietly, "--target", target, source],
+            check=True,
+        )
         return target
 
     return install

@@ -19,7 +19,18 @@ def folders(install, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patched:
         patched.syspath_prepend(install("sums"))
         with pytest.raises(SystemExit) as ended:
-            main(["--model", ",".join(MODELS), "--tasks", "sums_small", "--limit", "8", "--output", str(output)])
+            main(
+                [
+                    "--model",
+                    ",".join(MODELS),
+                    "--tasks",
+                    "sums_small",
+                    "--limit",
+                    "8",
+                    "--output",
+                    str(output),
+                ]
+            )
         assert ended.value.code == 0
         yield [next((output / model).iterdir()) for model in MODELS]
 
@@ -31,13 +42,20 @@ def page(folders):
 
 def test_its_results_are_shown_and_exported(folders, run):
     code, out, _ = run("show", *folders)
-    rows = {line.split()[0]: line.split() for line in out.splitlines() if "sums_small" in line and "/" not in line}
+    rows = {
+        line.split()[0]: line.split()
+        for line in out.splitlines()
+        if "sums_small" in line and "/" not in line
+    }
     assert code == 0
     assert rows["calculator"][2] == "100.0"
     assert rows["qwen2.5-vl-tiny"][-1] == "8"
     (samples,) = folders[0].rglob("samples_sums_small_*.jsonl")
     lines = [json.loads(line) for line in samples.read_text().splitlines()]
-    assert all(line["target"] == str(line["doc"]["a"] + line["doc"]["b"]) == line["resps"][0][0] for line in lines)
+    assert all(
+        line["target"] == str(line["doc"]["a"] + line["doc"]["b"]) == line["resps"][0][0]
+        for line in lines
+    )
     assert "sums_small right % 100.00 0.00 -100.00" in " ".join(run("compare", *folders)[1].split())
 
 
@@ -45,7 +63,16 @@ def test_a_stopped_run_goes_on(folders, run):
     (journal,) = (folders[0] / "journal").glob("*.jsonl")
     lines = journal.read_text().splitlines()
     journal.write_text("\n".join(lines[:-3]) + "\n")
-    words = ("--model", "calculator", "--tasks", "sums_small", "--limit", 8, "--output", folders[0].parents[1])
+    words = (
+        "--model",
+        "calculator",
+        "--tasks",
+        "sums_small",
+        "--limit",
+        8,
+        "--output",
+        folders[0].parents[1],
+    )
     code, _, err = run(*words)
     assert (code, "3 evaluated now, 5 resumed from the journal" in err) == (0, True)
 
@@ -54,15 +81,30 @@ def test_its_page_has_its_tables_its_chart_and_its_samples(page):
     sections = {section.key: section for section in page.sections}
     assert sections["sums"].title == "Sums"
     (chart,) = sections["sums"].charts
-    assert (chart.title, chart.description[:18]) == ("sums_small: right sums by kind", "calculator 100.0 %")
+    assert (chart.title, chart.description[:18]) == (
+        "sums_small: right sums by kind",
+        "calculator 100.0 %",
+    )
     (table,) = sections["sums"].tables
-    assert [column.name for column in table.columns] == ["model", "task", "all", "without carry", "with carry", "sums"]
+    assert [column.name for column in table.columns] == [
+        "model",
+        "task",
+        "all",
+        "without carry",
+        "with carry",
+        "sums",
+    ]
     assert {row.cells[2] for row in sections["results"].tables[0].rows} == {"right sums"}
     assert len(page.samples) == 8
     for sample in page.samples:
         a, b = map(int, sample.title.split(" + "))
         right, wrong = sample.results
-        assert (sample.target, right.reply, right.outcome, wrong.outcome) == (str(a + b), str(a + b), "right", "wrong")
+        assert (sample.target, right.reply, right.outcome, wrong.outcome) == (
+            str(a + b),
+            str(a + b),
+            "right",
+            "wrong",
+        )
         assert sample.kind in ("with carry", "without carry")
         assert wrong.tokens[0] > 0
 

@@ -29,21 +29,41 @@ def test_its_model_keeps_the_contract_and_refuses_what_cannot_be(run):
 
 
 def test_its_model_is_evaluated_and_answers_from_the_frames(tmp_path, run):
-    asked = ("--model", "thumbnails", "--frames", "shown,blank", "--tasks", "nieh_mini_gt", "--output", tmp_path)
+    asked = (
+        "--model",
+        "thumbnails",
+        "--frames",
+        "shown,blank",
+        "--tasks",
+        "nieh_mini_gt",
+        "--output",
+        tmp_path,
+    )
     code, out, err = run(*asked)
     assert (code, "thumbnails" in out) == (0, True), err
     shown, blank = sorted(
-        json.loads(path.read_text())["summary"]["tasks"]["nieh_mini_gt"]["by_clues"]["total"]["scores"]["strict"][
-            "mean"
-        ]
+        json.loads(path.read_text())["summary"]["tasks"]["nieh_mini_gt"]["by_clues"]["total"][
+            "scores"
+        ]["strict"]["mean"]
         for path in tmp_path.rglob("results.json")
     )
     assert shown != blank
 
 
 def test_its_task_runs_beside_ours(tmp_path, run):
-    asked = ("--model", "thumbnails", "--tasks", "nieh_mini_last,nieh_mini_gt", "--limit", 4, "--output", tmp_path)
+    asked = (
+        "--model",
+        "thumbnails",
+        "--tasks",
+        "nieh_mini_last,nieh_mini_gt",
+        "--limit",
+        4,
+        "--output",
+        tmp_path,
+    )
     assert run(*asked)[0] == 0
     (samples,) = tmp_path.rglob("samples_nieh_mini_last_*.jsonl")
-    assert {len(json.loads(line)["doc"]["frames"]) for line in samples.read_text().splitlines()} == {16}
+    assert {
+        len(json.loads(line)["doc"]["frames"]) for line in samples.read_text().splitlines()
+    } == {16}
     assert "nieh_mini_last" in run("ls", "tasks")[1]

@@ -90,21 +90,36 @@ DAMAGES = {
     "config is deep": (_content("config.json", DEEP), "cannot be loaded"),
     "config is no UTF-8": (_content("config.json", b'{"a": "\xff"}'), "cannot be loaded"),
     "config without a type": (_content("config.json", b"{}"), "cannot be loaded"),
-    "config with a text for a number": (_edit("config.json", text_config={"hidden_size": "many"}), "cannot be loaded"),
-    "config with no layers": (_edit("config.json", text_config={"num_hidden_layers": -1}), "cannot be loaded"),
+    "config with a text for a number": (
+        _edit("config.json", text_config={"hidden_size": "many"}),
+        "cannot be loaded",
+    ),
+    "config with no layers": (
+        _edit("config.json", text_config={"num_hidden_layers": -1}),
+        "cannot be loaded",
+    ),
     "config with a list for a part": (_edit("config.json", vision_config=[1]), "cannot be loaded"),
     "tokenizer is empty": (_content("tokenizer.json", b""), "cannot be loaded"),
     "tokenizer is deep": (_content("tokenizer.json", DEEP), "cannot be loaded"),
-    "tokenizer is of another form": (_content("tokenizer.json", b'{"version": "1.0", "model": 5}'), "cannot be loaded"),
+    "tokenizer is of another form": (
+        _content("tokenizer.json", b'{"version": "1.0", "model": 5}'),
+        "cannot be loaded",
+    ),
     "image processor is a list": (_content("preprocessor_config.json", b"[]"), "cannot be loaded"),
     "image processor with texts": (_edit("preprocessor_config.json", patch_size="x"), ""),
     "image processor with no patch": (_edit("preprocessor_config.json", patch_size=0), ""),
     "generation is a list": (_content("generation_config.json", b"[1]"), ""),
     "end is a text": (_edit("generation_config.json", eos_token_id="end"), "eos_token_id is"),
-    "end is a list of texts": (_edit("generation_config.json", eos_token_id=["end"]), "eos_token_id is"),
+    "end is a list of texts": (
+        _edit("generation_config.json", eos_token_id=["end"]),
+        "eos_token_id is",
+    ),
     "end is a fraction": (_edit("generation_config.json", eos_token_id=1.5), "eos_token_id is"),
     "penalty is a text": (_edit("generation_config.json", repetition_penalty="x"), ""),
-    "penalty is nothing": (_edit("generation_config.json", repetition_penalty=0.0), "repetition_penalty"),
+    "penalty is nothing": (
+        _edit("generation_config.json", repetition_penalty=0.0),
+        "repetition_penalty",
+    ),
     "template is broken": (_template("{% for %}"), REFUSES),
     "template divides by nothing": (_template("{{ 1 / 0 }}"), REFUSES),
     "template takes what is not there": (_template("{{ messages[99].content.x }}"), REFUSES),
@@ -135,7 +150,9 @@ DAMAGES = {
         "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
     ),
     "template doubles a text": (
-        _template("{% set a = namespace(t='x') %}{% for i in range(40) %}{% set a.t = a.t ~ a.t %}{% endfor %}"),
+        _template(
+            "{% set a = namespace(t='x') %}{% for i in range(40) %}{% set a.t = a.t ~ a.t %}{% endfor %}"
+        ),
         "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
     ),
     "template writes without end": (
@@ -148,7 +165,10 @@ DAMAGES = {
     ),
     "template is no UTF-8": (_content("chat_template.jinja", b"\xff"), "cannot be loaded"),
     "template of old is a list": (
-        lambda folder: (_without("chat_template.jinja")(folder), _content("chat_template.json", b"[]")(folder)),
+        lambda folder: (
+            _without("chat_template.jinja")(folder),
+            _content("chat_template.json", b"[]")(folder),
+        ),
         "",
     ),
 }

@@ -11,8 +11,27 @@ from .told import said_in_one_line
 
 RUN = ["--model", "oracle", "--tasks", "nieh_gt", "--data", "SET"]
 VIDEO = ["--model", "oracle", "--tasks", "nieh_video", "--data", "SET", "--output", "OUT"]
-PUBLISHED = ["--model", "oracle", "--tasks", "nieh_published_full", "--data", "SET", "--output", "OUT"]
-TINY = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", "SET", "--output", "OUT", "--model-args"]
+PUBLISHED = [
+    "--model",
+    "oracle",
+    "--tasks",
+    "nieh_published_full",
+    "--data",
+    "SET",
+    "--output",
+    "OUT",
+]
+TINY = [
+    "--model",
+    "qwen2.5-vl-tiny",
+    "--tasks",
+    "nieh_gt",
+    "--data",
+    "SET",
+    "--output",
+    "OUT",
+    "--model-args",
+]
 GENERATE = ["generate", "--scene", "kitchen-1", "--min-steps", 1]
 MANIFEST = {"name": "x", "trajectories": [{"scene": "kitchen-1", "seed": 0, "min_steps": 1}]}
 
@@ -53,11 +72,17 @@ PLACES = {
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("command", OUTPUTS)
-def test_a_folder_that_cannot_be_written_is_told_before_the_work(typed, tmp_path, monkeypatch, command, place):
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(
+    typed, tmp_path, monkeypatch, command, place
+):
     def work(*_: object, **__: object) -> None:
         raise AssertionError("work was begun")
 
-    for begins in ("thor.simulator.Simulator.__init__", "runs.binding._load_subject", "formats.hub_data._download"):
+    for begins in (
+        "thor.simulator.Simulator.__init__",
+        "runs.binding._load_subject",
+        "formats.hub_data._download",
+    ):
         monkeypatch.setattr(f"infthor_eval.{begins}", work)
     (tmp_path / "file.json").write_text("{}")
     where, said = PLACES[place]
@@ -76,7 +101,10 @@ def test_a_file_that_cannot_be_written_is_told_before_the_work(typed, monkeypatc
     code, _, err = typed(*arguments, "--out", where)
     assert code == 2
     assert "Traceback" not in err
-    assert "; give another place with --out" in err or "make room, or give another place with --out" in err
+    assert (
+        "; give another place with --out" in err
+        or "make room, or give another place with --out" in err
+    )
     assert Path("/dev/full").is_char_device()
 
 
@@ -87,9 +115,26 @@ TYPED = [
     (["run", *RUN, "--output", "OUT", "--seed", "1", "--seed=2"], "--seed is given twice"),
     (["scenes", "show", "kitchen-1", "--size", "64", "--size", "65"], "--size is given twice"),
     (["questions", "SET", "--out", "a.csv", "--out", "b.csv"], "--out is given twice"),
-    (["validate", "SET", "--models", "oracle", "--out", "OUT", "--scorer", "strict", "--scorer", "strict"], "--scorer"),
+    (
+        [
+            "validate",
+            "SET",
+            "--models",
+            "oracle",
+            "--out",
+            "OUT",
+            "--scorer",
+            "strict",
+            "--scorer",
+            "strict",
+        ],
+        "--scorer",
+    ),
     (["questions", "SET", "--out", "a.csv", "--min-share", "nan"], "is not a number"),
-    ([*GENERATE, "--out", "OUT", "--count", "1000000000"], "set INFTHOR_EVAL_MAX_TRAJECTORIES to more than"),
+    (
+        [*GENERATE, "--out", "OUT", "--count", "1000000000"],
+        "set INFTHOR_EVAL_MAX_TRAJECTORIES to more than",
+    ),
     ([*GENERATE, "--out", "OUT", "--count", "9" * 30], "are too many"),
     ([*GENERATE, "--out", "OUT", "--seed", "9" * 30], "--seed"),
     ([*RUN, "--output", "OUT", "--seed", "9" * 30], "--seed"),
@@ -118,8 +163,14 @@ TYPED = [
     ([*TINY, f"min_pixels={10**12}"], "is not between 1 and"),
     ([*TINY, "min_pixels=40000000"], "min_pixels is 40000000 and max_pixels"),
     (["validate", "SET", "--models", "oracle", "--out", "SET"], "is the set itself"),
-    (["validate", "SET", "--models", "oracle", "--out", "OUT", "--decisions", "file"], "no column question_id"),
-    (["validate", "SET", "--models", "oracle,a:x=1,x=1", "--out", "OUT"], "--models a: 'x' is given twice"),
+    (
+        ["validate", "SET", "--models", "oracle", "--out", "OUT", "--decisions", "file"],
+        "no column question_id",
+    ),
+    (
+        ["validate", "SET", "--models", "oracle,a:x=1,x=1", "--out", "OUT"],
+        "--models a: 'x' is given twice",
+    ),
     (
         ["train", "--recipe", "infthor_32k", "--data", "SET", "--out", "OUT", "--gpus", 4],
         "--gpus and --tflops are for --dry-run; add it",
@@ -129,7 +180,17 @@ TYPED = [
         "share the generation of data, which only the recipe tiny without --data does",
     ),
     (
-        ["train", "--recipe", "final_text", "--data", "SET", "--out", "OUT", "--set", "prompt=plain"],
+        [
+            "train",
+            "--recipe",
+            "final_text",
+            "--data",
+            "SET",
+            "--out",
+            "OUT",
+            "--set",
+            "prompt=plain",
+        ],
         "final_text.yaml: not a recipe (actions of the form text follow a system prompt; set prompt to chat); fix the",
     ),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
@@ -142,8 +203,14 @@ TYPED = [
         ["validate", ".", "--models", "oracle", "--out", "OUT"],
         "has no qa_set*.csv, as an NIEH set has beside metadata/; give the folder of an NIEH set, or download",
     ),
-    ([*RUN[:-1], "nowhere", "--output", "OUT"], "nowhere: no such folder; give the folder of an NIEH set, or download"),
-    ([*RUN, "--output", "OUT", "--prompt", "mine"], "'mine' is not one of 'published-main', 'published-logs'"),
+    (
+        [*RUN[:-1], "nowhere", "--output", "OUT"],
+        "nowhere: no such folder; give the folder of an NIEH set, or download",
+    ),
+    (
+        [*RUN, "--output", "OUT", "--prompt", "mine"],
+        "'mine' is not one of 'published-main', 'published-logs'",
+    ),
     (
         [*VIDEO, "--prompt", "published-logs"],
         "prompt published-logs: the context video is asked in words of its own; it is for clues, trajectory",
@@ -159,13 +226,17 @@ TYPED = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "said"), TYPED, ids=[f"{n}: {said}" for n, (_, said) in enumerate(TYPED)])
+@pytest.mark.parametrize(
+    ("arguments", "said"), TYPED, ids=[f"{n}: {said}" for n, (_, said) in enumerate(TYPED)]
+)
 def test_what_cannot_be_meant_is_refused(typed, arguments, said):
     said_in_one_line(typed(*arguments), said)
 
 
 @pytest.mark.parametrize("arguments", [["ls", "models"], ["ls", "tasks"], RUN, ["--version"]])
-def test_a_full_disk_behind_standard_output_is_one_line(make_nieh_set, tmp_path, monkeypatch, capfd, arguments):
+def test_a_full_disk_behind_standard_output_is_one_line(
+    make_nieh_set, tmp_path, monkeypatch, capfd, arguments
+):
     from infthor_eval.cli import main
 
     data = make_nieh_set(size=56)
@@ -205,9 +276,15 @@ def test_questions_do_not_replace_what_somebody_edited(tmp_path, run, monkeypatc
 # What a command writes, and one of the files that somebody may have edited since.
 REPLACES = {
     "scenes show": (["scenes", "show", "kitchen-1", "--size", 64, "--out", "a.png"], "a.png"),
-    "scenes show as JPEG": (["scenes", "show", "kitchen-1", "--size", 64, "--out", "a.jpg"], "a.jpg"),
+    "scenes show as JPEG": (
+        ["scenes", "show", "kitchen-1", "--size", 64, "--out", "a.jpg"],
+        "a.jpg",
+    ),
     "scenes dump, cells": ([*OUTPUTS["scenes dump"], "d"], "d/alfred/layouts/kitchen-1-layout.npy"),
-    "scenes dump, types": ([*OUTPUTS["scenes dump"], "d"], "d/alfred/layouts/kitchen-1-objects.json"),
+    "scenes dump, types": (
+        [*OUTPUTS["scenes dump"], "d"],
+        "d/alfred/layouts/kitchen-1-objects.json",
+    ),
 }
 
 
@@ -219,7 +296,8 @@ def test_a_scene_does_not_replace_what_somebody_edited(typed, tmp_path, name):
     made = (tmp_path / edited).read_bytes()
     (tmp_path / edited).write_text("of somebody's")
     said_in_one_line(
-        typed(*arguments), f"{edited}: exists already with different content; give another --out, or --overwrite"
+        typed(*arguments),
+        f"{edited}: exists already with different content; give another --out, or --overwrite",
     )
     assert (tmp_path / edited).read_text() == "of somebody's"
     assert typed(*arguments, "--overwrite")[0] == 0
@@ -232,7 +310,9 @@ def test_a_dump_does_not_replace_another_recording_of_its_scene(typed, tmp_path)
     others = '{"scene": "bedroom-1", "objects": []}\n'
     path.write_bytes(gzip.compress(f'{{"scene": "kitchen-1", "objects": []}}\n{others}'.encode()))
     arguments = [*OUTPUTS["scenes dump"], "d"]
-    said_in_one_line(typed(*arguments), "has a different recording of kitchen-1 already; give another --out")
+    said_in_one_line(
+        typed(*arguments), "has a different recording of kitchen-1 already; give another --out"
+    )
     assert not (tmp_path / "d" / "alfred").exists()
     assert typed(*arguments, "--overwrite")[0] == 0
     assert gzip.decompress(path.read_bytes()).decode().startswith(others)

@@ -23,7 +23,7 @@ from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.formats.video import read_video
 from infthor_eval.generation.bundle import read_manifest
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.nieh.validation import read_decisions
+from infthor_eval.nieh.validation.cross_validation import read_decisions
 from infthor_eval.runs import Catalog, read_run
 from model_adapters import load
 
@@ -37,7 +37,10 @@ READERS = {
     "set.json": ("set.json", simulator_of),
     "trajectory": ("a.json", lambda root: list(iter_trajectories(root / "a.json"))),
     "trajectories": ("a.jsonl", lambda root: list(iter_trajectories(root / "a.jsonl"))),
-    "packed trajectories": ("a.jsonl.gz", lambda root: list(iter_trajectories(root / "a.jsonl.gz"))),
+    "packed trajectories": (
+        "a.jsonl.gz",
+        lambda root: list(iter_trajectories(root / "a.jsonl.gz")),
+    ),
     "floor plans": ("thor_scenes/objects.jsonl.gz", floor_plan_names),
     "manifest": ("manifest.json", lambda root: read_manifest(root / "manifest.json")),
     "task": ("a.yaml", lambda root: Catalog(root).tasks),
@@ -75,7 +78,8 @@ def test_a_device_is_no_file(place, tmp_path, reader):
 
 
 @pytest.mark.parametrize(
-    "reader", sorted(READERS.keys() - {"checkpoint", "trajectory", "trajectories", "packed trajectories"})
+    "reader",
+    sorted(READERS.keys() - {"checkpoint", "trajectory", "trajectories", "packed trajectories"}),
 )
 def test_a_folder_is_no_file(place, tmp_path, reader):
     place(reader).mkdir()
@@ -120,25 +124,45 @@ CONTENTS = [
     ("archive", gzip.compress(os.urandom(9000))[:-600], "damaged archive"),
     ("archive", gzip.compress(os.urandom(9000))[:4000] + b"\x55" * 4000, "damaged archive"),
     ("archive", NO_DEFLATE, "damaged archive"),
-    ("questions", (ONE_ROW + ",note\nt,q,[1],['a'],\"open\nt,q,[2],['b'],x\n").encode(), "not a UTF-8 CSV file"),
+    (
+        "questions",
+        (ONE_ROW + ",note\nt,q,[1],['a'],\"open\nt,q,[2],['b'],x\n").encode(),
+        "not a UTF-8 CSV file",
+    ),
     (
         "questions",
         (ONE_ROW + ",note\nt,q,[1],['a'],\"open\nt,q,[2],['b'],closed\"\n").encode(),
         "note has several lines",
     ),
-    ("questions", (ONE_ROW + ",answer\nt,q,[1],['a'],['b']\n").encode(), "column 'answer' is there twice"),
+    (
+        "questions",
+        (ONE_ROW + ",answer\nt,q,[1],['a'],['b']\n").encode(),
+        "column 'answer' is there twice",
+    ),
     ("questions", (ONE_ROW + "\nt,q,[1],['a'],more\n").encode(), "has 5 cells for 4 columns"),
     ("questions", (ONE_ROW + "\nt,q,[1],['']\n").encode(), "an entry that no reply can match"),
     ("questions", (ONE_ROW + "\nt,q,[1],[' ']\n").encode(), "an entry that no reply can match"),
     ("questions", (ONE_ROW + "\nt,q,[1],[1e999]\n").encode(), "an entry that no reply can match"),
-    ("questions", (ONE_ROW + f"\nt,q,[1],[{10**30}]\n").encode(), "an entry that no reply can match"),
-    ("questions", (ONE_ROW + "\nt,q,[1],['\\ud800']\n").encode(), "an entry that no reply can match"),
+    (
+        "questions",
+        (ONE_ROW + f"\nt,q,[1],[{10**30}]\n").encode(),
+        "an entry that no reply can match",
+    ),
+    (
+        "questions",
+        (ONE_ROW + "\nt,q,[1],['\\ud800']\n").encode(),
+        "an entry that no reply can match",
+    ),
     ("questions", (ONE_ROW + "\nt,\"q\"x,[1],['a']\n").encode(), "not a UTF-8 CSV file"),
     ("decisions", b"question_id,decision\na,keep\na,drop\n", "has another decision above"),
     ("decisions", b"question_id,decision,decision\na,keep,drop\n", "is there twice"),
     ("decisions", b"question_id,decision\na,keep,drop\n", "has 3 cells for 2 columns"),
     ("decisions", b'question_id,decision\n"a,keep\n', "not a UTF-8 CSV file"),
-    ("manifest", b'{"name": "../x", "trajectories": [{"scene": "a", "seed": 0, "min_steps": 1}]}', "documented form"),
+    (
+        "manifest",
+        b'{"name": "../x", "trajectories": [{"scene": "a", "seed": 0, "min_steps": 1}]}',
+        "documented form",
+    ),
     ("manifest", b'{"name": "x", "trajectories": []}', "documented form"),
     (
         "manifest",
@@ -148,14 +172,18 @@ CONTENTS = [
 ]
 
 
-@pytest.mark.parametrize(("reader", "content", "said"), CONTENTS, ids=[f"{r}: {s}" for r, _, s in CONTENTS])
+@pytest.mark.parametrize(
+    ("reader", "content", "said"), CONTENTS, ids=[f"{r}: {s}" for r, _, s in CONTENTS]
+)
 def test_content_that_is_not_what_it_should_be(place, tmp_path, reader, content, said):
     place(reader).write_bytes(content)
     refused(lambda: READERS[reader][1](tmp_path), said)
 
 
 @pytest.mark.parametrize("reader", ["packed trajectories", "floor plans"])
-def test_what_unpacks_to_more_than_the_limit_is_refused_and_the_limit_is_named(place, tmp_path, monkeypatch, reader):
+def test_what_unpacks_to_more_than_the_limit_is_refused_and_the_limit_is_named(
+    place, tmp_path, monkeypatch, reader
+):
     place(reader).write_bytes(_bomb())
     monkeypatch.setenv("INFTHOR_EVAL_MAX_LINE_MB", "2")
     refused(lambda: READERS[reader][1](tmp_path), "set INFTHOR_EVAL_MAX_LINE_MB to more than 2")
@@ -173,7 +201,12 @@ def test_a_large_file_is_read_where_the_limit_is_raised(place, tmp_path, monkeyp
 
 def _png(width: int, height: int, body: bytes = b"") -> bytes:
     def chunk(name: bytes, content: bytes) -> bytes:
-        return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+        return (
+            struct.pack(">I", len(content))
+            + name
+            + content
+            + struct.pack(">I", zlib.crc32(name + content))
+        )
 
     header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
     return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", body) + chunk(b"IEND", b"")
@@ -185,9 +218,15 @@ def _cut(path: Path) -> None:
 
 
 IMAGES = {
-    "bomb": (_png(30_000, 30_000), "is too large; if this is intended, set INFTHOR_EVAL_MAX_IMAGE_MEGAPIXELS"),
+    "bomb": (
+        _png(30_000, 30_000),
+        "is too large; if this is intended, set INFTHOR_EVAL_MAX_IMAGE_MEGAPIXELS",
+    ),
     "larger than Pillow warns of": (_png(10_000, 10_000), "is too large"),
-    "sliver": (_png(60_000, 1), "is too narrow; if this is intended, set INFTHOR_EVAL_MAX_IMAGE_ASPECT"),
+    "sliver": (
+        _png(60_000, 1),
+        "is too narrow; if this is intended, set INFTHOR_EVAL_MAX_IMAGE_ASPECT",
+    ),
     "upright sliver": (_png(2, 700), "is too narrow"),
     "no width": (_png(0, 7), "not a readable image"),
     "header cut": (_png(8, 8)[:20], "not a readable image"),
@@ -222,12 +261,17 @@ def test_archive_members_that_stand_twice_are_refused(tmp_path):
             info = tarfile.TarInfo("metadata/x")
             info.size = len(content)
             tar.addfile(info, io.BytesIO(content))
-    refused(lambda: unpack_tar(tmp_path / "a.tar", tmp_path / "metadata"), "contains 'metadata/x' twice")
+    refused(
+        lambda: unpack_tar(tmp_path / "a.tar", tmp_path / "metadata"), "contains 'metadata/x' twice"
+    )
     assert not (tmp_path / "metadata").exists()
 
 
 def test_a_deep_object_in_a_trajectory_is_one_line(tmp_path):
-    deep = {"scene": {"floor_plan": "x", "init_action": {"x": 0, "y": 0, "z": 0}}, "plan": {"low_actions": []}}
+    deep = {
+        "scene": {"floor_plan": "x", "init_action": {"x": 0, "y": 0, "z": 0}},
+        "plan": {"low_actions": []},
+    }
     text = json.dumps(deep)[:-1] + ', "gen_info": {"a": ' + "[" * 100_000 + "]" * 100_000 + "}}"
     (tmp_path / "a.json").write_text(text)
     refused(lambda: list(iter_trajectories(tmp_path / "a.json")), "not a trajectory")
@@ -246,8 +290,18 @@ def _packed(path, **headers):
 @pytest.mark.parametrize(
     ("damage", "problem"),
     [
-        (lambda tar: tar[:6000] + bytes([tar[6000 + at] ^ 255 for at in range(2000)]) + tar[8000:], "no header"),
-        (lambda tar: tar[: tar.index(b"metadata/5") + 3] + b"\0" + tar[tar.index(b"metadata/5") + 4 :], "no header"),
+        (
+            lambda tar: (
+                tar[:6000] + bytes([tar[6000 + at] ^ 255 for at in range(2000)]) + tar[8000:]
+            ),
+            "no header",
+        ),
+        (
+            lambda tar: (
+                tar[: tar.index(b"metadata/5") + 3] + b"\0" + tar[tar.index(b"metadata/5") + 4 :]
+            ),
+            "no header",
+        ),
         (lambda tar: tar[: tar.index(b"metadata/5") + 100], "damaged archive"),
         (lambda tar: tar[: tar.index(b"metadata/5")], "no header"),
     ],

@@ -15,7 +15,6 @@ import pytest
 import torch
 from PIL import Image
 
-from infthor_eval.formats.limits import OBJECT_POSES
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.trajectory import DiscreteAction, HighAction, PlannerAction
@@ -23,9 +22,10 @@ from infthor_eval.generation.replay_set import select
 from infthor_eval.household.sequence_text import plan_text
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
-from infthor_eval.runs.journal import Journal
-from model_adapters.hf.decoding import Generation, ReplyState, extend_replies
-from model_adapters.hf.model import TransformersModel
+from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.storage.limits import OBJECT_POSES
+from model_adapters.hf.cached.decoding import Generation, ReplyState, extend_replies
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.protocols import Decoding
 
 from ..conftest import QUESTIONS
@@ -49,25 +49,57 @@ def _twice(data):
 
 # What is done to a set of five sound questions, and how many of them are answered, are skipped, and fail then.
 SETS = {
-    "a frame is missing that no question shows": (lambda data: _frame(data, "traj_a", 5).unlink(), 5, 0),
+    "a frame is missing that no question shows": (
+        lambda data: _frame(data, "traj_a", 5).unlink(),
+        5,
+        0,
+    ),
     "a clue is missing": (lambda data: _frame(data, "traj_b", 0).unlink(), 4, 1),
     "a clue is a pipe": (lambda data: _pipe(_frame(data, "traj_b", 0)), 4, 1),
     "a clue is a folder": (lambda data: _folder(_frame(data, "traj_b", 0)), 4, 1),
     "a clue is a bomb": (lambda data: _write(_frame(data, "traj_b", 0), IMAGES["bomb"][0]), 4, 1),
-    "a clue is a sliver": (lambda data: _write(_frame(data, "traj_b", 0), IMAGES["sliver"][0]), 4, 1),
+    "a clue is a sliver": (
+        lambda data: _write(_frame(data, "traj_b", 0), IMAGES["sliver"][0]),
+        4,
+        1,
+    ),
     "a clue is no image": (lambda data: _write(_frame(data, "traj_b", 0), b"text"), 4, 1),
     "a log is gone": (lambda data: (data / "metadata/traj_b/metadata.json").unlink(), 3, 2),
-    "a log is no JSON": (lambda data: (data / "metadata/traj_b/metadata.json").write_text("["), 3, 2),
-    "a log is deep": (lambda data: (data / "metadata/traj_b/metadata.json").write_text("[" * 200_000), 3, 2),
-    "a log is of another form": (lambda data: (data / "metadata/traj_b/metadata.json").write_text("5"), 3, 2),
+    "a log is no JSON": (
+        lambda data: (data / "metadata/traj_b/metadata.json").write_text("["),
+        3,
+        2,
+    ),
+    "a log is deep": (
+        lambda data: (data / "metadata/traj_b/metadata.json").write_text("[" * 200_000),
+        3,
+        2,
+    ),
+    "a log is of another form": (
+        lambda data: (data / "metadata/traj_b/metadata.json").write_text("5"),
+        3,
+        2,
+    ),
     "a log is a pipe": (lambda data: _pipe(data / "metadata/traj_b/metadata.json"), 3, 2),
-    "a log names two frames alike": (lambda data: _rename(data, "img_filename", "000000000.png"), 3, 2),
+    "a log names two frames alike": (
+        lambda data: _rename(data, "img_filename", "000000000.png"),
+        3,
+        2,
+    ),
     "a log numbers two frames alike": (lambda data: _rename(data, "img_idx", 0), 3, 2),
     "two frames have one name": (_twice, 3, 2),
     "the images are gone": (lambda data: shutil.rmtree(data / "metadata/traj_b/img"), 3, 2),
-    "a frame too many": (lambda data: shutil.copy(_frame(data, "traj_b", 0), _frame(data, "traj_b", 77)), 3, 2),
+    "a frame too many": (
+        lambda data: shutil.copy(_frame(data, "traj_b", 0), _frame(data, "traj_b", 77)),
+        3,
+        2,
+    ),
     "a row has no answer": (lambda data: _row(data, 2, answer=""), 4, 1),
-    "rows have cells of another form": (lambda data: (_row(data, 0, answer="a"), _row(data, 3, gt_img_idx="1")), 3, 2),
+    "rows have cells of another form": (
+        lambda data: (_row(data, 0, answer="a"), _row(data, 3, gt_img_idx="1")),
+        3,
+        2,
+    ),
     "a trajectory's name is too long": (lambda data: _ask(data, "n" * 300), 5, 1),
     "a trajectory's name has a null": (lambda data: _ask(data, "a\0b"), 5, 1),
     "a trajectory's name climbs": (lambda data: _ask(data, "../metadata/traj_b"), 5, 1),
@@ -106,7 +138,9 @@ def _row(data, number, **changes):
 def _ask(data, traj_id):
     with (data / "qa_set_more.csv").open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerows([["traj_id", "question", "gt_img_idx", "answer"], [traj_id, "q", "[1]", "['a']"]])
+        writer.writerows(
+            [["traj_id", "question", "gt_img_idx", "answer"], [traj_id, "q", "[1]", "['a']"]]
+        )
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -114,7 +148,16 @@ def test_what_is_damaged_in_a_set_costs_its_own_questions(make_nieh_set, tmp_pat
     damage, n_answered, n_skipped = SETS[name]
     data = make_nieh_set(size=56)
     damage(data)
-    arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     code, _, err = run(*arguments)
     assert code == 0, err
     assert f"{n_answered} evaluated now" in err
@@ -123,9 +166,13 @@ def test_what_is_damaged_in_a_set_costs_its_own_questions(make_nieh_set, tmp_pat
 
 
 LATE = {
-    "a header of nonsense": lambda data: _write(_frame(data, "traj_b", 0), b"\xff\xd8\xff\xe0" + b"\xaa" * 300),
+    "a header of nonsense": lambda data: _write(
+        _frame(data, "traj_b", 0), b"\xff\xd8\xff\xe0" + b"\xaa" * 300
+    ),
     "a cut header": lambda data: _write(_frame(data, "traj_b", 0), b"\x89PNG\r\n\x1a\n\0\0"),
-    "pixels that are cut": lambda data: _write(_frame(data, "traj_b", 0), _frame(data, "traj_b", 0).read_bytes()[:60]),
+    "pixels that are cut": lambda data: _write(
+        _frame(data, "traj_b", 0), _frame(data, "traj_b", 0).read_bytes()[:60]
+    ),
     "a sliver as JPEG": lambda data: _sliver(_frame(data, "traj_b", 0)),
 }
 
@@ -139,7 +186,14 @@ def _sliver(path):
 def test_a_frame_that_no_model_can_take_fails_alone(make_nieh_set, tmp_path, run, name, batch_size):
     data = make_nieh_set(size=56)
     LATE[name](data)
-    arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", f"batch_size={batch_size}", "--tasks", "nieh_gt"]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--model-args",
+        f"batch_size={batch_size}",
+        "--tasks",
+        "nieh_gt",
+    ]
     code, _, err = run(*arguments, "--data", data, "--output", tmp_path / "out")
     assert code == 1
     assert "5 evaluated now" in err
@@ -147,8 +201,12 @@ def test_a_frame_that_no_model_can_take_fails_alone(make_nieh_set, tmp_path, run
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("error", [RuntimeError, ValueError, KeyError, ZeroDivisionError, OSError, MemoryError])
-def test_what_an_adapter_raises_on_one_question_fails_alone(make_nieh_set, tmp_path, run, monkeypatch, error):
+@pytest.mark.parametrize(
+    "error", [RuntimeError, ValueError, KeyError, ZeroDivisionError, OSError, MemoryError]
+)
+def test_what_an_adapter_raises_on_one_question_fails_alone(
+    make_nieh_set, tmp_path, run, monkeypatch, error
+):
     reply = TransformersModel.answer_each
 
     def answer_each(self, conversations, decoding):
@@ -160,7 +218,9 @@ def test_what_an_adapter_raises_on_one_question_fails_alone(make_nieh_set, tmp_p
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "batch_size=4", "--tasks", "nieh_gt"]
     code, _, err = run(*arguments, "--data", make_nieh_set(size=56), "--output", tmp_path / "out")
     assert code == 1
-    assert "nieh_gt: 1 sample(s) failed, counted as wrong: qwen2.5-vl-tiny fails on the request" in err
+    assert (
+        "nieh_gt: 1 sample(s) failed, counted as wrong: qwen2.5-vl-tiny fails on the request" in err
+    )
 
 
 @pytest.mark.parametrize("batch_size", [1, 4])
@@ -168,21 +228,44 @@ def test_a_question_that_is_too_long_fails_alone(make_nieh_set, tmp_path, run, b
     long = Question("traj_b", "Is there " + "a very large " * 2000 + "sink?", (0,), ("no",))
     data = make_nieh_set([*SOUND, long], size=56)
     model_args = f"batch_size={batch_size},max_tokens=1000"
-    arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", model_args, "--tasks", "nieh_gt", "--data", data]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--model-args",
+        model_args,
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+    ]
     code, _, err = run(*arguments, "--output", tmp_path / "out")
     assert code == 1
     assert "nieh_gt: 1 sample(s) failed" in err
 
 
 @pytest.mark.parametrize("model", ["oracle", "qwen2.5-vl-tiny"])
-def test_a_haystack_without_a_usable_question_ends_the_same_way(make_nieh_set, tmp_path, run, model):
+def test_a_haystack_without_a_usable_question_ends_the_same_way(
+    make_nieh_set, tmp_path, run, model
+):
     data = make_nieh_set([Question("t", "q", (99,), ("a",))], size=56)
-    arguments = ["--model", model, "--tasks", "nieh_haystack_8k", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        model,
+        "--tasks",
+        "nieh_haystack_8k",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     said_in_one_line(run(*arguments), "can be asked (clue 99 is outside trajectory t (6 frames))")
 
 
 def test_a_context_is_measured_by_a_frame_that_can_be_read(make_nieh_set, tmp_path, run):
-    asked = [Question("t", "Is there a mug?", (1,), ("yes",)), Question("u", "Is there a mug?", (1,), ("yes",))]
+    asked = [
+        Question("t", "Is there a mug?", (1,), ("yes",)),
+        Question("u", "Is there a mug?", (1,), ("yes",)),
+    ]
     data = make_nieh_set(asked, size=56)
     _frame(data, "t", 1).write_bytes(b"\xff\xd8\xff\xe0")
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]
@@ -205,7 +288,9 @@ def test_a_run_whose_folder_is_deleted_does_not_end_well(make_nieh_set, tmp_path
     assert "was deleted or replaced while the run wrote it" in err
 
 
-def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(make_nieh_set, tmp_path, run, monkeypatch):
+def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(
+    make_nieh_set, tmp_path, run, monkeypatch
+):
     arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56)]
     n_synced = []
     fsync = os.fsync
@@ -217,7 +302,7 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(make_nieh_
         fsync(descriptor)
 
     with monkeypatch.context() as patched:
-        patched.setattr("infthor_eval.runs.journal.os.fsync", full)
+        patched.setattr("infthor_eval.runs.journals.journal.os.fsync", full)
         code, out, err = run(*arguments, "--output", tmp_path / "out")
     assert (code, out) == (2, "")
     assert "cannot be written (No space left on device); make room" in err
@@ -229,8 +314,20 @@ def test_a_full_disk_in_mid_run_is_one_line_and_the_run_goes_on_later(make_nieh_
 
 
 @pytest.mark.parametrize("full_at", ["kitchen-1-seed1.json", "task-000.pddl"])
-def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(tmp_path, run, monkeypatch, full_at):
-    arguments = ["generate", "--scene", "kitchen-1", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path]
+def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(
+    tmp_path, run, monkeypatch, full_at
+):
+    arguments = [
+        "generate",
+        "--scene",
+        "kitchen-1",
+        "--min-steps",
+        1,
+        "--min-subgoals",
+        1,
+        "--out",
+        tmp_path,
+    ]
     assert run(*arguments)[0] == 0
     first = (tmp_path / "kitchen-1-seed0.json").read_bytes()
     makes_more = [*arguments, "--count", 3]
@@ -248,7 +345,8 @@ def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(tm
         for name in ("write_bytes", "write_text"):
             patched.setattr(f"pathlib.Path.{name}", full(getattr(Path, name)))
         said_in_one_line(
-            run(*makes_more), "kitchen-1-seed1.json: cannot be written (No space left on device); make room and run"
+            run(*makes_more),
+            "kitchen-1-seed1.json: cannot be written (No space left on device); make room and run",
         )
     assert [path.name for path in tmp_path.glob("*.json")] == ["kitchen-1-seed0.json"]
     assert [path.name for path in tmp_path.glob(".*partial")] == []
@@ -261,7 +359,9 @@ def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(tm
 @pytest.mark.parametrize("temperature", [0.0, 1.0])
 def test_scores_that_are_no_numbers_are_no_answer(scores, temperature):
     decoding = Decoding(max_new_tokens=2, temperature=temperature)
-    writing = ReplyState(Generation(frozenset()), decoding, context=(), choices=None, finished=lambda _: False)
+    writing = ReplyState(
+        Generation(frozenset()), decoding, context=(), choices=None, finished=lambda _: False
+    )
     refused(lambda: extend_replies([(writing, torch.tensor(scores))]), "no token has a score")
 
 
@@ -272,14 +372,19 @@ def _trajectory(**changes):
 
 
 def _odd_turn():
-    turn = {"api_action": {"action": "RotateLeft"}, "discrete_action": {"action": "Rotate_²", "args": {}}}
+    turn = {
+        "api_action": {"action": "RotateLeft"},
+        "discrete_action": {"action": "Rotate_²", "args": {}},
+    }
     return json.dumps(_trajectory(plan={"low_actions": [turn]})).encode()
 
 
 def _posed(n_poses):
     pose = {"objectName": "Plate_1", "position": {"x": 0.0, "y": 0.9, "z": 0.0}}
     sound = _trajectory()
-    return json.dumps(sound | {"scene": sound["scene"] | {"object_poses": [pose] * n_poses}}).encode()
+    return json.dumps(
+        sound | {"scene": sound["scene"] | {"object_poses": [pose] * n_poses}}
+    ).encode()
 
 
 MALFORMED = {
@@ -307,7 +412,10 @@ def test_as_many_poses_as_the_limit_are_read(tmp_path, monkeypatch):
     assert len(select([tmp_path]).items) == 1
     monkeypatch.setenv(OBJECT_POSES.name, "2")
     (failure,) = select([tmp_path]).failures
-    assert f"3 object_poses are too many for a scene; if this is intended, set {OBJECT_POSES.name}" in failure.message
+    assert (
+        f"3 object_poses are too many for a scene; if this is intended, set {OBJECT_POSES.name}"
+        in failure.message
+    )
 
 
 @pytest.mark.parametrize("damage", [os.mkfifo, lambda path: path.write_bytes(b"no gzip")])
@@ -332,7 +440,7 @@ def test_sigterm_leaves_no_temporary_folder(tmp_path):
         "import sys, time\n"
         "from infthor_eval.cli import main\n"
         "from infthor_eval.cli.commands import ls\n"
-        "from infthor_eval.formats.scratch import ScratchFolder\n"
+        "from infthor_eval.storage.scratch import ScratchFolder\n"
         "def wait(**_):\n"
         "    with ScratchFolder():\n"
         "        print('waiting', flush=True)\n"

@@ -18,7 +18,10 @@ FILES = [
     (CLUES + ", depthz: [0.2]}", "depthz is not known; did you mean depths?"),
     (CLUES + ", top-k: 3}", "top-k is not known; did you mean top_k?"),
     (CLUES + ", 5: 3}", "not"),
-    (CLUES + ", ctx_size: two}", f"{SETTING} ctx_size is 'two'; it is a number of kilo-tokens above 0"),
+    (
+        CLUES + ", ctx_size: two}",
+        f"{SETTING} ctx_size is 'two'; it is a number of kilo-tokens above 0",
+    ),
     (CLUES + ", ctx_size: -8}", f"{SETTING} ctx_size is -8; it is a number of kilo-tokens above 0"),
     (CLUES + ", ctx_size: .nan}", "holds what JSON cannot"),
     (CLUES + ", depths: 0.2}", f"{SETTING} depths is 0.2; it is a list of numbers from 0 to 1"),
@@ -29,27 +32,54 @@ FILES = [
     (CLUES + ", budget: 0}", f"{SETTING} budget is 0; it is a whole number from 1, in tokens"),
     (CLUES + ", k_tokens: 1023}", f"{SETTING} k_tokens is 1023; it is 1000 or 1024"),
     (CLUES + ", seed: x}", f"{SETTING} seed is 'x'; it is a whole number"),
-    (CLUES + ", frames: grey}", f"{SETTING} frames is 'grey'; it is one of shown, blank, shuffled, other"),
-    (CLUES + ", prompt: mine}", f"{SETTING} prompt is 'mine'; it is one of published-main, published-logs"),
+    (
+        CLUES + ", frames: grey}",
+        f"{SETTING} frames is 'grey'; it is one of shown, blank, shuffled, other",
+    ),
+    (
+        CLUES + ", prompt: mine}",
+        f"{SETTING} prompt is 'mine'; it is one of published-main, published-logs",
+    ),
     (
         HEAD + "dataset_kwargs: {context: video, prompt: published-logs}",
         f"{SETTING} prompt published-logs: the context video is asked in words of its own; it is for clues, trajectory",
     ),
-    (CLUES + "}\nmetric_list: [{metric: exact}]", "metric_list: exact is none of our scorers, reference, strict"),
+    (
+        CLUES + "}\nmetric_list: [{metric: exact}]",
+        "metric_list: exact is none of our scorers, reference, strict",
+    ),
     (CLUES + ", retriever: 5}", f"{SETTING} retriever is 5; it is a text"),
     (CLUES + ", bundled: 5}", f"{SETTING} bundled is 5; it is a name"),
     (CLUES + ", bundled: no}", f"{SETTING} bundled is False; it is a name"),
-    (CLUES + ", bundled: none}", f"{SETTING} bundled is 'none': the installation lacks its data folder"),
-    (HEAD + "dataset_kwargs: {context: clue}", f"{SETTING} context is 'clue'; it is one of clues, trajectory"),
-    (HEAD + "dataset_kwargs: {context: haystack}", f"{SETTING} ctx_size is missing; haystack needs it"),
+    (
+        CLUES + ", bundled: none}",
+        f"{SETTING} bundled is 'none': the installation lacks its data folder",
+    ),
+    (
+        HEAD + "dataset_kwargs: {context: clue}",
+        f"{SETTING} context is 'clue'; it is one of clues, trajectory",
+    ),
+    (
+        HEAD + "dataset_kwargs: {context: haystack}",
+        f"{SETTING} ctx_size is missing; haystack needs it",
+    ),
     (HEAD + "dataset_kwargs: {context: [clues]}", "name of a context"),
     (HEAD + "dataset_kwargs: {}", "name of a context"),
     (HEAD + "dataset_kwargs: 5", "must be a mapping"),
     (HEAD + "dataset_kwargs: [context]", "must be a mapping"),
-    (CLUES + "}\ngeneration_kwargs: 5", "own.yaml: generation_kwargs is 5; it is a mapping of settings"),
+    (
+        CLUES + "}\ngeneration_kwargs: 5",
+        "own.yaml: generation_kwargs is 5; it is a mapping of settings",
+    ),
     (CLUES + "}\ngeneration_kwargs: [until]", "it is a mapping of settings"),
-    (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: 5}", "it is a text or a list of texts"),
-    (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: {a: 1}}", "it is a text or a list of texts"),
+    (
+        CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: 5}",
+        "it is a text or a list of texts",
+    ),
+    (
+        CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, until: {a: 1}}",
+        "it is a text or a list of texts",
+    ),
     (CLUES + "}\ngeneration_kwargs: {max_gen_toks: 5, 7: 1}", "not"),
     (CLUES + "}\ndescription: 2020-01-01", "holds what JSON cannot"),
     (CLUES + "}\ndescription: !!binary aGk=", "holds what JSON cannot"),
@@ -81,8 +111,12 @@ FILES = [
 ]
 
 
-@pytest.mark.parametrize(("content", "said"), FILES, ids=[f"{n}: {said}" for n, (_, said) in enumerate(FILES)])
-def test_a_task_file_that_is_not_what_it_should_be(make_nieh_set, tmp_path, run, task_files, content, said):
+@pytest.mark.parametrize(
+    ("content", "said"), FILES, ids=[f"{n}: {said}" for n, (_, said) in enumerate(FILES)]
+)
+def test_a_task_file_that_is_not_what_it_should_be(
+    make_nieh_set, tmp_path, run, task_files, content, said
+):
     (task_files / "nieh" / "own.yaml").write_text(content)
     data = make_nieh_set(size=56)
     ended = run("--model", "oracle", "--tasks", "own", "--data", data, "--output", tmp_path / "out")
@@ -92,26 +126,45 @@ def test_a_task_file_that_is_not_what_it_should_be(make_nieh_set, tmp_path, run,
 def test_groups_in_a_circle_are_told(tmp_path, run, task_files):
     (task_files / "nieh" / "one.yaml").write_text("group: one\ntask: [other]")
     (task_files / "nieh" / "other.yaml").write_text("group: other\ntask: [one]")
-    said_in_one_line(run("--model", "oracle", "--tasks", "one", "--output", tmp_path), "is in itself")
+    said_in_one_line(
+        run("--model", "oracle", "--tasks", "one", "--output", tmp_path), "is in itself"
+    )
 
 
-def test_a_larger_document_is_read_where_the_limit_is_raised(make_nieh_set, tmp_path, run, task_files, monkeypatch):
+def test_a_larger_document_is_read_where_the_limit_is_raised(
+    make_nieh_set, tmp_path, run, task_files, monkeypatch
+):
     (task_files / "nieh" / "own.yaml").write_text(CLUES + "}\na: &a [1, 1, 1, 1]\nb: [*a, *a]\n")
-    arguments = ["--model", "oracle", "--tasks", "own", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "oracle",
+        "--tasks",
+        "own",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path / "out",
+    ]
     monkeypatch.setenv("INFTHOR_EVAL_MAX_YAML_NODES", "10")
     said_in_one_line(run(*arguments), "has more than 10 values")
     monkeypatch.delenv("INFTHOR_EVAL_MAX_YAML_NODES")
     assert run(*arguments)[0] == 0
 
 
-@pytest.mark.parametrize("settings", ["null", "[context]", "{context: trajctory}", "{context: clues, depthz: [0.2]}"])
+@pytest.mark.parametrize(
+    "settings", ["null", "[context]", "{context: trajctory}", "{context: clues, depthz: [0.2]}"]
+)
 def test_a_task_that_cannot_be_run_is_not_listed_as_if_it_could(tmp_path, run, settings):
     (tmp_path / "own.yaml").write_text(f"{HEAD}dataset_kwargs: {settings}\n")
-    (tmp_path / "good.yaml").write_text("include: _nieh.yaml\ntask: good\ndataset_kwargs: {context: clues}\n")
+    (tmp_path / "good.yaml").write_text(
+        "include: _nieh.yaml\ntask: good\ndataset_kwargs: {context: clues}\n"
+    )
     code, out, err = run("ls", "tasks", "--include-path", tmp_path)
     assert (code, err) == (0, "")
     said = " ".join(out.split())
-    assert said.count("not usable: ") == 1 and "good context clues" in said and "nieh_mini_gt" in said
+    assert (
+        said.count("not usable: ") == 1 and "good context clues" in said and "nieh_mini_gt" in said
+    )
 
 
 def test_all_packaged_tasks_are_good():

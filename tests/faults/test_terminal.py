@@ -24,7 +24,8 @@ RAW = ("\x1b", "\x9b", "\x07", "\b", "\r", "\u202e", "\u200b")
 
 def _as_shown(text):
     return "".join(
-        letter if letter.isprintable() else letter.encode("unicode_escape").decode("ascii") for letter in text
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode("ascii")
+        for letter in text
     )
 
 
@@ -34,7 +35,12 @@ def _is_clean(out):
 
 @pytest.mark.parametrize("name", NASTY)
 def test_a_table_shows_text_as_text(capfd, name):
-    table = Table(NASTY[name], (Column(NASTY[name], False), Column("n")), (Row((NASTY[name], "1")),), (NASTY[name],))
+    table = Table(
+        NASTY[name],
+        (Column(NASTY[name], False), Column("n")),
+        (Row((NASTY[name], "1")),),
+        (NASTY[name],),
+    )
     print_table(table, table_console())
     out = capfd.readouterr().out
     assert out.count(_as_shown(NASTY[name])) == 4
@@ -45,8 +51,12 @@ def test_a_table_shows_text_as_text(capfd, name):
 def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run, name):
     data = make_nieh_set(size=56)
     extra = NASTY[name].replace("\r", "").replace("/", "|")
-    (data / "qa_set_more.csv").write_text(f"traj_id,question,gt_img_idx,answer\n{extra},q,[1],['a']\n")
-    code, out, err = run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
+    (data / "qa_set_more.csv").write_text(
+        f"traj_id,question,gt_img_idx,answer\n{extra},q,[1],['a']\n"
+    )
+    code, out, err = run(
+        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+    )
     assert code == 0
     assert _as_shown(extra) in err
     assert _is_clean(out + err)
@@ -54,7 +64,14 @@ def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run
 
 @pytest.mark.parametrize("name", NASTY)
 def test_an_error_is_text(tmp_path, run, name):
-    code, out, err = run("--model", "oracle", "--tasks", "nieh_gt", "--data", tmp_path / NASTY[name].replace("/", "|"))
+    code, out, err = run(
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        tmp_path / NASTY[name].replace("/", "|"),
+    )
     assert (code, out) == (2, "")
     assert _is_clean(err)
     assert len(err.splitlines()) == 1
@@ -64,7 +81,9 @@ def test_an_error_is_text(tmp_path, run, name):
 def test_a_folder_of_results_is_text(make_nieh_set, tmp_path, run, name):
     data = make_nieh_set(size=56)
     output = tmp_path / NASTY[name].replace("/", "|")
-    code, out, err = run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output)
+    code, out, err = run(
+        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output
+    )
     assert code == 0, err
     assert _as_shown(output.name) in out
     assert _is_clean(out + err)
@@ -85,6 +104,8 @@ def test_ls_shows_names_as_text(tmp_path, run, task_files, name):
 def test_a_name_that_is_no_unicode_ends_nothing(make_nieh_set, tmp_path, run):
     data = make_nieh_set([Question("t", "q", (1,), ("a",))], size=56)
     output = tmp_path / "\udcff"
-    code, out, err = run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output)
+    code, out, err = run(
+        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output
+    )
     assert code == 0, err
     assert "\\udcff" in out

@@ -5,7 +5,7 @@ import csv
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.suite import NiehSuite
 from model_adapters import Capabilities
 
@@ -105,7 +105,9 @@ def test_a_damaged_list_is_told_before_a_model_is_asked(validate, tmp_path):
 
 def test_decisions_on_another_set_are_told_before_a_model_is_asked(validate, tmp_path):
     (tmp_path / "d.csv").write_text("question_id,decision\nother/1,keep\n")
-    said_in_one_line(validate("--decisions", tmp_path / "d.csv"), "about other/1, which is not in the set")
+    said_in_one_line(
+        validate("--decisions", tmp_path / "d.csv"), "about other/1, which is not in the set"
+    )
     assert Silent.n_asked == 0
 
 

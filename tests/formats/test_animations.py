@@ -45,10 +45,19 @@ def test_a_gif_shows_every_picture_for_its_time(tmp_path):
 def test_what_does_not_move_keeps_its_colours_in_a_gif(tmp_path):
     path = tmp_path / "a.gif"
     ramp = np.linspace(0, 255, 64).astype(np.uint8)
-    still = np.stack([np.broadcast_to(ramp, (48, 64)), np.full((48, 64), 90, np.uint8), ramp[::-1] + np.zeros((48, 1))])
+    still = np.stack(
+        [
+            np.broadcast_to(ramp, (48, 64)),
+            np.full((48, 64), 90, np.uint8),
+            ramp[::-1] + np.zeros((48, 1)),
+        ]
+    )
     still = np.moveaxis(still, 0, -1).astype(np.uint8)
     noise = np.random.default_rng(0).integers(0, 256, (6, 48, 64, 3), dtype=np.uint8)
-    pictures = [np.concatenate([still, moving // (number + 1)], axis=1) for number, moving in enumerate(noise)]
+    pictures = [
+        np.concatenate([still, moving // (number + 1)], axis=1)
+        for number, moving in enumerate(noise)
+    ]
     write_animation(path, map(Image.fromarray, pictures), 4.0)
     with Image.open(path) as gif:
         seen = []

@@ -19,7 +19,10 @@ def test_frames_come_in_time_order_and_clues_in_theirs(make_nieh_set):
     root = make_nieh_set([Question("t", "q", (4, 1), ("yes",))])
     data = NiehSet(root)
     assert [frame.path.stem for frame in data.frames("t")] == [f"{index:09d}" for index in range(6)]
-    assert [frame.path.stem for frame in data.clue_frames(data.questions[0])] == ["000000004", "000000001"]
+    assert [frame.path.stem for frame in data.clue_frames(data.questions[0])] == [
+        "000000004",
+        "000000001",
+    ]
     assert data.skipped == ()
 
 
@@ -44,10 +47,15 @@ def test_the_folder_of_larger_images_serves_as_well(make_nieh_set):
         (Question("t", "q", (-1,), ("a",)), "clue -1 is outside trajectory t (6 frames)"),
         (Question("t", "q", (), ("a",)), "no clue frame"),
         (Question("t", "q", (1,), ()), "no gold answer"),
-        (Question("../metadata/t", "q", (1,), ("a",)), "trajectory '../metadata/t' is not a plain folder name"),
+        (
+            Question("../metadata/t", "q", (1,), ("a",)),
+            "trajectory '../metadata/t' is not a plain folder name",
+        ),
     ],
 )
-def test_a_question_that_cannot_be_asked_is_left_out_with_its_reason(make_nieh_set, question, reason):
+def test_a_question_that_cannot_be_asked_is_left_out_with_its_reason(
+    make_nieh_set, question, reason
+):
     root = make_nieh_set([SOUND])
     extra = root / "qa_set_extra.csv"
     rows = f'"{question.traj_id}",q,"{list(question.clues)}","{list(question.answers)}"\n'
@@ -97,7 +105,9 @@ def test_a_missing_frame_leaves_out_the_questions_that_show_it(make_nieh_set):
 def test_two_frames_with_one_number_are_refused(make_nieh_set):
     root = make_nieh_set([SOUND])
     metadata = root / "metadata" / "t" / "metadata.json"
-    metadata.write_text(json.dumps([{**entry, "img_idx": 0} for entry in json.loads(metadata.read_text())]))
+    metadata.write_text(
+        json.dumps([{**entry, "img_idx": 0} for entry in json.loads(metadata.read_text())])
+    )
     assert "two entries of metadata.json have img_idx 0" in reasons(root)[0]
 
 
@@ -146,14 +156,18 @@ def test_the_simulator_is_what_the_set_says(make_nieh_set):
 def test_a_set_of_another_version_is_refused(make_nieh_set):
     root = make_nieh_set([SOUND])
     (root / "set.json").write_text('{"format": 99, "simulator": "embedded"}')
-    with pytest.raises(DataError, match=r"set\.json: the set has format 99, this version reads 1; use the version"):
+    with pytest.raises(
+        DataError, match=r"set\.json: the set has format 99, this version reads 1; use the version"
+    ):
         NiehSet(root)
 
 
 def test_a_set_is_continued_by_the_same_simulator_of_the_same_version_alone(tmp_path):
     claim_for_simulator(tmp_path, "embedded")
     claim_for_simulator(tmp_path, "embedded")
-    with pytest.raises(DataError, match="of the embedded simulator; give another folder for the unity one"):
+    with pytest.raises(
+        DataError, match="of the embedded simulator; give another folder for the unity one"
+    ):
         claim_for_simulator(tmp_path, "unity")
     info = json.loads((tmp_path / "set.json").read_text())
     (tmp_path / "set.json").write_text(json.dumps(info | {"infthor_eval": "0.0.1"}))

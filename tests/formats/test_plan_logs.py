@@ -25,7 +25,9 @@ ROWS = [row("t0", (1, 4), (1, 2), (0, 1), (0, 1)), row("t1", (0, 0), (0, 0), (0,
 @pytest.fixture
 def read(tmp_path):
     def read(lines, name=NAME):
-        content = "".join(line if isinstance(line, str) else json.dumps(line) + "\n" for line in lines).encode()
+        content = "".join(
+            line if isinstance(line, str) else json.dumps(line) + "\n" for line in lines
+        ).encode()
         path = tmp_path / name
         path.write_bytes(gzip.compress(content, mtime=0) if name.endswith(".gz") else content)
         return read_plan_log(path)
@@ -57,21 +59,32 @@ def test_the_model_is_in_a_published_name(read, name, model):
 
 
 def test_packing_does_not_change_the_digest(read):
-    assert read(ROWS).digest == read(ROWS, f"{NAME}.gz").digest != read(ROWS[:1], "other.log").digest
+    assert (
+        read(ROWS).digest == read(ROWS, f"{NAME}.gz").digest != read(ROWS[:1], "other.log").digest
+    )
 
 
 BAD = {
     "cut": (json.dumps(ROWS[0])[:50] + "\n", "has no counts of plans ("),
     "a list": ("[1]\n", "has no counts of plans (Expected `object`, got `array`)"),
     "nested": ("[" * 5000 + "\n", "has no counts of plans ("),
-    "a count is missing": ({"traj_id": "t2", "metric": {"total_count": 4}}, "missing required field"),
+    "a count is missing": (
+        {"traj_id": "t2", "metric": {"total_count": 4}},
+        "missing required field",
+    ),
     "a word": (row("t2", (0, "4"), (0, 2), (0, 1), (0, 1)), "Expected `int`, got `str`"),
     "below zero": (row("t2", (0, 4), (-1, 2), (0, 1), (0, 1)), "Expected `int` >= 0"),
     "endless": (row("t2", (0, 10**9), (0, 2), (0, 1), (0, 1)), "Expected `int` <= 10000"),
     "no name": (row("", (0, 4), (0, 2), (0, 1), (0, 1)), "Expected `str` of length >= 1"),
     "more done": (row("t2", (3, 4), (3, 2), (0, 1), (0, 1)), "more plans are done than there are"),
-    "too small a total": (row("t2", (1, 3), (1, 2), (0, 1), (0, 1)), "the total is less than its kinds together"),
-    "the same again": (row("t0", (0, 4), (0, 2), (0, 1), (0, 1)), "has 't0' again; the first row is kept"),
+    "too small a total": (
+        row("t2", (1, 3), (1, 2), (0, 1), (0, 1)),
+        "the total is less than its kinds together",
+    ),
+    "the same again": (
+        row("t0", (0, 4), (0, 2), (0, 1), (0, 1)),
+        "has 't0' again; the first row is kept",
+    ),
 }
 
 
@@ -86,7 +99,8 @@ def test_a_bad_line_is_named_and_the_others_are_read(read, bad):
 
 
 @pytest.mark.parametrize(
-    ("lines", "reason"), [([], "it is empty"), (["{}\n"], "line 1 has no counts of plans (Object missing required")]
+    ("lines", "reason"),
+    [([], "it is empty"), (["{}\n"], "line 1 has no counts of plans (Object missing required")],
 )
 def test_a_log_without_counts_is_one_line(read, lines, reason):
     with pytest.raises(DataError, match="no line has counts of plans") as caught:
@@ -97,7 +111,12 @@ def test_a_log_without_counts_is_one_line(read, lines, reason):
 
 @pytest.mark.parametrize(
     ("content", "is_one"),
-    [('{"qidx": 0}\n', False), ("", False), ('half a line\n{"metric": {}}\n', True), ('[1]\n{"reply": ""}', False)],
+    [
+        ('{"qidx": 0}\n', False),
+        ("", False),
+        ('half a line\n{"metric": {}}\n', True),
+        ('[1]\n{"reply": ""}', False),
+    ],
 )
 def test_a_log_of_plans_is_told_from_one_of_replies(tmp_path, content, is_one):
     path = tmp_path / "a.log"

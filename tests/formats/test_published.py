@@ -10,7 +10,9 @@ import pytest
 from infthor_eval.formats.published import published_tables
 
 PUBLISHED = Path(__file__).parents[2] / "../shared/data/published_sets"
-needs_logs = pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data")
+needs_logs = pytest.mark.skipif(
+    not PUBLISHED.is_dir(), reason="the published logs are not at ../shared/data"
+)
 REPLIES = "eval_qa_set_{}_clue_Qwen2.5-VL-7B-Instruct_full_traj{}.log.gz"
 
 
@@ -47,7 +49,10 @@ def test_means_of_replies_are_those_of_the_logs(title, row, mode):
         for file in ("nieh_single", "nsieh_multi")
     ]
     assert published.columns == ("nieh_single_clue", "nsieh_multi_clue")
-    assert tuple(round(100 * sum(given) / len(given), 2) for given in scores) == published.rows[row].values
+    assert (
+        tuple(round(100 * sum(given) / len(given), 2) for given in scores)
+        == published.rows[row].values
+    )
 
 
 def test_two_figures_that_disagree_both_stand_and_that_is_said():
@@ -63,11 +68,15 @@ def test_rates_of_plans_are_those_of_the_logs():
     rows = {row.log: row.values for row in table("plans", "logs on final tasks").rows}
     assert len(logs) == len(rows) == 7
     for log in logs:
-        name = log.name.removeprefix("eval_longhrz_checkpoints_").removesuffix(".log.gz").rstrip("_")
+        name = (
+            log.name.removeprefix("eval_longhrz_checkpoints_").removesuffix(".log.gz").rstrip("_")
+        )
         counts = Counter()
         for row in rows_of(log):
             counts.update(row["metric"])
-        rates = [counts[f"{kind}_success"] / counts[f"{kind}_count"] for kind in ("goto", "pick", "put")]
+        rates = [
+            counts[f"{kind}_success"] / counts[f"{kind}_count"] for kind in ("goto", "pick", "put")
+        ]
         rates.append(counts["success_count"] / counts["total_count"])
         assert tuple(round(100 * rate, 1) for rate in rates) == rows[name], name
 

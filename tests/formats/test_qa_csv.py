@@ -37,7 +37,9 @@ def test_what_is_written_is_read_back(tmp_path_factory, items):
             n_evidence=st.integers(0, 20) | st.none(),
             steps=st.lists(st.integers(0, 3000), max_size=5).map(tuple),
             matches=st.lists(st.floats(0, 2), min_size=4, max_size=4).map(
-                lambda scores: tuple(zip(("match1", "match2", "match3", "match4"), scores, strict=True))
+                lambda scores: tuple(
+                    zip(("match1", "match2", "match3", "match4"), scores, strict=True)
+                )
             ),
         ),
         max_size=5,
@@ -46,7 +48,10 @@ def test_what_is_written_is_read_back(tmp_path_factory, items):
 )
 def test_all_columns_of_the_published_files_are_kept(tmp_path_factory, file, published):
     path = tmp_path_factory.mktemp("csv") / f"qa_set_nieh_{file}_clue.csv"
-    items = [Question("t", "q", (1,), ("a",), published=replace(columns, file=file)) for columns in published]
+    items = [
+        Question("t", "q", (1,), ("a",), published=replace(columns, file=file))
+        for columns in published
+    ]
     write_questions(path, items)
     assert read_questions(path) == items
     assert [item.id for item in items] == [columns.qid for columns in published]
@@ -82,15 +87,30 @@ def test_the_published_columns_suffice_and_others_are_left_unread(tmp_path):
     [
         ("traj_id,question,answer\nt,q,['a']\n", "no column gt_img_idx"),
         ("", "no column traj_id"),
-        ("traj_id,question,gt_img_idx,answer\nt,q,\"[1, 2\",['a']\n", "line 2: gt_img_idx is not a list"),
+        (
+            "traj_id,question,gt_img_idx,answer\nt,q,\"[1, 2\",['a']\n",
+            "line 2: gt_img_idx is not a list",
+        ),
         ("traj_id,question,gt_img_idx,answer\nt,q,[1],yes\n", "line 2: answer is not a list"),
-        ("traj_id,question,gt_img_idx,answer\nt,q,[1],__import__('os')\n", "line 2: answer is not a list"),
-        ("traj_id,question,gt_img_idx,answer\nt,q,['x'],['a']\n", "line 2: gt_img_idx has an entry of the wrong type"),
+        (
+            "traj_id,question,gt_img_idx,answer\nt,q,[1],__import__('os')\n",
+            "line 2: answer is not a list",
+        ),
+        (
+            "traj_id,question,gt_img_idx,answer\nt,q,['x'],['a']\n",
+            "line 2: gt_img_idx has an entry of the wrong type",
+        ),
         ("traj_id,question,gt_img_idx,answer\nt,q,[True],['a']\n", "wrong type"),
-        ("traj_id,question,gt_img_idx,answer,absence\nt,q,[1],['no'],maybe\n", "line 2: absence is neither yes nor no"),
+        (
+            "traj_id,question,gt_img_idx,answer,absence\nt,q,[1],['no'],maybe\n",
+            "line 2: absence is neither yes nor no",
+        ),
         ("traj_id,question,gt_img_idx,answer\nt,,[1],['a']\n", "line 2: question is empty"),
         ("traj_id,question,gt_img_idx,answer\nt,q\n", "line 2: gt_img_idx is empty"),
-        ("traj_id,question,gt_img_idx,answer\nt,q," + "[" * 5000 + ",['a']\n", "gt_img_idx is not a list"),
+        (
+            "traj_id,question,gt_img_idx,answer\nt,q," + "[" * 5000 + ",['a']\n",
+            "gt_img_idx is not a list",
+        ),
     ],
 )
 def test_a_malformed_file_is_refused_in_one_line(tmp_path, content, said):

@@ -5,16 +5,20 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question_forms import FORMS, FURTHER_FORMS, find_form, type_of
+from infthor_eval.storage.packaged import packaged_folder
 
 PUBLISHED = Path(__file__).parents[2] / "../shared/data/published_sets"
 
 
 @pytest.mark.parametrize("form", (*FORMS, *FURTHER_FORMS), ids=lambda form: form.words)
 def test_a_form_is_told_by_its_words_and_by_no_others(form):
-    for names in (("Mug", "CoffeeTable"), ("the mug", "the coffee table"), ("an alarm clock", "the bed")):
+    for names in (
+        ("Mug", "CoffeeTable"),
+        ("the mug", "the coffee table"),
+        ("an alarm clock", "the bed"),
+    ):
         text = form.words.replace("in/on", "on")
         for name in names:
             text = text.replace("{}", name, 1)
@@ -22,7 +26,9 @@ def test_a_form_is_told_by_its_words_and_by_no_others(form):
         assert find_form(f"Oh! {text}") is None
 
 
-@pytest.mark.parametrize("text", ["", "?", "Is there a mug?", "Where was the mug?", "How many mugs?", "What is in it?"])
+@pytest.mark.parametrize(
+    "text", ["", "?", "Is there a mug?", "Where was the mug?", "How many mugs?", "What is in it?"]
+)
 def test_other_questions_have_no_type(text):
     assert type_of(text) == ""
 
@@ -33,7 +39,9 @@ def test_the_words_of_the_bundled_questions_give_the_types_that_their_file_names
     assert all(type_of(item.text) == item.question_type for item in questions)
 
 
-@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data")
+@pytest.mark.skipif(
+    not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
+)
 def test_every_published_question_has_a_type():
     single, multi = (read_questions(path) for path in sorted(PUBLISHED.glob("qa_set*.csv")))
     # Counted by hand from the files: single clue, several clues.

@@ -32,21 +32,29 @@ PUBLISHED = {
 
 
 def put(folder, document):
-    (folder / "metadata.json").write_text(document if isinstance(document, str) else json.dumps(document))
+    (folder / "metadata.json").write_text(
+        document if isinstance(document, str) else json.dumps(document)
+    )
     return folder
 
 
 def test_published_layouts_read_alike(tmp_path):
     columns = {key: [value, value] for key, value in PUBLISHED.items()}
     single = read_steps(put(tmp_path, PUBLISHED))
-    assert single == read_steps(put(tmp_path, [PUBLISHED])) == read_steps(put(tmp_path, columns))[:1]
+    assert (
+        single == read_steps(put(tmp_path, [PUBLISHED])) == read_steps(put(tmp_path, columns))[:1]
+    )
     assert single[0].object_log.recep_objs == {"Shelf": ["Vase"]}
     assert single[0].seen is None
 
 
 def test_columns_with_img_idx_alone(tmp_path):
     steps = read_steps(put(tmp_path, {"img_idx": [0, 1, 2]}))
-    assert [step.img_filename for step in steps] == ["000000000.png", "000000001.png", "000000002.png"]
+    assert [step.img_filename for step in steps] == [
+        "000000000.png",
+        "000000001.png",
+        "000000002.png",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -85,7 +93,10 @@ logged = st.builds(
     object_log=st.builds(ObjectLog, visible=st.lists(st.text(max_size=8), max_size=3)),
     action=st.none() | st.text(max_size=10),
     pose=st.none() | st.just(LoggedPose(0.25, 0.9, -1.0, 90.0, 30.0)),
-    seen=st.none() | st.dictionaries(st.text(max_size=5), st.just(ObjectInFrame(12, (0, 0, 3, 4), True)), max_size=2),
+    seen=st.none()
+    | st.dictionaries(
+        st.text(max_size=5), st.just(ObjectInFrame(12, (0, 0, 3, 4), True)), max_size=2
+    ),
     changes=st.dictionaries(st.text(max_size=5), states, max_size=3),
 )
 
@@ -99,7 +110,9 @@ def test_what_is_written_is_read(tmp_path_factory, steps):
 
 def test_worlds_apply_changes_in_order():
     steps = [
-        Step(0, "0.png", changes={"a": ObjectState("Mug"), "b": ObjectState("Fridge", is_open=False)}),
+        Step(
+            0, "0.png", changes={"a": ObjectState("Mug"), "b": ObjectState("Fridge", is_open=False)}
+        ),
         Step(1, "1.png", changes={"b": ObjectState("Fridge", is_open=True)}),
     ]
     opened = [dict(world)["b"].is_open for world in iter_object_states(steps)]

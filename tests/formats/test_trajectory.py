@@ -16,7 +16,10 @@ from infthor_eval.formats.trajectory import (
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
 MINIMAL = {
-    "scene": {"floor_plan": "FloorPlan1", "init_action": {"x": 0, "y": 0.9, "z": 1.5, "rotation": 90}},
+    "scene": {
+        "floor_plan": "FloorPlan1",
+        "init_action": {"x": 0, "y": 0.9, "z": 1.5, "rotation": 90},
+    },
     "plan": {"low_actions": [{"api_action": {"action": "MoveAhead"}}]},
     "something_new": 1,
 }
@@ -37,7 +40,10 @@ def test_every_container_reads(tmp_path, name):
 
 
 def test_vector_rotation(tmp_path):
-    scene = {"floor_plan": "FloorPlan1", "init_action": {"x": 0, "y": 0, "z": 0, "rotation": {"y": 270.0}}}
+    scene = {
+        "floor_plan": "FloorPlan1",
+        "init_action": {"x": 0, "y": 0, "z": 0, "rotation": {"y": 270.0}},
+    }
     trajectory = next(iter_trajectories(write(tmp_path / "a.json", {**MINIMAL, "scene": scene})))
     assert trajectory.scene.init_action.yaw == 270
 
@@ -45,7 +51,10 @@ def test_vector_rotation(tmp_path):
 def test_directory_in_order_without_the_sets_own_files(tmp_path):
     for name in ("b.json", "a.json", "metadata.json", "expert_log.json"):
         write(tmp_path / name, {**MINIMAL, "traj_id": name})
-    assert [trajectory.traj_id for trajectory in iter_trajectories(tmp_path)] == ["a.json", "b.json"]
+    assert [trajectory.traj_id for trajectory in iter_trajectories(tmp_path)] == [
+        "a.json",
+        "b.json",
+    ]
 
 
 def test_a_malformed_line_is_named_and_hides_no_other(tmp_path):
@@ -82,7 +91,9 @@ def test_written_reads_back(tmp_path):
 def test_what_the_published_saver_leaves_empty(tmp_path):
     scene = {**MINIMAL["scene"], "floor_plan": "", "scene_num": 28, "dirty_and_empty": None}
     trajectory = next(
-        iter_trajectories(write(tmp_path / "a.json", {**MINIMAL, "scene": scene, "long_horizon_task": {}}))
+        iter_trajectories(
+            write(tmp_path / "a.json", {**MINIMAL, "scene": scene, "long_horizon_task": {}})
+        )
     )
     assert (trajectory.scene.floor_plan, trajectory.scene.dirty_and_empty) == ("FloorPlan28", False)
     assert trajectory.long_horizon_task is None
@@ -91,7 +102,11 @@ def test_what_the_published_saver_leaves_empty(tmp_path):
 def test_keys_that_readers_of_published_trajectories_look_up_are_always_written(tmp_path):
     trajectory = next(iter_trajectories(write(tmp_path / "a.json", MINIMAL)))
     document = json.loads(encode_trajectory(trajectory))
-    assert (document["long_horizon_task"], document["sub_tasks"], document["sub_trajs"]) == ({}, [], [])
+    assert (document["long_horizon_task"], document["sub_tasks"], document["sub_trajs"]) == (
+        {},
+        [],
+        [],
+    )
 
 
 @pytest.mark.parametrize("document", [[], {"scene": {"scene_num": 1}}, {"scene": 3}, {}])
@@ -104,7 +119,12 @@ def test_what_is_no_trajectory_is_one_line(tmp_path, document):
 @given(st.text(), st.text())
 def test_folder_names_are_one_safe_component(one, other):
     name = folder_name(one)
-    assert "/" not in name and name not in {"", ".", ".."} and not name.startswith(".") and len(name) < 200
+    assert (
+        "/" not in name
+        and name not in {"", ".", ".."}
+        and not name.startswith(".")
+        and len(name) < 200
+    )
     assert (name == folder_name(other)) == (one == other)
 
 

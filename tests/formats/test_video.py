@@ -3,8 +3,8 @@ import pytest
 
 from infthor_eval.errors import DataError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.user_cache import user_cache
 from infthor_eval.formats.video import Video, read_video, sample_positions
+from infthor_eval.storage.user_cache import user_cache
 
 
 def greys(frames):
@@ -34,7 +34,9 @@ def test_at_most_768_frames_are_sampled():
 
 
 @pytest.mark.parametrize(("film_fps", "fps"), [(10, 1), (10, 2), (25, 4), (29.97, 3)])
-def test_sampled_frames_are_those_of_the_film_and_the_rate_is_theirs(write_video, tmp_path, film_fps, fps):
+def test_sampled_frames_are_those_of_the_film_and_the_rate_is_theirs(
+    write_video, tmp_path, film_fps, fps
+):
     path = tmp_path / "a.mp4"
     write_video(path, [7 * index for index in range(36)], fps=film_fps)
     sampled, expected = read_video(path, fps), sample_positions(36, film_fps, fps)
@@ -48,7 +50,9 @@ def test_rates_of_one_film_are_kept_apart(write_video, tmp_path):
     assert [len(read_video(tmp_path / "a.mp4", fps).frames) for fps in (1, 2, 1)] == [8, 16, 8]
 
 
-def test_a_video_is_decoded_once_and_again_only_when_it_has_changed(write_video, tmp_path, monkeypatch):
+def test_a_video_is_decoded_once_and_again_only_when_it_has_changed(
+    write_video, tmp_path, monkeypatch
+):
     path, moved = tmp_path / "a.mp4", tmp_path / "b.mp4"
     write_video(path, [10] * 25)
     first = read_video(path, 1)
@@ -59,7 +63,9 @@ def test_a_video_is_decoded_once_and_again_only_when_it_has_changed(write_video,
     write_video(moved, [200] * 25)
     changed = read_video(moved, 1)
     assert greys(changed.frames) == pytest.approx([200] * 4, abs=3)
-    assert {frame.digest for frame in changed.frames}.isdisjoint(frame.digest for frame in first.frames)
+    assert {frame.digest for frame in changed.frames}.isdisjoint(
+        frame.digest for frame in first.frames
+    )
 
 
 def test_frames_that_were_cleaned_away_are_decoded_again(write_video, tmp_path):
@@ -87,7 +93,9 @@ def damaged(content):
         (damaged, r"only \d+ of its 60 frames can be decoded"),
     ],
 )
-def test_a_broken_video_is_one_line_and_leaves_nothing_behind(write_video, tmp_path, capfd, spoil, said):
+def test_a_broken_video_is_one_line_and_leaves_nothing_behind(
+    write_video, tmp_path, capfd, spoil, said
+):
     path = tmp_path / "a.mp4"
     write_video(path, [4 * index for index in range(60)])
     path.write_bytes(spoil(path.read_bytes()))

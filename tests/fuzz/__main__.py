@@ -30,9 +30,13 @@ _FOUND = Path(tempfile.gettempdir()) / "infthor-fuzz"
 
 def main() -> int:
     """Run the command; return its exit code."""
-    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.fuzz", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("--list", action="store_true", help="print the names of the readers")
-    parser.add_argument("--reader", action="append", choices=sorted(READERS), help="reader to try; default: all")
+    parser.add_argument(
+        "--reader", action="append", choices=sorted(READERS), help="reader to try; default: all"
+    )
     parser.add_argument("--minutes", type=float, default=10.0, help="time for each reader")
     parser.add_argument("--seed", type=int, default=0, help="seed of the first batch")
     options = parser.parse_args()
@@ -41,7 +45,10 @@ def main() -> int:
         return 0
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
     warnings.simplefilter("ignore")
-    found = [_campaign(READERS[name], options.minutes, options.seed) for name in options.reader or READERS]
+    found = [
+        _campaign(READERS[name], options.minutes, options.seed)
+        for name in options.reader or READERS
+    ]
     return int(any(found))
 
 
@@ -76,10 +83,16 @@ def _campaign(reader: Reader, minutes: float, first_seed: int) -> int:
     return len(findings)
 
 
-def _note(reader: Reader, error: Exception, content: bytes, findings: collections.Counter[str]) -> None:
+def _note(
+    reader: Reader, error: Exception, content: bytes, findings: collections.Counter[str]
+) -> None:
     """Count a finding, and print and keep the first input that shows it."""
     frames = traceback.extract_tb(error.__traceback__)
-    ours = [frame for frame in frames if "infthor_eval" in frame.filename or "model_adapters" in frame.filename]
+    ours = [
+        frame
+        for frame in frames
+        if "infthor_eval" in frame.filename or "model_adapters" in frame.filename
+    ]
     last = (ours or frames)[-1]
     what = f"{type(error).__name__} at {Path(last.filename).name}:{last.lineno}"
     findings[what] += 1

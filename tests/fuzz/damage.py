@@ -40,7 +40,20 @@ _NUMBERS = (
     0, -1, 1, 2**31, 2**63 - 1, 2**63, -(2**63) - 1, 2**64, 10**30, 10**400, 0.5, -0.0, 1e18, 1e308, 5e-324,
     math.nan, math.inf, -math.inf,
 )  # fmt: skip
-_OTHERS = (None, True, False, [], {}, [[]], [None], {"": None}, {"x": {}}, [1, "a", None], DEEP, MANY)
+_OTHERS = (
+    None,
+    True,
+    False,
+    [],
+    {},
+    [[]],
+    [None],
+    {"": None},
+    {"x": {}},
+    [1, "a", None],
+    DEEP,
+    MANY,
+)
 _ODD = (*_TEXTS, *_NUMBERS, *_OTHERS)
 _PIECES = (
     b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b",", b"{", b"}", b"[", b"]", b"\\", b"&a ",
@@ -88,7 +101,11 @@ def _damaged_document(draw: st.DrawFn, sound: Any) -> Any:
     for _ in range(draw(st.integers(1, 3))):
         places = _places(holder)
         parent, key = places[draw(st.integers(0, len(places) - 1))]
-        do = draw(st.sampled_from(("replace", "replace", "replace", "drop", "repeat", "rename", "text", "swap")))
+        do = draw(
+            st.sampled_from(
+                ("replace", "replace", "replace", "drop", "repeat", "rename", "text", "swap")
+            )
+        )
         value = parent[key]
         if do == "replace" or parent is holder:
             parent[key] = copy.deepcopy(draw(st.sampled_from(_ODD)))
@@ -102,7 +119,9 @@ def _damaged_document(draw: st.DrawFn, sound: Any) -> Any:
         elif isinstance(parent, list):
             parent.insert(key, copy.deepcopy(value))
         else:
-            parent[draw(st.sampled_from(_TEXTS))] = parent.pop(key) if do == "rename" else copy.deepcopy(value)
+            parent[draw(st.sampled_from(_TEXTS))] = (
+                parent.pop(key) if do == "rename" else copy.deepcopy(value)
+            )
     return holder[0]
 
 
@@ -112,7 +131,10 @@ def _places(holder: list[Any]) -> list[tuple[Any, Any]]:
     for parent, key in places:
         value = parent[key]
         if isinstance(value, dict | list) and len(places) < _MOST_PATHS:
-            places += [(value, inner) for inner in (value if isinstance(value, dict) else range(len(value)))]
+            places += [
+                (value, inner)
+                for inner in (value if isinstance(value, dict) else range(len(value)))
+            ]
     return places
 
 
@@ -128,7 +150,9 @@ def _json(document: Any) -> bytes:
 
 
 def _lines(document: Any) -> bytes:
-    return "".join(_text(item) + "\n" for item in (document if isinstance(document, list) else [document])).encode()
+    return "".join(
+        _text(item) + "\n" for item in (document if isinstance(document, list) else [document])
+    ).encode()
 
 
 def _read_csv(content: bytes) -> Any:

@@ -49,7 +49,9 @@ class Reader:
                 self.read(folder)
         except InfthorError as error:
             message = str(error)
-            assert message and len(message) < _LONGEST, f"a message of {len(message)} characters: {message[:300]!r}"
+            assert message and len(message) < _LONGEST, (
+                f"a message of {len(message)} characters: {message[:300]!r}"
+            )
             assert not {"\n", "\r"} & set(message), f"no single line: {message!r}"
             assert message.count(str(file)) <= 1, f"names its place twice: {message!r}"
             return True

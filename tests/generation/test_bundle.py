@@ -2,11 +2,11 @@ import msgspec
 import pytest
 
 from infthor_eval.errors import DataError
-from infthor_eval.formats.digests import digest_of_file
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.generation.bundle import MANIFEST, build_bundle, read_manifest
 from infthor_eval.generation.questions.generate import generate_questions
+from infthor_eval.storage.digests import digest_of_file
+from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
@@ -27,7 +27,10 @@ def test_the_bundled_set_is_small_and_has_every_type_and_number_of_clues():
 def test_the_bundled_questions_follow_from_the_bundled_logs():
     manifest = read_manifest(BUNDLED / MANIFEST)
     made = generate_questions(
-        BUNDLED, seed=manifest.question_seed, per_trajectory=manifest.per_trajectory, further=manifest.further
+        BUNDLED,
+        seed=manifest.question_seed,
+        per_trajectory=manifest.per_trajectory,
+        further=manifest.further,
     )
     assert made.questions == list(NiehSet(BUNDLED).questions)
 
@@ -49,13 +52,16 @@ def test_a_folder_that_is_not_empty_and_a_scene_that_is_not_there_are_refused(tm
         with pytest.raises(DataError, match="not empty"):
             build_bundle(manifest, simulator, tmp_path)
         nowhere = msgspec.structs.replace(
-            manifest, trajectories=(msgspec.structs.replace(manifest.trajectories[0], scene="attic-1"),)
+            manifest,
+            trajectories=(msgspec.structs.replace(manifest.trajectories[0], scene="attic-1"),),
         )
         with pytest.raises(DataError, match="attic-1"):
             build_bundle(nowhere, simulator, tmp_path / "set")
 
 
-@pytest.mark.parametrize("content", ["{", '{"name": "x"}', '{"name": "x", "trajectories": [], "more": 1}'])
+@pytest.mark.parametrize(
+    "content", ["{", '{"name": "x"}', '{"name": "x", "trajectories": [], "more": 1}']
+)
 def test_what_is_no_manifest_is_named(tmp_path, content):
     path = tmp_path / "manifest.json"
     path.write_text(content)

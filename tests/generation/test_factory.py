@@ -38,20 +38,33 @@ def simulator():
 
 def test_every_task_begins_with_an_empty_hand(simulator):
     # What was looked at is still in the hand, and is put down between the tasks.
-    made = generate(TrajectorySettings("bedroom-3", 0, 60, 3, task_types=(TaskType.EXAMINE,)), simulator)
+    made = generate(
+        TrajectorySettings("bedroom-3", 0, 60, 3, task_types=(TaskType.EXAMINE,)), simulator
+    )
     trajectory = made.trajectory
-    assert [entry["step"] for entry in trajectory.object_log] == list(range(len(trajectory.plan.low_actions) + 1))
+    assert [entry["step"] for entry in trajectory.object_log] == list(
+        range(len(trajectory.plan.low_actions) + 1)
+    )
     for part in trajectory.sub_trajs:
         assert trajectory.object_log[part.low_pddl_idx[0]]["inven_obj"] == []
     assert trajectory.object_log[-1]["inven_obj"] == []
-    assert len(trajectory.plan.high_pddl) > sum(len(range(*part.high_pddl_idx)) for part in trajectory.sub_trajs)
-    assert sum(made.statistics.tried.values()) >= sum(made.statistics.accepted.values()) == len(made.problems) >= 3
+    assert len(trajectory.plan.high_pddl) > sum(
+        len(range(*part.high_pddl_idx)) for part in trajectory.sub_trajs
+    )
+    assert (
+        sum(made.statistics.tried.values())
+        >= sum(made.statistics.accepted.values())
+        == len(made.problems)
+        >= 3
+    )
 
 
 def test_sub_goals_and_actions_are_numbered_through(simulator):
     trajectory = generate(TrajectorySettings("living-room-2", 5, 60, 4), simulator).trajectory
     plan = trajectory.plan
-    assert [high.high_idx for high in plan.high_pddl] == list(range(len(plan.high_pddl))) and len(plan.high_pddl) >= 4
+    assert [high.high_idx for high in plan.high_pddl] == list(range(len(plan.high_pddl))) and len(
+        plan.high_pddl
+    ) >= 4
     assert [low.low_idx for low in plan.low_actions] == list(range(len(plan.low_actions)))
     assert len(plan.low_actions) >= 60
     owners = [low.high_idx for low in plan.low_actions]
@@ -60,12 +73,16 @@ def test_sub_goals_and_actions_are_numbered_through(simulator):
     for part in trajectory.sub_trajs:
         first, end = part.low_pddl_idx
         assert ends[-1] <= first < end <= len(plan.low_actions)
-        assert all(part.high_pddl_idx[0] <= owner < part.high_pddl_idx[1] for owner in owners[first:end])
+        assert all(
+            part.high_pddl_idx[0] <= owner < part.high_pddl_idx[1] for owner in owners[first:end]
+        )
         ends.append(end)
 
 
 def test_the_final_task_is_about_both_ends_and_comes_last(simulator):
-    trajectory = generate(TrajectorySettings("kitchen-2", 3, 60, 1, final_task=True), simulator).trajectory
+    trajectory = generate(
+        TrajectorySettings("kitchen-2", 3, 60, 1, final_task=True), simulator
+    ).trajectory
     assert violation(trajectory) is None
     assert len(trajectory.sub_trajs) == len(trajectory.sub_tasks)
     assert trajectory.sub_tasks[-1] == trajectory.long_horizon_task
@@ -80,20 +97,29 @@ def test_looking_for_places_leaves_no_trace(scene, seed, tmp_path):
     if data is not None and not data.is_dir():
         pytest.skip("recorded floor plans not at ../shared/data")
     with Simulator(embedded_launch(data)) as simulator:
-        (path,) = generate_set([TrajectorySettings(scene, seed, 150, 1)], simulator, tmp_path / "trajectories").paths
+        (path,) = generate_set(
+            [TrajectorySettings(scene, seed, 150, 1)], simulator, tmp_path / "trajectories"
+        ).paths
     with Simulator(embedded_launch(data)) as simulator:
         summary = summarise(replay_set(select([path]), simulator, tmp_path / "set"))
     assert summary.complete == 1, summary.diverged
     trajectory = next(iter_trajectories(path))
-    made = [{key: value for key, value in entry.items() if key != "step"} for entry in trajectory.object_log]
+    made = [
+        {key: value for key, value in entry.items() if key != "step"}
+        for entry in trajectory.object_log
+    ]
     steps = read_steps(tmp_path / "set" / "metadata" / trajectory.traj_id)
     assert made == [msgspec.to_builtins(step.object_log) for step in steps]
 
 
 def test_the_lengths_are_in_steps_and_subgoals_with_put_downs(simulator):
-    made = generate(TrajectorySettings("living-room-2", 1, 1, 3, task_types=(TaskType.PLACE,)), simulator)
+    made = generate(
+        TrajectorySettings("living-room-2", 1, 1, 3, task_types=(TaskType.PLACE,)), simulator
+    )
     assert len(made.trajectory.sub_tasks) == len(made.trajectory.sub_trajs) == 3
-    looks = generate(TrajectorySettings("bedroom-3", 0, 1, 4, task_types=(TaskType.EXAMINE,)), simulator)
+    looks = generate(
+        TrajectorySettings("bedroom-3", 0, 1, 4, task_types=(TaskType.EXAMINE,)), simulator
+    )
     assert len(looks.trajectory.sub_tasks) == 2  # each is followed by a put-down
 
 
@@ -149,10 +175,14 @@ def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
 
     _Failing(monkeypatch, while_)
     kinds = (TaskType.PLACE, TaskType.PLACE_TWO)  # which leave nothing in the hand
-    made = generate(TrajectorySettings("living-room-2", 5, 150, 9, task_types=kinds, max_fail=2), simulator)
+    made = generate(
+        TrajectorySettings("living-room-2", 5, 150, 9, task_types=kinds, max_fail=2), simulator
+    )
     assert [item.subgoals for item in made.statistics.roll_backs] == [1, 2, 4]
     went_back = made.trajectory.gen_info["roll_backs"]
-    assert [item["from_step"] for item in went_back[1:]] == [item["to_step"] for item in went_back[:-1]]
+    assert [item["from_step"] for item in went_back[1:]] == [
+        item["to_step"] for item in went_back[:-1]
+    ]
     assert len(made.trajectory.sub_tasks) == len(made.problems) >= 9
     assert made.statistics.reasons["made to fail"] == 9
     assert _refused(made.trajectory, simulator) == []
@@ -160,7 +190,9 @@ def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
 
 def test_an_accepted_task_ends_the_row_of_failures(simulator, monkeypatch):
     tries = iter(range(10_000))
-    _Failing(monkeypatch, lambda _: next(tries) % 4 < 2)  # what fails of itself is among the other two
+    _Failing(
+        monkeypatch, lambda _: next(tries) % 4 < 2
+    )  # what fails of itself is among the other two
     made = generate(TrajectorySettings("living-room-2", 5, 60, 6, max_fail=4), simulator)
     assert made.statistics.roll_backs == [] and made.statistics.reasons["made to fail"] >= 6
 
@@ -176,12 +208,17 @@ def test_what_gives_up_is_kept_from_a_floor_on(simulator, monkeypatch, floor):
     _Failing(monkeypatch, while_)
     settings = TrajectorySettings("living-room-2", 5, 300, 3, True, max_fail=2, save_floor=floor)
     if floor != 40:
-        with pytest.raises(UsageError, match=r"no further task works after .* failed tasks \(.*made to fail"):
+        with pytest.raises(
+            UsageError, match=r"no further task works after .* failed tasks \(.*made to fail"
+        ):
             generate(settings, simulator)
         return
     made = generate(settings, simulator)
     assert len(made.trajectory.plan.low_actions) >= 40 and len(made.trajectory.sub_tasks) == 4
-    assert made.trajectory.gen_info["banked_on_giveup"] is True and made.trajectory.long_horizon_task is None
+    assert (
+        made.trajectory.gen_info["banked_on_giveup"] is True
+        and made.trajectory.long_horizon_task is None
+    )
     assert len(made.problems) == len(made.trajectory.sub_tasks)
     assert _refused(made.trajectory, simulator) == []
 
@@ -189,14 +226,32 @@ def test_what_gives_up_is_kept_from_a_floor_on(simulator, monkeypatch, floor):
 def test_a_pool_of_tasks_that_is_exhausted_begins_again(simulator):
     settings = TrajectorySettings("bathroom-4", 2, 700, 1, task_types=(TaskType.CLEAN,))
     made = generate(settings, simulator)
-    assert made.statistics.pool_restarts and made.trajectory.gen_info["pool_restarts"] == made.statistics.pool_restarts
+    assert (
+        made.statistics.pool_restarts
+        and made.trajectory.gen_info["pool_restarts"] == made.statistics.pool_restarts
+    )
 
 
 def test_the_same_bytes_come_out_after_a_kill_with_roll_backs(run, tmp_path):
-    words = ["generate", "--scene", "kitchen-5", "--seed", "5", "--min-steps", "150", "--min-subgoals", "1"]
+    words = [
+        "generate",
+        "--scene",
+        "kitchen-5",
+        "--seed",
+        "5",
+        "--min-steps",
+        "150",
+        "--min-subgoals",
+        "1",
+    ]
     words += ["--max-fail", "1"]
     assert run(*words, "--out", tmp_path / "whole")[0] == 0
-    command = [sys.executable, "-c", "import sys; from infthor_eval.cli import main; sys.exit(main())", *words]
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; from infthor_eval.cli import main; sys.exit(main())",
+        *words,
+    ]
     killed = subprocess.Popen([*command, "--out", str(tmp_path / "killed")])
     time.sleep(6)
     killed.kill()
@@ -207,6 +262,10 @@ def test_the_same_bytes_come_out_after_a_kill_with_roll_backs(run, tmp_path):
 
 
 def test_a_task_type_that_the_room_offers_nothing_for_is_one_line(simulator):
-    with pytest.raises(UsageError, match=r"scene living-room-1, seed 0: no further task works after 0 steps") as error:
-        generate(TrajectorySettings("living-room-1", 0, 10, 1, task_types=(TaskType.HEAT,)), simulator)
+    with pytest.raises(
+        UsageError, match=r"scene living-room-1, seed 0: no further task works after 0 steps"
+    ) as error:
+        generate(
+            TrajectorySettings("living-room-1", 0, 10, 1, task_types=(TaskType.HEAT,)), simulator
+        )
     assert "\n" not in str(error.value)

@@ -14,7 +14,10 @@ from infthor_eval.generation.final_task import end_types, violation
 
 def log(*types):
     """Entries in which upper-case types can be picked up and all are visible."""
-    return [{"visible": list(shown), "pickupable": [name for name in shown if name.isupper()]} for shown in types]
+    return [
+        {"visible": list(shown), "pickupable": [name for name in shown if name.isupper()]}
+        for shown in types
+    ]
 
 
 def test_the_ends_are_a_fifth_each():
@@ -28,7 +31,10 @@ def trajectory(pickup, receptacle, movable=None, before=10):
     return Trajectory(
         Scene("kitchen-1", InitAction(0, 0, 0)),
         ExpertPlan([]),
-        sub_trajs=[SubTrajectory(0, (0, 1), (0, before)), SubTrajectory(1, (1, 2), (before, before + 3))],
+        sub_trajs=[
+            SubTrajectory(0, (0, 1), (0, before)),
+            SubTrajectory(1, (1, 2), (before, before + 3)),
+        ],
         long_horizon_task=task,
         object_log=log("Aa", "Aa", *"BBBBBBB", "Cc", "Cc", *"XXX"),
     )
@@ -54,4 +60,7 @@ def test_the_rule_is_derived_from_the_log(pickup, receptacle, movable, fine):
 
 
 def test_without_a_final_task():
-    assert violation(Trajectory(Scene("kitchen-1", InitAction(0, 0, 0)), ExpertPlan([]))) == "there is no final task"
+    assert (
+        violation(Trajectory(Scene("kitchen-1", InitAction(0, 0, 0)), ExpertPlan([])))
+        == "there is no final task"
+    )

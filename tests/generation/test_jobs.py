@@ -13,7 +13,14 @@ def test_every_scene_has_as_many_seeds_as_asked_for():
 
 
 def test_bathrooms_are_known_by_their_names():
-    scenes = ["FloorPlan401", "kitchen-1", "FloorPlan30", "bathroom-2", "FloorPlan430", "FloorPlan431"]
+    scenes = [
+        "FloorPlan401",
+        "kitchen-1",
+        "FloorPlan30",
+        "bathroom-2",
+        "FloorPlan430",
+        "FloorPlan431",
+    ]
     chosen, skipped = without_bathrooms(scenes)
     assert chosen == ["kitchen-1", "FloorPlan30", "FloorPlan431"]
     assert skipped == ["FloorPlan401", "FloorPlan430", "bathroom-2"]

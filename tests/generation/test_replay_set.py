@@ -14,7 +14,7 @@ from infthor_eval.generation.replay import box_iou
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.generation.replay_summary import summarise
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.scoring import score
 from infthor_eval.thor.launch import embedded_launch
@@ -47,7 +47,9 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
     frames = sorted((folder / "img").iterdir())
     assert len(steps) == len(frames) == len(trajectory.plan.low_actions) + 1 >= 41
     assert Image.open(frames[0]).size == (300, 300)
-    assert [entry["visible"] for entry in trajectory.object_log] == [step.object_log.visible for step in steps]
+    assert [entry["visible"] for entry in trajectory.object_log] == [
+        step.object_log.visible for step in steps
+    ]
     last = list(iter_object_states(steps))[-1]
     assert last and all(state.type for state in last.values())
     images = json.loads((folder / "expert_log.json").read_text())["images"]
@@ -56,7 +58,9 @@ def test_a_generated_trajectory_replays_whole(generated, tmp_path):
     assert [(image["low_idx"], image["image_name"]) for image in document["images"]] == [
         (image["low_idx"], image["image_name"]) for image in images[1:]
     ]
-    assert all({"low_idx", "high_idx", "api_action"} <= set(low) for low in document["plan"]["low_actions"])
+    assert all(
+        {"low_idx", "high_idx", "api_action"} <= set(low) for low in document["plan"]["low_actions"]
+    )
     assert (folder / "traj.txt").read_text().startswith("<|goal|>Your main goal: ")
     assert not list((tmp_path / "metadata").glob(".*"))
 
@@ -73,7 +77,9 @@ def test_several_frames_per_move(generated, tmp_path):
     assert [step.img_idx for step in steps] == list(range(len(steps)))
     moves = sum(step.action is not None for step in steps)
     assert moves == len(next(iter_trajectories(generated)).plan.low_actions)
-    assert (tmp_path / "metadata" / JOB.traj_id / "traj.txt").read_text().count("<|act|>") == 2 * moves
+    assert (tmp_path / "metadata" / JOB.traj_id / "traj.txt").read_text().count(
+        "<|act|>"
+    ) == 2 * moves
 
 
 def test_the_seed_decides_and_what_exists_is_kept(generated, tmp_path):
@@ -113,7 +119,9 @@ def test_another_trajectory_of_the_same_name_is_refused(generated, tmp_path):
 @pytest.mark.skipif(not SHARED.is_dir(), reason="recorded data not at ../shared/data")
 def test_recorded_trajectories_replay(tmp_path):
     selection = select([SHARED / "alfred/valid_seen.jsonl.gz"], limit=3, per_floor_plan=1)
-    write_supplement((trajectory for _, trajectory in selection.items), tmp_path / "supplement.json")
+    write_supplement(
+        (trajectory for _, trajectory in selection.items), tmp_path / "supplement.json"
+    )
     with Simulator(embedded_launch(SHARED, tmp_path / "supplement.json")) as simulator:
         replayed = replay_set(selection, simulator, tmp_path)
     summary = summarise(replayed)
@@ -131,13 +139,22 @@ def test_what_the_published_saver_writes_is_replayed_asked_about_and_evaluated(t
     write_supplement((item for _, item in selection.items), tmp_path / "supplement.json")
     with Simulator(embedded_launch(SHARED, tmp_path / "supplement.json")) as simulator:
         summary = summarise(replay_set(selection, simulator, tmp_path / "set"))
-    assert (summary.trajectories, summary.complete, summary.floor_plans) == (2, 2, 1), summary.diverged
+    assert (summary.trajectories, summary.complete, summary.floor_plans) == (2, 2, 1), (
+        summary.diverged
+    )
     training, test = (item for _, item in selection.items)
     assert training.long_horizon_task is None
-    assert test.long_horizon_task.task_desc == test.sub_tasks[-1].task_desc == test.sub_trajs[-1].subgoal
+    assert (
+        test.long_horizon_task.task_desc
+        == test.sub_tasks[-1].task_desc
+        == test.sub_trajs[-1].subgoal
+    )
     made = generate_questions(tmp_path / "set", per_trajectory=20)
     assert 30 < len(made.questions) <= 40 and not made.unconfirmed
-    assert "put a cold apple in the microwave" in (tmp_path / "set/metadata/floorplan28_test/traj.txt").read_text()
+    assert (
+        "put a cold apple in the microwave"
+        in (tmp_path / "set/metadata/floorplan28_test/traj.txt").read_text()
+    )
     predict = BASELINES["oracle"](0).fit(made.questions)
     said = {question: predict(Sample(question, question.clues)) for question in made.questions}
     assert all(score(reply, question.answers, "strict") == 1.0 for question, reply in said.items())
@@ -148,7 +165,10 @@ def test_selection_limits(tmp_path):
         "scene": {"floor_plan": "A", "init_action": {"x": 0, "y": 0, "z": 0}},
         "plan": {"low_actions": []},
     }
-    rows = [json.dumps({**document, "scene": {**document["scene"], "floor_plan": name}}) for name in "AABB"]
+    rows = [
+        json.dumps({**document, "scene": {**document["scene"], "floor_plan": name}})
+        for name in "AABB"
+    ]
     (tmp_path / "a.jsonl").write_text("\n".join(rows))
     assert len(list(iter_sources(tmp_path / "a.jsonl"))) == 4
     assert len(select([tmp_path / "a.jsonl"], per_floor_plan=1).items) == 2
@@ -162,5 +182,8 @@ def test_overlap_of_boxes():
 
 
 def test_the_simulator_error_is_told(tmp_path):
-    with Simulator(embedded_launch()) as simulator, pytest.raises(SimulatorError, match="FloorPlan1"):
+    with (
+        Simulator(embedded_launch()) as simulator,
+        pytest.raises(SimulatorError, match="FloorPlan1"),
+    ):
         simulator.reset("FloorPlan1")

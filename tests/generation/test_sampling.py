@@ -40,7 +40,9 @@ def test_an_exhausted_pool_begins_again_unless_nothing_was_drawn():
 
 def test_a_small_variable_leads_more_often_than_a_large_one():
     # Weights are shares of their variable's sum: of 2 goals one soon leads by far, of 20 objects none does.
-    tasks = [Task(kind, f"Item{number:02d}", "Table") for kind in ("a", "b") for number in range(20)]
+    tasks = [
+        Task(kind, f"Item{number:02d}", "Table") for kind in ("a", "b") for number in range(20)
+    ]
     first = Counter(TaskPool(random.Random(seed)).draw(tasks).task_type for seed in range(400))
     assert 150 < first["a"] < 250
 
@@ -102,8 +104,14 @@ def published_candidates():
 def test_first_draws_are_as_often_as_the_published_function_makes_them():
     tasks = list(published_candidates())
     drawn = [TaskPool(random.Random(seed)).draw(tasks) for seed in range(1200)]
-    counts = Counter(name for task in drawn for name in (str(task.task_type), task.movable, task.receptacle))
+    counts = Counter(
+        name for task in drawn for name in (str(task.task_type), task.movable, task.receptacle)
+    )
     ours = {name: 100 * counts[name] / 1200 for name in _PUBLISHED}
     # Four standard errors of two such samples are 8 points at a half, and 5 at a tenth.
-    far = {name: (ours[name], share) for name, share in _PUBLISHED.items() if abs(ours[name] - share) > 5}
+    far = {
+        name: (ours[name], share)
+        for name, share in _PUBLISHED.items()
+        if abs(ours[name] - share) > 5
+    }
     assert not far

@@ -1,6 +1,6 @@
 """Generating, replaying and asking by several workers: the very files of one."""
 
-from infthor_eval.formats.digests import digest_of_file
+from infthor_eval.storage.digests import digest_of_file
 
 SCENES = ("--scene", "kitchen-1", "--scene", "bedroom-2", "--min-steps", 20, "--min-subgoals", 1)
 
@@ -20,7 +20,17 @@ def test_the_files_are_the_same_whoever_makes_them(run, tmp_path):
         assert code == 0, err
         assert said.startswith("2 trajectories (0 generated earlier)")
         assert run("replay", out / "made", "--out", out / "set", "--workers", workers)[0] == 0
-        assert run("questions", out / "set", "--out", out / "set" / "qa_set_q.csv", "--workers", workers)[0] == 0
+        assert (
+            run(
+                "questions",
+                out / "set",
+                "--out",
+                out / "set" / "qa_set_q.csv",
+                "--workers",
+                workers,
+            )[0]
+            == 0
+        )
     assert files(tmp_path / "1") == files(tmp_path / "2")
     assert len(files(tmp_path / "2")) > 40
     code, said, _ = run("generate", *SCENES, "--out", tmp_path / "2" / "made", "--workers", 2)
@@ -28,5 +38,7 @@ def test_the_files_are_the_same_whoever_makes_them(run, tmp_path):
 
 
 def test_gpus_are_shared_out_by_a_cluster_alone(run, tmp_path):
-    code, _, err = run("--model", "blind", "--tasks", "nieh_mini_gt", "--gpus-per-worker", 1, "--output", tmp_path)
+    code, _, err = run(
+        "--model", "blind", "--tasks", "nieh_mini_gt", "--gpus-per-worker", 1, "--output", tmp_path
+    )
     assert (code, "--gpus-per-worker is for --ray-address" in err) == (2, True)

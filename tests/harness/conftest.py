@@ -29,7 +29,9 @@ def start() -> Callable[..., str]:
 
     def start(program: str, *arguments: object, path: Sequence[Path] = ()) -> str:
         environment = {**os.environ, "HF_HUB_OFFLINE": "1"}
-        environment["PYTHONPATH"] = os.pathsep.join([*map(str, path), *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment["PYTHONPATH"] = os.pathsep.join(
+            [*map(str, path), *filter(None, [os.environ.get("PYTHONPATH")])]
+        )
         command = [sys.executable, "-c", program, *map(str, arguments)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[-3000:]

@@ -2,13 +2,27 @@
 
 import json
 
-from lm_eval.utils import get_results_filenames, get_sample_results_filenames, hash_string, make_table
+from lm_eval.utils import (
+    get_results_filenames,
+    get_sample_results_filenames,
+    hash_string,
+    make_table,
+)
 
 from tests.harness.conftest import only, samples
 
 
 def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run):
-    arguments = ["--model", "oracle", "--tasks", "nieh", "--data", make_nieh_set(size=56), "--output", tmp_path]
+    arguments = [
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path,
+    ]
     assert run(*arguments)[0] == 0
     names = [str(path) for path in only(tmp_path, "lm_eval").rglob("*.json*")]
     (results,) = get_results_filenames(names)
@@ -20,25 +34,55 @@ def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run):
     assert "reference" in table
     assert document["results"]["nieh_gt"]["strict,none"] == 1.0
     assert document["n-samples"]["nieh_gt"] == {"original": 5, "effective": 5}
-    hashes = "".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in samples(tmp_path)["nieh_gt"])
+    hashes = "".join(
+        row["doc_hash"] + row["prompt_hash"] + row["target_hash"]
+        for row in samples(tmp_path)["nieh_gt"]
+    )
     assert document["task_hashes"]["nieh_gt"] == hash_string(hashes)
 
 
 def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run):
     from datasets import load_dataset
 
-    run("--model", "blind", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path)
+    run(
+        "--model",
+        "blind",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path,
+    )
     rows = load_dataset("json", data_files=str(only(tmp_path, "samples_*.jsonl")), split="train")
     assert len(rows) == 5
     assert rows[0]["metrics"] == ["reference", "strict"]
-    assert set(rows[0]) >= {"doc_id", "doc", "target", "arguments", "resps", "filtered_resps", "filter", "strict"}
+    assert set(rows[0]) >= {
+        "doc_id",
+        "doc",
+        "target",
+        "arguments",
+        "resps",
+        "filtered_resps",
+        "filter",
+        "strict",
+    }
 
 
 def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path,
+    ]
     assert run(*arguments)[0] == 1
     rows = samples(tmp_path)["nieh_gt"]
     assert len(rows) == 5

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.storage.packaged import packaged_folder
 from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, samples
 
 PEERS = Path(sys.prefix) / "test-peers"
@@ -20,7 +20,16 @@ def ours(make_nieh_set, tmp_path, run):
 
     def ours(model, *options):
         data = make_nieh_set()
-        arguments = ["--model", model, "--tasks", "nieh_gt,nieh_full", "--data", data, "--output", tmp_path / "ours"]
+        arguments = [
+            "--model",
+            model,
+            "--tasks",
+            "nieh_gt,nieh_full",
+            "--data",
+            data,
+            "--output",
+            tmp_path / "ours",
+        ]
         code, _, err = run(*arguments, *options)
         assert code == 0, err
         return data, samples(tmp_path / "ours")
@@ -28,14 +37,23 @@ def ours(make_nieh_set, tmp_path, run):
     return ours
 
 
-@pytest.mark.skipif(not PEERS.is_dir(), reason=f"no torchvision in {PEERS}; `make test` puts it there")
+@pytest.mark.skipif(
+    not PEERS.is_dir(), reason=f"no torchvision in {PEERS}; `make test` puts it there"
+)
 def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, ours, start):
     from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
     checkpoint = tmp_path / "checkpoint"
     save_tiny_checkpoint(checkpoint, seed=0)
-    data, found = ours("qwen2.5-vl", "--model-args", f"pretrained={checkpoint},dtype=float32,device=cpu")
-    arguments = ["--model", "hf-multimodal", "--model_args", f"pretrained={checkpoint},dtype=float32"]
+    data, found = ours(
+        "qwen2.5-vl", "--model-args", f"pretrained={checkpoint},dtype=float32,device=cpu"
+    )
+    arguments = [
+        "--model",
+        "hf-multimodal",
+        "--model_args",
+        f"pretrained={checkpoint},dtype=float32",
+    ]
     arguments += [
         "--tasks",
         "nieh_gt,nieh_full",
@@ -45,10 +63,22 @@ def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, our
         json.dumps({"data": str(data)}),
     ]
     arguments += ["--apply_chat_template", "--device", "cpu", "--batch_size", 1]
-    start(LM_EVAL, "run", *arguments, "--log_samples", "--output_path", tmp_path / "theirs", path=[SHIM, PEERS])
+    start(
+        LM_EVAL,
+        "run",
+        *arguments,
+        "--log_samples",
+        "--output_path",
+        tmp_path / "theirs",
+        path=[SHIM, PEERS],
+    )
 
     def replies(of):
-        return {(task, row["doc"]["question_id"]): row["resps"][0][0] for task, rows in of.items() for row in rows}
+        return {
+            (task, row["doc"]["question_id"]): row["resps"][0][0]
+            for task, rows in of.items()
+            for row in rows
+        }
 
     theirs = replies(samples(tmp_path / "theirs"))
     assert len(theirs) == 10
@@ -67,14 +97,32 @@ def test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own(tmp_p
     assert found == theirs
 
 
-def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(make_nieh_set, tmp_path, start):
+def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(
+    make_nieh_set, tmp_path, start
+):
     package = tmp_path / "site"
     write_adapter(package)
     data = make_nieh_set(size=56)
-    arguments = ["--model", "infthor", "--model_args", "adapter=constant,word=mug", "--include_path", TASKS]
+    arguments = [
+        "--model",
+        "infthor",
+        "--model_args",
+        "adapter=constant,word=mug",
+        "--include_path",
+        TASKS,
+    ]
     arguments += ["--tasks", "nieh_gt", "--metadata", json.dumps({"data": str(data)})]
     out = tmp_path / "theirs"
-    start(OURS_WITH_ALL_TASKS, "lm-eval", "run", *arguments, "--log_samples", "--output_path", out, path=[package])
+    start(
+        OURS_WITH_ALL_TASKS,
+        "lm-eval",
+        "run",
+        *arguments,
+        "--log_samples",
+        "--output_path",
+        out,
+        path=[package],
+    )
     (rows,) = samples(out).values()
     assert [row["resps"][0][0] for row in rows] == ["mug"] * 5
 

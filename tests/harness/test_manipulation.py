@@ -17,8 +17,23 @@ TINY = "openvla-tiny"
 
 def asked(folder, data, out, adapter, *more):
     return [
-        *("lm-eval", "run", "--model", "infthor", "--model_args", f"adapter={adapter}{','.join(('', *more))}"),
-        *("--include_path", folder, "--tasks", "manipulathor_pickup", "--output_path", out, "--log_samples"),
+        *(
+            "lm-eval",
+            "run",
+            "--model",
+            "infthor",
+            "--model_args",
+            f"adapter={adapter}{','.join(('', *more))}",
+        ),
+        *(
+            "--include_path",
+            folder,
+            "--tasks",
+            "manipulathor_pickup",
+            "--output_path",
+            out,
+            "--log_samples",
+        ),
         *("--metadata", json.dumps({"data": str(data)})),
     ]
 
@@ -28,13 +43,24 @@ def short(task_files):
     """Tasks whose episodes have three steps."""
     task = task_files / "manipulation" / "manipulathor_pickup.yaml"
     settings = "{kind: pickup, max_steps: 3, image_size: 64}"
-    task.write_text(f"include: _manipulation.yaml\ntask: manipulathor_pickup\ndataset_kwargs: {settings}\n")
+    task.write_text(
+        f"include: _manipulation.yaml\ntask: manipulathor_pickup\ndataset_kwargs: {settings}\n"
+    )
     return task_files
 
 
 def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run, start):
     data = write(tmp_path / "data", cut(MUG, 6))
-    arguments = ["--model", TINY, "--tasks", "manipulathor_pickup", "--data", data, "--output", tmp_path / "ours"]
+    arguments = [
+        "--model",
+        TINY,
+        "--tasks",
+        "manipulathor_pickup",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "ours",
+    ]
     code, _, err = run(*arguments)
     assert code == 0, err
     _, records = read_run(only(tmp_path / "ours", "journal").parent, RECORDS)
@@ -60,7 +86,11 @@ def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run,
             "manipulathor_pickup",
             "cannot be evaluated on manipulation, which needs a policy that drives an arm",
         ),
-        (TINY, "nieh_mini_gt", "openvla-tiny cannot be evaluated on nieh, which needs a model that answers in words"),
+        (
+            TINY,
+            "nieh_mini_gt",
+            "openvla-tiny cannot be evaluated on nieh, which needs a model that answers in words",
+        ),
     ],
 )
 def test_what_a_model_cannot_do_is_refused_in_one_line(tmp_path, short, adapter, task, said):

@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import read_run
+from infthor_eval.storage.packaged import packaged_folder
 from tests.harness.conftest import LM_EVAL, only, samples
 from tests.plans.cut import FORK, MUG, cut, write
 
@@ -24,9 +24,20 @@ def asked(task, data, out, model, *more, **options):
 
 def test_one_request_a_trajectory_and_what_our_own_run_finds(tmp_path, task_files, run, start):
     task = task_files / "plans" / "infthor_plans.yaml"
-    task.write_text("include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n")
+    task.write_text(
+        "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n"
+    )
     data = write(tmp_path / "data", cut(FORK, 3), cut(MUG, 2))
-    arguments = ["--model", TINY, "--tasks", "infthor_plans", "--data", data, "--output", tmp_path / "ours"]
+    arguments = [
+        "--model",
+        TINY,
+        "--tasks",
+        "infthor_plans",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "ours",
+    ]
     code, _, err = run(*arguments, "--greedy", "--constrained")
     assert code == 0, err
     _, records = read_run(only(tmp_path / "ours", "journal").parent, RECORDS)
@@ -46,7 +57,9 @@ def test_one_request_a_trajectory_and_what_our_own_run_finds(tmp_path, task_file
         assert row["success"] == sum(plan.done for plan in plans) / len(plans)
         assert row["reward"] == pytest.approx(sum(plan.reward for plan in plans))
         assert row["target"] == f"{len(plans)} plans done"
-        assert [plan["ended"] for plan in json.loads(row["resps"][0][0])] == [plan.ended for plan in plans]
+        assert [plan["ended"] for plan in json.loads(row["resps"][0][0])] == [
+            plan.ended for plan in plans
+        ]
     found = json.loads(only(out, "results_*.json").read_text())["results"]["infthor_plans"]
     assert found["reward,none"] == pytest.approx(sum(row["reward"] for row in rows) / 2)
     # What it did is in the journal, as in ours.

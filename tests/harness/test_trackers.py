@@ -14,7 +14,16 @@ from . import tracker_doubles
 @pytest.fixture
 def asked(make_nieh_set, tmp_path):
     """The words of a run of five questions."""
-    return ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
+    return [
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path / "out",
+    ]
 
 
 @pytest.fixture
@@ -37,7 +46,9 @@ def hub(monkeypatch):
     """The hub's client, whose calls are held to the real one's signatures; nothing is sent."""
     api = create_autospec(HfApi, instance=True)
     monkeypatch.setattr("huggingface_hub.HfApi", lambda token: api)
-    monkeypatch.setattr("lm_eval.loggers.EvaluationTracker.recreate_metadata_card", lambda self: api.card())
+    monkeypatch.setattr(
+        "lm_eval.loggers.EvaluationTracker.recreate_metadata_card", lambda self: api.card()
+    )
     api.card = lambda: None
     monkeypatch.setenv("HF_TOKEN", "hf_of_nobody")
     return api
@@ -48,7 +59,9 @@ def test_wandb_is_given_metrics_configuration_and_samples(asked, run, doubled):
     code, _, err = run(*asked, "--wandb-args", "project=mine,mode=offline")
     assert code == 0, err
     assert double.of("init") == [{"name": "oracle", "project": "mine", "mode": "offline"}]
-    assert {"nieh_gt/strict": 1.0, "nieh_gt/reference": 1.0}.items() <= double.of("log")[0]["data"].items()
+    assert {"nieh_gt/strict": 1.0, "nieh_gt/reference": 1.0}.items() <= double.of("log")[0][
+        "data"
+    ].items()
     (configuration, *_) = double.of("update")
     assert configuration["cli_configs"]["model_args"] == {"adapter": "oracle"}
     table = double.of("log")[-1]["data"]["nieh_gt_eval_results"]
@@ -103,7 +116,10 @@ def test_what_a_tracker_does_not_take_is_told_and_the_run_is_whole(asked, run, h
     assert code == 1
     assert "oracle" in out
     said = " ".join(err.split())
-    assert "could not be sent to the hub (Could not save results aggregated OSError('the network is down'))" in said
+    assert (
+        "could not be sent to the hub (Could not save results aggregated OSError('the network is down'))"
+        in said
+    )
     assert "run the same command again" in said
     assert "hf_of_nobody" not in out + err
     assert len(list((tmp_path / "out").rglob("results.json"))) == 1
@@ -116,9 +132,17 @@ def test_what_a_tracker_does_not_take_is_told_and_the_run_is_whole(asked, run, h
         ("--wandb-args", "projct=mine", "--wandb-args has no projct; did you mean project?"),
         ("--wandb-args", "mine", "--wandb-args: 'mine' is not of the form key=value"),
         ("--trackio-args", "entity=x", "--trackio-args has no entity; there are ['project'"),
-        ("--hf-hub-log-args", "hub_results_org=us", "--hf-hub-log-args would push nothing; add push_results_to_hub"),
+        (
+            "--hf-hub-log-args",
+            "hub_results_org=us",
+            "--hf-hub-log-args would push nothing; add push_results_to_hub",
+        ),
         ("--hf-hub-log-args", "token=secret", "--hf-hub-log-args has no token"),
-        ("--hf-hub-log-args", "push_results_to_hub=True", "--hf-hub-log-args needs a token of the hub; set HF_TOKEN"),
+        (
+            "--hf-hub-log-args",
+            "push_results_to_hub=True",
+            "--hf-hub-log-args needs a token of the hub; set HF_TOKEN",
+        ),
     ],
 )
 def test_what_cannot_be_sent_is_refused_before_anything_is_asked(
@@ -139,10 +163,15 @@ def test_a_package_that_is_missing_is_named_with_the_mend(asked, run, doubled, p
     doubled(package, is_installed=False)
     code, _, err = run(*asked, f"--{package}-args", "project=mine")
     assert code == 2
-    assert err.splitlines()[-1] == f"infthor-eval: --{package}-args needs the package {package}; pip install {package}"
+    assert (
+        err.splitlines()[-1]
+        == f"infthor-eval: --{package}-args needs the package {package}; pip install {package}"
+    )
 
 
-@pytest.mark.parametrize(("package", "more"), [("wandb", "mode=offline"), ("trackio", "auto_log_gpu=False")])
+@pytest.mark.parametrize(
+    ("package", "more"), [("wandb", "mode=offline"), ("trackio", "auto_log_gpu=False")]
+)
 def test_the_real_package_takes_a_run(asked, run, tmp_path, monkeypatch, package, more):
     pytest.importorskip(package)
     monkeypatch.setenv("WANDB_DIR", str(tmp_path))

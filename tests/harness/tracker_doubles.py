@@ -27,7 +27,9 @@ class Double:
     def function(self, name, gives=None):
         """A function of the package with the real one's parameters."""
         names = self._signatures[name]
-        signature = Signature([Parameter(one, Parameter.POSITIONAL_OR_KEYWORD, default=None) for one in names])
+        signature = Signature(
+            [Parameter(one, Parameter.POSITIONAL_OR_KEYWORD, default=None) for one in names]
+        )
 
         def double(*args, **kwargs):
             self.calls.append((name, dict(signature.bind(*args, **kwargs).arguments)))
@@ -44,7 +46,9 @@ class Double:
 def wandb():
     """The modules of a double of wandb by name, and the double."""
     double = Double("wandb")
-    artifact = types.SimpleNamespace(new_file=double.function("new_file", gives=nullcontext(io.StringIO())))
+    artifact = types.SimpleNamespace(
+        new_file=double.function("new_file", gives=nullcontext(io.StringIO()))
+    )
     table = types.SimpleNamespace(add_data=lambda *cells: double.calls.append(("add_data", cells)))
     run = types.SimpleNamespace(
         config=Config(double),

@@ -38,7 +38,9 @@ def test_of_a_logged_object_it_is_told_where_it_is_clear(parents, parent):
 
 def test_of_an_object_in_a_view_it_is_what_can_be_carried_then_the_smallest():
     def of(*parents):
-        return direct_parent(replace(APPLE, parent_receptacles=[item.object_id for item in parents]), KITCHEN.objects)
+        return direct_parent(
+            replace(APPLE, parent_receptacles=[item.object_id for item in parents]), KITCHEN.objects
+        )
 
     assert of(COUNTER, MUG) == MUG.object_id
     assert of(FRIDGE, COUNTER) == COUNTER.object_id  # the fridge here has no box

@@ -36,7 +36,11 @@ def state(at=None, held=None, clean=(), hot=(), cold=(), lit=(), **where):
 
 def holds(task, now):
     places = frozenset({"table-1", "table-2", "desk", "lamp", "other-lamp"})
-    return is_achieved(task, SymbolicRoom(TYPES, places, frozenset({"table-1", "table-2", "desk", "plate"}), now), now)
+    return is_achieved(
+        task,
+        SymbolicRoom(TYPES, places, frozenset({"table-1", "table-2", "desk", "plate"}), now),
+        now,
+    )
 
 
 PLACE = Task(TaskType.PLACE, "Mug", "SideTable")
@@ -109,7 +113,14 @@ STACKED = {building.APPLE: building.PLATE, building.PLATE: THERE}
 
 def all_in(*things):
     """The things on one table, everything else in the fridge."""
-    everything = (building.MUG, building.CUP, building.PLATE, building.APPLE, building.SLICE_1, building.SLICE_2)
+    everything = (
+        building.MUG,
+        building.CUP,
+        building.PLATE,
+        building.APPLE,
+        building.SLICE_1,
+        building.SLICE_2,
+    )
     return kitchen({key: THERE if key in things else HERE for key in everything})
 
 
@@ -130,8 +141,18 @@ HOT_SLICE = Task(TaskType.HEAT, "Apple", "SideTable", sliced=True)
         (EXAMINE, kitchen(held=building.MUG, on=[building.LAMP]), Treatments(), True),
         (EXAMINE, kitchen(held=building.MUG), Treatments(), False),
         (EXAMINE, kitchen(held=building.CUP, on=[building.LAMP]), Treatments(), False),
-        (EXAMINE, kitchen(held=building.MUG, on=[building.LAMP], hidden=[building.LAMP]), Treatments(), False),
-        (EXAMINE, kitchen(held=building.MUG, on=[building.LAMP], hidden=[building.LAMP]), None, True),
+        (
+            EXAMINE,
+            kitchen(held=building.MUG, on=[building.LAMP], hidden=[building.LAMP]),
+            Treatments(),
+            False,
+        ),
+        (
+            EXAMINE,
+            kitchen(held=building.MUG, on=[building.LAMP], hidden=[building.LAMP]),
+            None,
+            True,
+        ),
         (EXAMINE, kitchen(on=[building.LAMP]), Treatments(), False),
         (CLEAN, all_in(building.MUG), Treatments(clean=frozenset({building.MUG})), True),
         (CLEAN, all_in(building.MUG), Treatments(clean=frozenset({building.CUP})), False),

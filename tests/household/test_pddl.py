@@ -43,7 +43,13 @@ def test_the_domain_is_well_formed():
         parameters = {word for word in action[3] if word.startswith("?")}
         used = set(re.findall(r"\?\w+", str(action[4:])))
         assert used <= parameters
-        names = set(re.findall(r"\['([a-z_-]+)'", str(action[4:]))) - {"and", "not", "increase", "total-cost", "="}
+        names = set(re.findall(r"\['([a-z_-]+)'", str(action[4:]))) - {
+            "and",
+            "not",
+            "increase",
+            "total-cost",
+            "=",
+        }
         assert names <= declared(domain)
 
 
@@ -51,7 +57,11 @@ def test_the_domain_is_well_formed():
 def test_problems_use_what_the_domain_declares(task):
     text = read(problem(task, ROOM))
     init = next(section for section in text if section[0] == ":init")
-    objects = set(next(section for section in text if section[0] == ":objects")[1:]) - {"-", "item", "place"}
+    objects = set(next(section for section in text if section[0] == ":objects")[1:]) - {
+        "-",
+        "item",
+        "place",
+    }
     for fact in init[2:]:
         assert fact[0] in declared(read(DOMAIN))
         assert set(fact[1:]) <= objects

@@ -26,8 +26,14 @@ def names(task):
         (Task(TaskType.HEAT, "Apple", "CounterTop"), "Goto Pickup Goto Heat Goto Put"),
         (Task(TaskType.COOL, "Mug", "CounterTop"), "Goto Pickup Goto Cool Goto Put"),
         (Task(TaskType.EXAMINE, "Mug", light="DeskLamp"), "Goto Pickup Goto Toggle"),
-        (Task(TaskType.PLACE_TWO, "Apple", "CounterTop"), "Goto Pickup Goto Put Goto Pickup Goto Put"),
-        (Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate"), "Goto Pickup Put Pickup Goto Put"),
+        (
+            Task(TaskType.PLACE_TWO, "Apple", "CounterTop"),
+            "Goto Pickup Goto Put Goto Pickup Goto Put",
+        ),
+        (
+            Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate"),
+            "Goto Pickup Put Pickup Goto Put",
+        ),
         (Task(TaskType.PUT_AWAY, "Mug", "DiningTable"), "Goto Pickup Goto Put"),
         (
             Task(TaskType.PLACE, "Apple", "CounterTop", sliced=True),
@@ -70,7 +76,9 @@ def shortest(task, limit):
     queue = deque([problem.start])
     while queue:
         state = queue.popleft()
-        assert lower_bound(task, ROOM, state) + depth[state] <= limit or not is_achieved(task, ROOM, state)
+        assert lower_bound(task, ROOM, state) + depth[state] <= limit or not is_achieved(
+            task, ROOM, state
+        )
         if is_achieved(task, ROOM, state):
             return depth[state]
         for _, following in problem.successors(state):
@@ -83,5 +91,7 @@ def shortest(task, limit):
 def test_the_room_is_read_from_the_metadata():
     where = dict(ROOM.start.where)
     assert where[MUG.object_id] == COUNTER.object_id
-    assert ROOM.types[f"{APPLE.object_id}#1"] == "AppleSliced" and where[f"{APPLE.object_id}#1"] == ""
+    assert (
+        ROOM.types[f"{APPLE.object_id}#1"] == "AppleSliced" and where[f"{APPLE.object_id}#1"] == ""
+    )
     assert ROOM.place_of("Spoon|+00.20|+00.95|+00.00", where) == COUNTER.object_id

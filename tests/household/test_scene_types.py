@@ -23,7 +23,9 @@ def test_scenes_by_name(scene, expected):
 
 
 def test_what_is_done_where():
-    assert TaskType.HEAT in usual_tasks("kitchen-1") and TaskType.EXAMINE not in usual_tasks("kitchen-1")
+    assert TaskType.HEAT in usual_tasks("kitchen-1") and TaskType.EXAMINE not in usual_tasks(
+        "kitchen-1"
+    )
     assert usual_tasks("FloorPlan301") >= {TaskType.EXAMINE, TaskType.STACK}
     assert usual_tasks("bathroom-1") == {TaskType.PLACE, TaskType.PLACE_TWO, TaskType.CLEAN}
     assert usual_tasks("house-2") == set(SAMPLED)

@@ -10,10 +10,22 @@ def test_descriptions():
     def words(task):
         return sub_task(task, "kitchen-1").task_desc
 
-    assert words(Task(TaskType.PLACE, "Apple", "Fridge", sliced=True)) == "put a sliced apple in the fridge"
-    assert words(Task(TaskType.PLACE_TWO, "Knife", "CounterTop")) == "put two knives on the counter top"
-    assert words(Task(TaskType.PLACE_TWO, "Apple", "Fridge", sliced=True)) == "put two slices of apple in the fridge"
-    assert words(Task(TaskType.EXAMINE, "Mug", light="DeskLamp")) == "look at a mug under the desk lamp"
+    assert (
+        words(Task(TaskType.PLACE, "Apple", "Fridge", sliced=True))
+        == "put a sliced apple in the fridge"
+    )
+    assert (
+        words(Task(TaskType.PLACE_TWO, "Knife", "CounterTop"))
+        == "put two knives on the counter top"
+    )
+    assert (
+        words(Task(TaskType.PLACE_TWO, "Apple", "Fridge", sliced=True))
+        == "put two slices of apple in the fridge"
+    )
+    assert (
+        words(Task(TaskType.EXAMINE, "Mug", light="DeskLamp"))
+        == "look at a mug under the desk lamp"
+    )
     stack = Task(TaskType.STACK, "Apple", "CounterTop", movable="Plate")
     assert words(stack) == "put a plate with an apple on it on the counter top"
 
@@ -41,40 +53,76 @@ def recorded(goal, pickup=None, movable=None, receptacle=None, **params):
 
 
 def test_types_out_of_the_parameters_and_of_another_version():
-    place = recorded("pick_and_place_simple", object_target="Glassbottle", parent_target="Desk", mrecep_target="")
+    place = recorded(
+        "pick_and_place_simple", object_target="Glassbottle", parent_target="Desk", mrecep_target=""
+    )
     assert task_of(place) == Task(TaskType.PLACE, "Bottle", "Desk")
-    assert task_of(recorded("pick_and_place_simple", "AppleSliced", receptacle="Desk")).target == "AppleSliced"
-    examine = recorded("look_at_obj_in_light", "Book", None, "Desk", toggle_target="FloorLamp", object_sliced=None)
+    assert (
+        task_of(recorded("pick_and_place_simple", "AppleSliced", receptacle="Desk")).target
+        == "AppleSliced"
+    )
+    examine = recorded(
+        "look_at_obj_in_light", "Book", None, "Desk", toggle_target="FloorLamp", object_sliced=None
+    )
     assert task_of(examine) == Task(TaskType.EXAMINE, "Book", light="FloorLamp")
 
 
 def test_what_is_put_away_is_the_movable_object_whatever_the_parameters_say():
     """They are those of the task before."""
-    params = {"object_target": "Bread", "parent_target": "Fridge", "mrecep_target": "", "object_sliced": True}
+    params = {
+        "object_target": "Bread",
+        "parent_target": "Fridge",
+        "mrecep_target": "",
+        "object_sliced": True,
+    }
     away = recorded("put object", None, "Glassbottle", "Toilet", **params)
     assert task_of(away) == Task(TaskType.PUT_AWAY, "Bottle", "Toilet")
-    assert sub_task(Task(TaskType.PUT_AWAY, "Knife", "Toilet"), "kitchen-1").task_desc == "put the Knife on the Toilet"
+    assert (
+        sub_task(Task(TaskType.PUT_AWAY, "Knife", "Toilet"), "kitchen-1").task_desc
+        == "put the Knife on the Toilet"
+    )
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
     [
         (recorded(""), "a task has no goal; give one of pick_and_place_simple, "),
-        (recorded("juggle", "Mug"), "a task's goal is 'juggle'; give one of pick_and_place_simple, "),
+        (
+            recorded("juggle", "Mug"),
+            "a task's goal is 'juggle'; give one of pick_and_place_simple, ",
+        ),
         (
             recorded("pick_and_place_simple", receptacle="Desk"),
             "has no task_info's pickup or pddl_params' object_target",
         ),
-        (recorded("pick_clean_then_place_in_recep", "Mug"), "has no task_info's receptacle or .*' parent_target"),
-        (recorded("pick_and_place_with_movable_recep", "Mug", "", "Desk"), "task_info's movable or .*' mrecep_target"),
+        (
+            recorded("pick_clean_then_place_in_recep", "Mug"),
+            "has no task_info's receptacle or .*' parent_target",
+        ),
+        (
+            recorded("pick_and_place_with_movable_recep", "Mug", "", "Desk"),
+            "task_info's movable or .*' mrecep_target",
+        ),
         (
             recorded("put object", receptacle="Toilet", mrecep_target="Mug"),
             "needs task_info's movable and receptacle",
         ),
-        (recorded("put object", None, "Mug", parent_target="Toilet"), "needs task_info's movable and receptacle"),
-        (recorded("look_at_obj_in_light", "Mug", toggle_target=""), "has no pddl_params' toggle_target"),
-        (recorded("look_at_obj_in_light", "Mug", toggle_target=3), "has no pddl_params' toggle_target"),
-        (recorded("pick_and_place_simple", "Mug", None, "Desk", object_sliced="no"), "object_sliced 'no'"),
+        (
+            recorded("put object", None, "Mug", parent_target="Toilet"),
+            "needs task_info's movable and receptacle",
+        ),
+        (
+            recorded("look_at_obj_in_light", "Mug", toggle_target=""),
+            "has no pddl_params' toggle_target",
+        ),
+        (
+            recorded("look_at_obj_in_light", "Mug", toggle_target=3),
+            "has no pddl_params' toggle_target",
+        ),
+        (
+            recorded("pick_and_place_simple", "Mug", None, "Desk", object_sliced="no"),
+            "object_sliced 'no'",
+        ),
     ],
 )
 def test_what_a_task_lacks_is_named(given, words):

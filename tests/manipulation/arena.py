@@ -20,7 +20,9 @@ from infthor_eval.thor.frames import NoFrames
 from infthor_eval.thor.simulator import Simulator
 
 
-def task_of(data: Path, options: ManipulationOptions | None = None, **settings: Any) -> ManipulationTask:
+def task_of(
+    data: Path, options: ManipulationOptions | None = None, **settings: Any
+) -> ManipulationTask:
     """A task on these trajectories, with these `dataset_kwargs`."""
     file = TaskFile("a_task", "manipulation", Path("a_task.yaml"), {"dataset_kwargs": settings})
     return ManipulationTask(file, TaskRequest([file], options or ManipulationOptions(), data))
@@ -62,7 +64,9 @@ class Arena:
         """Run an episode."""
         episode = self.episodes[index]
         if seed not in self._runners:
-            self._runners = {seed: self._runner(seed)}  # one world at a time: they share the simulator
+            self._runners = {
+                seed: self._runner(seed)
+            }  # one world at a time: they share the simulator
             self._environment = None
         self._any_actor.actor = actor
         task = task_of(self._data, **{"kind": str(episode.kind), **settings})
@@ -76,8 +80,12 @@ class Arena:
             self._environment, self._runners = ArmEnvironment(self.trajectory, self.simulator), {}
         episode = self.episodes[index]
         start = self.states.before(episode)
-        begun = self._environment.reset(episode, start, conversion or Conversion(), grasp or Grasp(), NoFrames())
+        begun = self._environment.reset(
+            episode, start, conversion or Conversion(), grasp or Grasp(), NoFrames()
+        )
         return self._environment, begun
 
     def _runner(self, seed: int) -> ArmRunner:
-        return ArmRunner(self.trajectory, self.states, self.simulator, self._any_actor, sees=False, seed=seed)
+        return ArmRunner(
+            self.trajectory, self.states, self.simulator, self._any_actor, sees=False, seed=seed
+        )

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.manipulation.kinds import ManipulationKind
-from infthor_eval.manipulation.recorded_runs import ArmRun
+from infthor_eval.manipulation.recorded.runs import ArmRun
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 from infthor_eval.runs import RunHeader, UnitRecord
-from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.journals.journal import Journal
 
 TASKS = {"pickup": "arm_pickup", "put": "arm_put"}
 REWARD = 2.0
@@ -80,8 +80,12 @@ def made_run(
     return ArmRun(label, RunHeader(suite="manipulation", name=label, config=identity), records)
 
 
-def planner_run(records: Sequence[UnitRecord[ArmRecord]], label: str = "planner-arm", **about: Any) -> ArmRun:
-    return made_run(label, records, model={"name": "planner-arm", "baseline": "planner-arm"}, **about)
+def planner_run(
+    records: Sequence[UnitRecord[ArmRecord]], label: str = "planner-arm", **about: Any
+) -> ArmRun:
+    return made_run(
+        label, records, model={"name": "planner-arm", "baseline": "planner-arm"}, **about
+    )
 
 
 def write_run(run: ArmRun, output: Path, name: str = "arm-0123") -> Path:

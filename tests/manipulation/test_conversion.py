@@ -25,8 +25,21 @@ def tuple_of(vector: Vector):
 def simulator():
     """In the middle of an empty room of four by four metres: nothing is in the arm's way."""
     corners = [{"x": x, "y": 0, "z": z} for x, z in ((0, 0), (0, 4), (4, 4), (4, 0))]
-    room = {"id": "room|1", "roomType": "Kitchen", "floorPolygon": corners, "ceilings": [], "children": []}
-    house = {"rooms": [room], "walls": [], "objects": [], "doors": [], "windows": [], "proceduralParameters": {}}
+    room = {
+        "id": "room|1",
+        "roomType": "Kitchen",
+        "floorPolygon": corners,
+        "ceilings": [],
+        "children": [],
+    }
+    house = {
+        "rooms": [room],
+        "walls": [],
+        "objects": [],
+        "doors": [],
+        "windows": [],
+        "proceduralParameters": {},
+    }
     with Simulator(embedded_launch(), image=False, instances=False, agentMode="arm") as simulator:
         simulator.reset(house)
         yield simulator
@@ -42,7 +55,12 @@ def arm(simulator):
             stand = simulator.view.agent.position
             there = {"x": 2.0, "y": stand.y, "z": 2.0}
             view = simulator.step(
-                "TeleportFull", position=there, rotation={"y": rotation}, horizon=0, standing=True, forceAction=True
+                "TeleportFull",
+                position=there,
+                rotation={"y": rotation},
+                horizon=0,
+                standing=True,
+                forceAction=True,
             )
             assert view.success, view.error
             return self.now()
@@ -112,12 +130,16 @@ def in_world(shares, facing):
 
 
 @pytest.mark.parametrize("facing", [0, 90])
-@pytest.mark.parametrize(("asked", "looks"), [turn[1:] for turn in TURNS], ids=[turn[0] for turn in TURNS])
+@pytest.mark.parametrize(
+    ("asked", "looks"), [turn[1:] for turn in TURNS], ids=[turn[0] for turn in TURNS]
+)
 def test_a_unit_turn_turns_the_hand_about_its_axis_by_its_angle(arm, facing, asked, looks):
     wrist, looking = arm.face(facing)
     length = math.hypot(*looking)
     assert length == pytest.approx(0.07, abs=1e-4)  # the palm, and the radius of 0.06 m
-    assert looking == pytest.approx(tuple(length * part for part in in_world((1, 0, 0), facing)), abs=1e-3)
+    assert looking == pytest.approx(
+        tuple(length * part for part in in_world((1, 0, 0), facing)), abs=1e-3
+    )
     after, now = arm.does(step(rotation=asked))
     assert now == pytest.approx(tuple(length * part for part in in_world(looks, facing)), abs=1e-4)
     assert after == pytest.approx(wrist, abs=1e-3)  # it turns on the spot
@@ -125,12 +147,16 @@ def test_a_unit_turn_turns_the_hand_about_its_axis_by_its_angle(arm, facing, ask
 
 @pytest.mark.parametrize("facing", [0, 90])
 @pytest.mark.parametrize(("roll", "up"), [(1, S), (-1, -S)])
-def test_a_roll_lifts_the_hands_left_side_as_a_right_handed_turn_about_forward_does(arm, facing, roll, up):
+def test_a_roll_lifts_the_hands_left_side_as_a_right_handed_turn_about_forward_does(
+    arm, facing, roll, up
+):
     """It shows in where the hand's own left is: a quarter's roll makes that the world's up, or down."""
     arm.face(facing)
     _, looking = arm.does(step(rotation=(roll * math.pi / 2, 0, 0)), step(rotation=(0, 0, 0.4)))
     length = math.hypot(*looking)
-    assert looking == pytest.approx(tuple(length * part for part in in_world((C, 0, up), facing)), abs=1e-4)
+    assert looking == pytest.approx(
+        tuple(length * part for part in in_world((C, 0, up), facing)), abs=1e-4
+    )
 
 
 def test_a_step_too_long_is_cut_in_its_direction(arm):
@@ -138,7 +164,9 @@ def test_a_step_too_long_is_cut_in_its_direction(arm):
     assert call["offset"] == pytest.approx({"x": 0.0, "y": -0.08, "z": 0.06})
     before, _ = arm.face(0)
     after, _ = arm.does(step((0.3, 0.0, -0.4)))
-    assert tuple(b - a for a, b in zip(before, after, strict=True)) == pytest.approx((0, -0.08, 0.06), abs=1e-4)
+    assert tuple(b - a for a, b in zip(before, after, strict=True)) == pytest.approx(
+        (0, -0.08, 0.06), abs=1e-4
+    )
 
 
 def test_a_short_step_is_not_cut_and_the_scale_comes_before_the_cut():
@@ -146,7 +174,9 @@ def test_a_short_step_is_not_cut_and_the_scale_comes_before_the_cut():
     assert call["offset"] == pytest.approx({"x": -0.02, "y": 0.02, "z": 0.01})
     (call,) = Conversion(translation_scale=2.0, max_step=0.1).calls(step((0.01, 0.02, 0.02)))
     assert call["offset"] == pytest.approx({"x": -0.04, "y": 0.04, "z": 0.02})
-    (call,) = Conversion(translation_scale=10.0, max_step=0.06).calls(step((0.01, 0.02, 0.02)))  # 0.3 m cut to 0.06
+    (call,) = Conversion(translation_scale=10.0, max_step=0.06).calls(
+        step((0.01, 0.02, 0.02))
+    )  # 0.3 m cut to 0.06
     assert call["offset"] == pytest.approx({"x": -0.04, "y": 0.04, "z": 0.02})
 
 
@@ -179,7 +209,10 @@ def test_an_arm_that_meets_the_floor_goes_back_or_stays_there(arm, simulator, ba
     """The scale and the cut of ten metres let one step reach the floor."""
     arm.face(0)
     simulator.step("MoveArmBase", y=0)
-    (before, _), (call,) = arm.now(), Conversion(10.0, 10.0, return_to_start=back).calls(step((0, 0, -0.06)))
+    (before, _), (call,) = (
+        arm.now(),
+        Conversion(10.0, 10.0, return_to_start=back).calls(step((0, 0, -0.06))),
+    )
     view = simulator.step(**call)
     assert not view.success and view.error.startswith("Collided")
     after, _ = arm.now()

@@ -16,7 +16,11 @@ from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.thor.frames import NoFrames
 from model_adapters import ArmDelta
 
-BOOK, PEN, AGAIN = 7, 100, 27  # pick-ups: out of the sphere's reach; in the sphere at the start; the book once more
+BOOK, PEN, AGAIN = (
+    7,
+    100,
+    27,
+)  # pick-ups: out of the sphere's reach; in the sphere at the start; the book once more
 ON_TABLE, ON_BED, INTO_DRAWER = 106, 53, 23  # puts of the pen, and of the book
 
 
@@ -38,10 +42,18 @@ def gripper(value):
 
 
 def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
-    played = [room.play(actor("still"), episode.index) for episode in room.of(ManipulationKind.PICKUP)]
+    played = [
+        room.play(actor("still"), episode.index) for episode in room.of(ManipulationKind.PICKUP)
+    ]
     assert [record.done for record in played] == [record.starts_inside for record in played]
-    assert [record.starts_inside for record in played] == [record.start_distance <= 0.5 for record in played]
-    assert [record.index for record in played if record.done] == [51, 67, 100]  # the book, a ball and a pen before it
+    assert [record.starts_inside for record in played] == [
+        record.start_distance <= 0.5 for record in played
+    ]
+    assert [record.index for record in played if record.done] == [
+        51,
+        67,
+        100,
+    ]  # the book, a ball and a pen before it
     assert all(len(record.steps) == 1 for record in played)
     assert {record.ended for record in played} == {"done", "gave up"}
     (refused,) = room.play(actor("still"), BOOK).steps[0].refusals
@@ -49,16 +61,24 @@ def test_who_stands_still_gets_just_what_lies_in_the_sphere_at_the_start(room):
 
 
 def test_the_planner_picks_up_and_puts_all(room):
-    picked = [room.play(actor("planner-arm"), episode.index) for episode in room.of(ManipulationKind.PICKUP)]
+    picked = [
+        room.play(actor("planner-arm"), episode.index)
+        for episode in room.of(ManipulationKind.PICKUP)
+    ]
     assert [record.ended for record in picked] == ["done"] * 5
     assert all(record.reward == record.max_reward == 2 for record in picked)
-    put = [room.play(actor("planner-arm"), episode.index) for episode in room.of(ManipulationKind.PUT)]
+    put = [
+        room.play(actor("planner-arm"), episode.index) for episode in room.of(ManipulationKind.PUT)
+    ]
     assert [record.ended for record in put] == ["done"] * 5
 
 
 def test_the_planner_puts_into_open_drawers(arena):
     kitchen = arena("kitchen-2-seed4", 99)
-    put = [kitchen.play(actor("planner-arm"), episode.index) for episode in kitchen.of(ManipulationKind.PUT)]
+    put = [
+        kitchen.play(actor("planner-arm"), episode.index)
+        for episode in kitchen.of(ManipulationKind.PUT)
+    ]
     assert [record.ended for record in put] == ["done"] * 3
     assert all(len(record.steps) < 10 for record in put)
 
@@ -77,7 +97,9 @@ def test_a_larger_sphere_takes_no_success_from_the_planner(room):
 
 def test_equal_seeds_move_alike_and_other_seeds_and_episodes_do_not(room):
     def moved(index, seed):
-        return [step.delta for step in room.play(actor("random-arm"), index, seed, max_steps=4).steps]
+        return [
+            step.delta for step in room.play(actor("random-arm"), index, seed, max_steps=4).steps
+        ]
 
     first = moved(AGAIN, 7)
     assert len(first) == 4 and len(set(first)) == 4
@@ -116,7 +138,9 @@ def test_of_a_put_the_wrist_is_as_high_as_the_experts_hand(room, index):
     _, begun = room.begin(index)
     start = room.states.starts[index]
     hand = start.view.objects[start.object_id].position.y
-    assert begun.view.arm.wrist.y == pytest.approx(hand, abs=0.01)  # the range of 1.35 m, halved eight times
+    assert begun.view.arm.wrist.y == pytest.approx(
+        hand, abs=0.01
+    )  # the range of 1.35 m, halved eight times
 
 
 def test_an_episode_begins_alike_whatever_was_done_before(room):
@@ -136,13 +160,17 @@ def test_what_is_held_before_the_palm_is_nearer_to_it_than_in_the_middle(room, i
         held = begun.view.objects[room.states.starts[index].object_id]
         return math.dist(middle_of(held), point_of(begun.view.arm.wrist))
 
-    assert distance(at_palm=True) < distance(at_palm=False) <= 0.51 + 0.01  # the middle is radius and palm away
+    assert (
+        distance(at_palm=True) < distance(at_palm=False) <= 0.51 + 0.01
+    )  # the middle is radius and palm away
 
 
 def test_the_agent_needs_an_arm(room, pool):
     with pool.one(image=False, instances=False) as without:
         environment = ArmEnvironment(room.trajectory, without)
-        with pytest.raises(InfeasibleError, match="the episode cannot be begun: SetHandSphereRadius: "):
+        with pytest.raises(
+            InfeasibleError, match="the episode cannot be begun: SetHandSphereRadius: "
+        ):
             environment.reset(
                 room.episodes[BOOK], room.states.starts[BOOK], Conversion(), Grasp(), NoFrames()
             )  # fmt: skip
@@ -226,7 +254,12 @@ def over(environment, item, aside=0.0):
         "y": top + 0.1 + held.axis_aligned_bounding_box.size.y / 2 + wrist.y - now[1],
         "z": goal[2] + wrist.z - now[2],
     }
-    return {"action": "MoveArm", "position": place, "coordinateSpace": "world", "returnToStart": False}
+    return {
+        "action": "MoveArm",
+        "position": place,
+        "coordinateSpace": "world",
+        "returnToStart": False,
+    }
 
 
 def test_released_over_the_receptacle_counts(room):
@@ -237,7 +270,9 @@ def test_released_over_the_receptacle_counts(room):
     outcome = environment.step([{"action": "ReleaseObject"}])
     assert outcome.ended == ArmEnded.DONE
     assert is_in(target, box, outcome.view)
-    assert middle_of(outcome.view.objects[target])[1] < middle_of(moved.view.objects[target])[1]  # it fell
+    assert (
+        middle_of(outcome.view.objects[target])[1] < middle_of(moved.view.objects[target])[1]
+    )  # it fell
 
 
 def test_released_elsewhere_does_not_count(room):
@@ -265,7 +300,10 @@ def test_distances_are_from_the_spheres_centre_to_the_targets_box(room):
         environment, begun = room.begin(index)
         target = environment.start.receptacle_id or environment.start.object_id
         for outcome in (begun, environment.step(ArmDelta((0.05, 0, 0.02), (0, 0.1, 0), 0.49))):
-            box, center = outcome.view.objects[target].axis_aligned_bounding_box, outcome.view.arm.sphere_center
+            box, center = (
+                outcome.view.objects[target].axis_aligned_bounding_box,
+                outcome.view.arm.sphere_center,
+            )
             nearest = (
                 min(max(getattr(center, axis), getattr(box.center, axis) - getattr(box.size, axis) / 2),
                     getattr(box.center, axis) + getattr(box.size, axis) / 2)
@@ -291,8 +329,15 @@ def test_an_egg_that_cracks_before_it_is_taken_ends_nothing(arena):
 
 
 def test_closest_is_the_smallest_of_the_start_and_all_steps(room):
-    for name, index in (("planner-arm", BOOK), ("random-arm", BOOK), ("still", BOOK), ("random-arm", INTO_DRAWER)):
+    for name, index in (
+        ("planner-arm", BOOK),
+        ("random-arm", BOOK),
+        ("still", BOOK),
+        ("random-arm", INTO_DRAWER),
+    ):
         record = room.play(actor(name), index, max_steps=6)
-        assert record.closest == min([record.start_distance, *(step.distance for step in record.steps)])
+        assert record.closest == min(
+            [record.start_distance, *(step.distance for step in record.steps)]
+        )
     still = room.play(actor("still"), BOOK)
     assert still.closest == still.start_distance == still.steps[0].distance

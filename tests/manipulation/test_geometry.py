@@ -4,7 +4,14 @@ import math
 
 import pytest
 
-from infthor_eval.manipulation.geometry import distance_to, interpolate, middle_of, offset, size_of, xyz
+from infthor_eval.manipulation.geometry import (
+    distance_to,
+    interpolate,
+    middle_of,
+    offset,
+    size_of,
+    xyz,
+)
 from infthor_eval.thor.view import Box, ThorObject, Vector
 
 BOX = Box(Vector(1.0, 2.0, 3.0), Vector(2.0, 0.5, 4.0))  # 0..2, 1.75..2.25, 1..5

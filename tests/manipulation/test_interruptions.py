@@ -26,14 +26,26 @@ OURS = "from infthor_eval.cli import main; main()"
 
 def same(records):
     """What is to be equal in two runs: all but times, attempts and faults."""
-    return [msgspec.structs.replace(record, seconds=0.0, attempt=1, faults=()) for record in records]
+    return [
+        msgspec.structs.replace(record, seconds=0.0, attempt=1, faults=()) for record in records
+    ]
 
 
 # -- the run is killed
 
 
 def start(data, output):
-    words = ["run", "--model", "random-arm", "--tasks", "manipulathor", "--data", data, "--output", output]
+    words = [
+        "run",
+        "--model",
+        "random-arm",
+        "--tasks",
+        "manipulathor",
+        "--data",
+        data,
+        "--output",
+        output,
+    ]
     return subprocess.Popen(
         [sys.executable, "-c", OURS, *map(str, words)],
         stdout=subprocess.DEVNULL,
@@ -50,7 +62,9 @@ def finish(process):
 
 def found(output):
     (folder,) = (path.parent for path in output.rglob("journal"))
-    return read_run(folder, RECORDS)[1], json.loads((folder / "results.json").read_text())["summary"]
+    return read_run(folder, RECORDS)[1], json.loads((folder / "results.json").read_text())[
+        "summary"
+    ]
 
 
 @pytest.mark.usefixtures("shared_simulators")
@@ -115,7 +129,9 @@ def calls(monkeypatch, shared_simulators):
 
 
 @pytest.mark.parametrize("mode", ["arm", "default"])
-def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(prepared, tmp_path, calls, mode):
+def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(
+    prepared, tmp_path, calls, mode
+):
     whole = execute(prepared("random-arm", output=tmp_path / "whole"))
     n_calls = calls.n[mode]
     assert n_calls > 20
@@ -125,12 +141,16 @@ def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(prep
     assert same(disturbed.records) == same(whole.records)
     assert disturbed.summary.summary == whole.summary.summary
     assert [fault for record in whole.records for fault in record.faults] == []
-    assert [fault for record in disturbed.records for fault in record.faults] == ["simulator started again: 1"]
+    assert [fault for record in disturbed.records for fault in record.faults] == [
+        "simulator started again: 1"
+    ]
 
 
 @pytest.mark.usefixtures("shared_simulators")
 @pytest.mark.parametrize("n_failures", [2, 3])
-def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(prepared, tmp_path, monkeypatch, n_failures):
+def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(
+    prepared, tmp_path, monkeypatch, n_failures
+):
     whole = execute(prepared("random-arm", output=tmp_path / "whole"))
     step, failures = ArmEnvironment.step, []
 
@@ -157,7 +177,11 @@ def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(prepared, t
 
 
 def children():
-    return {child for task in Path("/proc/self/task").iterdir() for child in (task / "children").read_text().split()}
+    return {
+        child
+        for task in Path("/proc/self/task").iterdir()
+        for child in (task / "children").read_text().split()
+    }
 
 
 class Counting(Silent):
@@ -170,7 +194,9 @@ class Counting(Silent):
         self.most = max(self.most, len(children() - self.before))
 
 
-def test_two_trajectories_at_once_find_what_one_after_the_other_finds(prepared, tmp_path, monkeypatch, pool):
+def test_two_trajectories_at_once_find_what_one_after_the_other_finds(
+    prepared, tmp_path, monkeypatch, pool
+):
     data = write(tmp_path / "two", cut(CANDLE), cut(MUG))
     counting = Counting()
     together = execute(prepared("random-arm", data=data, output=tmp_path / "together"), counting)

@@ -22,7 +22,9 @@ def picking(prepared, monkeypatch, tmp_path):
 
     def picking(model=TWIN, **changes):
         if model == TWIN:
-            monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: ScriptedPolicy(lambda _: [OPEN]))
+            monkeypatch.setattr(
+                "infthor_eval.runs.work.binding.load", lambda *_: ScriptedPolicy(lambda _: [OPEN])
+            )
         *_, record = execute(prepared(model, tasks=(PICK,), data=data, **changes)).records
         assert not record.failure and not record.excluded
         return record.payload
@@ -52,7 +54,9 @@ def test_before_the_way_there_the_object_is_farther_off(picking):
 
 
 def test_the_hand_begins_at_rest_low_or_high(picking):
-    heights = {hand: picking("still", hand=hand).steps[0].hand[1] for hand in ("rest", "low", "high")}
+    heights = {
+        hand: picking("still", hand=hand).steps[0].hand[1] for hand in ("rest", "low", "high")
+    }
     assert heights["low"] < heights["rest"] - 0.05 < heights["rest"] + 0.05 < heights["high"]
 
 

@@ -35,7 +35,10 @@ def one_line(caught):
 def test_what_a_policy_is_told(data, kind, template, episode, said):
     given = {} if template is None else {"instruction": template}
     assert task_of(data, kind=kind, **given).instruction(episode) == said
-    assert task_of(data, ManipulationOptions(instruction=template), kind=kind).instruction(episode) == said
+    assert (
+        task_of(data, ManipulationOptions(instruction=template), kind=kind).instruction(episode)
+        == said
+    )
 
 
 @pytest.mark.parametrize("template", [
@@ -59,23 +62,32 @@ def test_words_of_puts_may_have_a_receptacle_and_must_have_an_object(data):
 # -- radii
 
 
-@pytest.mark.parametrize("radius", ["0.039", "0.51", "0", "-0.1", "nan", "inf", "wide", "", "0,06", "6 cm"])
+@pytest.mark.parametrize(
+    "radius", ["0.039", "0.51", "0", "-0.1", "nan", "inf", "wide", "", "0,06", "6 cm"]
+)
 def test_a_radius_that_no_hand_has_is_refused(radius):
-    with pytest.raises(UsageError, match=r"--radius .*: is a length of 0\.04 to 0\.5 metres") as caught:
+    with pytest.raises(
+        UsageError, match=r"--radius .*: is a length of 0\.04 to 0\.5 metres"
+    ) as caught:
         ManipulationOptions(radius=radius)
     one_line(caught)
 
 
 @pytest.mark.parametrize("radius", [0.039, 0.6, 5])
 def test_nor_may_a_task_file_have_it(data, radius):
-    with pytest.raises(UsageError, match=f"a_task: radius {radius} is not within 0.04 to 0.5 metres"):
+    with pytest.raises(
+        UsageError, match=f"a_task: radius {radius} is not within 0.04 to 0.5 metres"
+    ):
         task_of(data, radius=radius)
 
 
 def test_the_command_line_goes_before_the_file(data):
     assert task_of(data, radius=0.1).settings.grasp.radius == 0.1
     for typed, metres in (("0.04", 0.04), ("0.5", 0.5), ("6e-2", 0.06)):
-        assert task_of(data, ManipulationOptions(radius=typed), radius=0.1).settings.grasp.radius == metres
+        assert (
+            task_of(data, ManipulationOptions(radius=typed), radius=0.1).settings.grasp.radius
+            == metres
+        )
 
 
 @pytest.mark.parametrize("frames", ["", "Blank", "black", "shown,blank"])
@@ -90,7 +102,10 @@ def test_frame_ablations_for_frames_that_do_not_exist_are_refused(frames):
 def test_settings_have_defaults_and_all_of_them_act(data):
     plain = task_of(data)
     assert plain.settings.grasp == Grasp(0.5, takes_all=False, at_palm=False, threshold=0.5)
-    assert (plain.settings.conversion.translation_scale, plain.settings.conversion.max_step) == (1.0, 0.1)
+    assert (plain.settings.conversion.translation_scale, plain.settings.conversion.max_step) == (
+        1.0,
+        0.1,
+    )
     assert plain.settings.conversion.rotation and plain.settings.conversion.return_to_start
     assert plain.settings.camera == (300, 60.0)
     assert (plain.settings.max_steps, plain.settings.reward) == (60, 2.0)
@@ -99,8 +114,13 @@ def test_settings_have_defaults_and_all_of_them_act(data):
         rotation=False, return_to_start=False, image_size=224, field_of_view=90, max_steps=9, reward=1,
     )  # fmt: skip
     assert changed.settings.grasp == Grasp(0.06, takes_all=True, at_palm=True, threshold=0.7)
-    assert (changed.settings.conversion.translation_scale, changed.settings.conversion.max_step) == (2, 0.05)
-    assert not changed.settings.conversion.rotation and not changed.settings.conversion.return_to_start
+    assert (
+        changed.settings.conversion.translation_scale,
+        changed.settings.conversion.max_step,
+    ) == (2, 0.05)
+    assert (
+        not changed.settings.conversion.rotation and not changed.settings.conversion.return_to_start
+    )
     assert changed.settings.camera == (224, 90)
     assert (changed.settings.max_steps, changed.settings.reward) == (9, 1)
 

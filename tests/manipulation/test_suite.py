@@ -25,7 +25,9 @@ STILL = ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.49)
 
 
 def by_key(outcome):
-    return {(record.task, record.cluster, record.payload.index): record for record in outcome.records}
+    return {
+        (record.task, record.cluster, record.payload.index): record for record in outcome.records
+    }
 
 
 def one_line(caught):
@@ -39,7 +41,7 @@ def policy(monkeypatch):
 
     def make(gives):
         made = ScriptedPolicy(gives)
-        monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: made)
+        monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: made)
         return made
 
     return make
@@ -59,7 +61,10 @@ def test_the_planner_does_what_the_expert_did(prepared, data):
     }
     assert all(record.payload.done and record.payload.reward == 2 for record in outcome.records)
     assert not any(record.failure or record.excluded or record.faults for record in outcome.records)
-    numbers = {record.key: sample.number for record, sample in zip(outcome.records, outcome.samples, strict=True)}
+    numbers = {
+        record.key: sample.number
+        for record, sample in zip(outcome.records, outcome.samples, strict=True)
+    }
     assert numbers[found[PUT, MUG, 21].key] == 0
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     (row,) = [row for row in table.rows if not row.is_published]
@@ -75,7 +80,10 @@ def test_the_journal_reads_back(prepared):
     assert outcome.run.suite.summarise(header, records) == outcome.summary.summary
     moved = next(step for record in records for step in record.payload.steps if step.calls)
     assert len(moved.delta) == 7 and moved.calls[0]["action"] == "MoveArmRelative"
-    assert json.loads((outcome.folder / "results.json").read_text())["summary"]["tasks"].keys() == {PICK, PUT}
+    assert json.loads((outcome.folder / "results.json").read_text())["summary"]["tasks"].keys() == {
+        PICK,
+        PUT,
+    }
 
 
 def test_the_limit_is_of_episodes(prepared):
@@ -98,7 +106,9 @@ def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, task_file, tmp_p
 
 def test_several_radii_are_runs_of_their_own(data, tmp_path):
     models = (ModelSpec("still"),)
-    options = RunOptions(models, (PICK,), data, tmp_path / "out", suite_options={"radius": "0.06,0.5"})
+    options = RunOptions(
+        models, (PICK,), data, tmp_path / "out", suite_options={"radius": "0.06,0.5"}
+    )
     outcomes = [execute(prepare(*request)) for request in options.requests()]
     assert [outcome.summary.summary.tasks[PICK].radius for outcome in outcomes] == [0.06, 0.5]
     assert len({outcome.folder for outcome in outcomes}) == 2
@@ -116,8 +126,19 @@ def test_all_that_changes_a_number_is_part_of_a_runs_identity(prepared, task_fil
     task_file("radius: 0.5")
     plain = prints()
     assert prints() == plain
-    changed = [prints(seed=1), prints(radius="0.06"), prints(instruction="take the {object}"), prints(frames="blank")]
-    for settings in ("max_step: 0.05", "rotation: false", "grasps: all", "hold: palm", "max_steps: 59"):
+    changed = [
+        prints(seed=1),
+        prints(radius="0.06"),
+        prints(instruction="take the {object}"),
+        prints(frames="blank"),
+    ]
+    for settings in (
+        "max_step: 0.05",
+        "rotation: false",
+        "grasps: all",
+        "hold: palm",
+        "max_steps: 59",
+    ):
         task_file(settings)
         changed.append(prints())
     assert all(not set(found) & set(plain) for found in changed)
@@ -134,7 +155,7 @@ def twins():
 @pytest.mark.parametrize("name", ["openvla-tiny", "spatialvla-tiny"])
 def test_tiny_policies_run_both_tasks(prepared, task_file, twins, monkeypatch, name):
     task_file("max_steps: 5")
-    monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: twins[name])
+    monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: twins[name])
     monkeypatch.setattr(twins[name], "close", lambda: None)
     outcome = execute(prepared(name))
     assert sorted(by_key(outcome)) == [(PICK, MUG, 9), (PUT, MUG, 21)]
@@ -147,10 +168,14 @@ def test_tiny_policies_run_both_tasks(prepared, task_file, twins, monkeypatch, n
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     assert [row.cells[0] for row in table.rows if not row.is_published] == [name]
     again = execute(prepared(name, output=outcome.folder.parents[1] / "again"))
-    assert [record.payload for record in again.records] == [record.payload for record in outcome.records]
+    assert [record.payload for record in again.records] == [
+        record.payload for record in outcome.records
+    ]
 
 
-def test_a_policy_sees_the_present_frame_once_per_chunk_and_is_told_what_to_do(prepared, task_file, policy):
+def test_a_policy_sees_the_present_frame_once_per_chunk_and_is_told_what_to_do(
+    prepared, task_file, policy
+):
     task_file("max_steps: 4, image_size: 96")
     move = ArmDelta((0.0, 0.05, 0.0), (0.0, 0.0, 0.2), 0.49)
     scripted = policy(lambda number: (move, STILL))
@@ -176,7 +201,9 @@ def test_blank_frames_are_plain_and_change_nothing_else(prepared, task_file, pol
         pixels = np.asarray(image)
     assert pixels.shape[:2] == (64, 64) and (pixels == 128).all()
     assert blank.told == shown.told
-    assert [record.payload for record in outcome.records] == [record.payload for record in plain.records]
+    assert [record.payload for record in outcome.records] == [
+        record.payload for record in plain.records
+    ]
     rows = outcome.run.suite.tables([plain.summary, outcome.summary])[0].rows
     assert [row.cells[0] for row in rows[:2]] == ["openvla-tiny", "openvla-tiny, blank frames"]
 
@@ -185,7 +212,10 @@ GOOD = (0.0, 0.0, 0.0)
 BAD = {
     "not a number": ((ArmDelta(GOOD, (0.0, math.nan, 0.0), 1.0),), "numbers that are not finite"),
     "a gripper that is none": ((ArmDelta(GOOD, GOOD, math.nan),), "numbers that are not finite"),
-    "an infinite way": ((ArmDelta((math.inf, 0.0, 0.0), GOOD, 1.0),), "numbers that are not finite"),
+    "an infinite way": (
+        (ArmDelta((math.inf, 0.0, 0.0), GOOD, 1.0),),
+        "numbers that are not finite",
+    ),
     "a text": ((ArmDelta(("far", 0.0, 0.0), GOOD, 1.0),), "numbers that are not finite"),
     "too few": ((ArmDelta((0.0, 0.0), GOOD, 1.0),), "gives 6 numbers for a step; it must be 7"),
     "too many": ((ArmDelta(GOOD, (0.0,) * 4, 1.0),), "gives 8 numbers for a step; it must be 7"),
@@ -213,9 +243,14 @@ def test_what_is_no_movement_is_a_failure_of_the_policy(prepared, task_file, pol
 
 def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepared, tmp_path):
     document = cut(MUG)
-    document["plan"]["low_actions"][12]["api_action"] = {"action": "OpenObject", "objectId": "Desk|+9.99|+0.00|+0.00"}
+    document["plan"]["low_actions"][12]["api_action"] = {
+        "action": "OpenObject",
+        "objectId": "Desk|+9.99|+0.00|+0.00",
+    }
     for model in ("planner-arm", "still"):
-        outcome = execute(prepared(model, data=write(tmp_path / model, document), output=tmp_path / "out" / model))
+        outcome = execute(
+            prepared(model, data=write(tmp_path / model, document), output=tmp_path / "out" / model)
+        )
         pick, put = by_key(outcome)[PICK, MUG, 9], by_key(outcome)[PUT, MUG, 21]
         assert pick.excluded is None
         assert put.excluded.startswith("the expert's action 12 (OpenObject) is refused here: ")
@@ -230,7 +265,9 @@ def test_an_episode_whose_object_is_missing_counts_for_nobody(prepared, tmp_path
     recorded = document["plan"]["low_actions"][9]["api_action"]
     recorded["objectId"] = "Elephant|+00.00|+00.00|+00.00"
     outcome = execute(prepared("still", data=write(tmp_path / "elephant", document)))
-    assert all("Elephant" in record.excluded for record in outcome.records)  # what comes after is not known either
+    assert all(
+        "Elephant" in record.excluded for record in outcome.records
+    )  # what comes after is not known either
     assert by_key(outcome)[PICK, MUG, 9].payload.instruction == "pick up the elephant"
     assert outcome.summary.summary.tasks[PICK].success is None
 
@@ -242,7 +279,10 @@ def test_a_scene_that_is_not_here_counts_for_nobody(prepared, data):
     outcome = execute(prepared("still"))
     left_out = [record for record in outcome.records if record.excluded is not None]
     assert [record.cluster for record in left_out] == ["elsewhere"] * 2
-    assert all(record.excluded.startswith("scene FloorPlan7: ") and not record.faults for record in left_out)
+    assert all(
+        record.excluded.startswith("scene FloorPlan7: ") and not record.faults
+        for record in left_out
+    )
     assert outcome.summary.summary.tasks[PICK].success.n == 1
 
 
@@ -253,7 +293,10 @@ def without_object(document):
 BROKEN = {
     "no JSON": ("{", "not a trajectory"),
     "of another form": ('{"scene": 5}', "not a trajectory"),
-    "a pick-up of nothing": (without_object, "action 9 (PickupObject) names no object; restore the file"),
+    "a pick-up of nothing": (
+        without_object,
+        "action 9 (PickupObject) names no object; restore the file",
+    ),
 }
 
 
@@ -277,7 +320,9 @@ def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
 
 def test_where_no_trajectory_has_such_an_action_that_is_said(prepared, tmp_path):
     data = write(tmp_path / "walks", cut(MUG, 1))
-    with pytest.raises(UsageError, match="manipulathor_pickup: no trajectory there has a Pick-up") as caught:
+    with pytest.raises(
+        UsageError, match="manipulathor_pickup: no trajectory there has a Pick-up"
+    ) as caught:
         prepared(data=data)
     one_line(caught)
     with pytest.raises(UsageError, match="manipulathor_put: no trajectory there has a Put"):
@@ -304,7 +349,9 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
     ("instruction", "do it", "must have {object}"),
     ("scenes", "/nowhere/at/all", "/nowhere/at/all"),
 ])  # fmt: skip
-def test_an_option_that_does_not_fit_ends_the_command_in_one_line(run, data, tmp_path, option, value, said):
+def test_an_option_that_does_not_fit_ends_the_command_in_one_line(
+    run, data, tmp_path, option, value, said
+):
     words = ("run", "--model", "still", "--tasks", PICK, "--data", data, "--output", tmp_path / "o")
     code, out, err = run(*words, f"--{option}", value)
     assert (code, out) == (2, "")
@@ -321,6 +368,10 @@ def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
     found = by_key(outcome)
     assert sorted(found) == [("far", MUG, 9), ("near", MUG, 9)]
     assert found["far", MUG, 9].payload.done
-    assert found["near", MUG, 9].payload.start_distance > found["far", MUG, 9].payload.start_distance  # a small sphere
-    rows = [row for row in outcome.run.suite.tables([outcome.summary])[0].rows if not row.is_published]
+    assert (
+        found["near", MUG, 9].payload.start_distance > found["far", MUG, 9].payload.start_distance
+    )  # a small sphere
+    rows = [
+        row for row in outcome.run.suite.tables([outcome.summary])[0].rows if not row.is_published
+    ]
     assert [row.cells[1] for row in rows] == ["0.06", "0.5"]

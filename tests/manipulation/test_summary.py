@@ -26,7 +26,13 @@ def step(distance=1.0, *refusals):
 
 
 def episode(trajectory, index, ended="done", task=PICK, failure=None, excluded=None, **payload):
-    record = ArmRecord(index=index, kind="pickup" if task == PICK else "put", instruction="", ended=ended, **payload)
+    record = ArmRecord(
+        index=index,
+        kind="pickup" if task == PICK else "put",
+        instruction="",
+        ended=ended,
+        **payload,
+    )
     return UnitRecord(
         task=task, id=f"{trajectory}/{index:04d}", cluster=trajectory, fingerprint="f", payload=record,
         failure=failure, excluded=excluded,
@@ -34,8 +40,21 @@ def episode(trajectory, index, ended="done", task=PICK, failure=None, excluded=N
 
 
 RECORDS = [
-    episode("a", 1, starts_inside=True, closest=0.1, reward=2.0, steps=(step(), step(1.0, COLLIDED, COLLIDED))),
-    episode("a", 5, "step limit", closest=0.4, steps=(step(1.0, COLLIDED, "no objects in the sphere"),) * 4),
+    episode(
+        "a",
+        1,
+        starts_inside=True,
+        closest=0.1,
+        reward=2.0,
+        steps=(step(), step(1.0, COLLIDED, COLLIDED)),
+    ),
+    episode(
+        "a",
+        5,
+        "step limit",
+        closest=0.4,
+        steps=(step(1.0, COLLIDED, "no objects in the sphere"),) * 4,
+    ),
     episode("b", 2, "gave up", starts_inside=True, closest=0.7),
     episode("b", 3, "", failure="out of memory"),
     episode("b", 9, "", excluded="no such scene"),
@@ -55,7 +74,9 @@ def run(name="a policy", records=RECORDS, **changes):
 
 
 def table(title, *runs):
-    (found,) = [table for table in ManipulationSuite().tables(runs) if table.title.startswith(title)]
+    (found,) = [
+        table for table in ManipulationSuite().tables(runs) if table.title.startswith(title)
+    ]
     return found
 
 
@@ -71,7 +92,10 @@ def test_the_numbers_of_pick_ups():
     task = summed().tasks[PICK]
     assert (task.kind, task.radius, task.n_trajectories, task.n_failed) == ("pickup", 0.5, 2, 1)
     assert task.excluded == {"no such scene": 1}
-    assert (task.success.mean, task.success.n) == (0.25, 4)  # a failure of the policy's is no success
+    assert (task.success.mean, task.success.n) == (
+        0.25,
+        4,
+    )  # a failure of the policy's is no success
     assert (task.inside.mean, task.inside.n) == (
         pytest.approx(2 / 3),
         3,
@@ -94,7 +118,10 @@ def test_a_summary_knows_no_order():
 
 
 def test_nothing_counts_where_all_is_left_out():
-    records = [episode("a", 1, "", excluded="no such scene"), episode("a", 2, "", excluded="no such scene", task=PUT)]
+    records = [
+        episode("a", 1, "", excluded="no such scene"),
+        episode("a", 2, "", excluded="no such scene", task=PUT),
+    ]
     task = summed(records).tasks[PICK]
     assert (task.success, task.inside, task.closest, task.steps, task.collisions) == (None,) * 5
     assert (task.n_trajectories, task.endings, task.excluded) == (0, {}, {"no such scene": 1})
@@ -127,7 +154,9 @@ def test_numbers_of_the_embedded_simulator_say_so_and_others_do_not():
 
 
 def test_there_is_a_row_per_run_and_radius():
-    runs = [run(radius=radius, frames=frames) for radius in (0.06, 0.5) for frames in ("shown", "blank")]
+    runs = [
+        run(radius=radius, frames=frames) for radius in (0.06, 0.5) for frames in ("shown", "blank")
+    ]
     assert [(row["model"], row["radius, m"]) for row in own(table("Low-level", *runs))] == [
         ("a policy", "0.06"), ("a policy, blank frames", "0.06"),
         ("a policy", "0.5"), ("a policy, blank frames", "0.5"),
@@ -136,7 +165,11 @@ def test_there_is_a_row_per_run_and_radius():
 
 def test_tasks_of_one_run_with_several_radii_have_a_row_each():
     tasks = {"near": about("pickup", 0.06), "far": about("pickup", 0.5), PUT: about("put", 0.5)}
-    records = [episode("a", 1, task="near"), episode("a", 2, "gave up", task="far"), episode("a", 7, task=PUT)]
+    records = [
+        episode("a", 1, task="near"),
+        episode("a", 2, "gave up", task="far"),
+        episode("a", 7, task=PUT),
+    ]
     rows = own(table("Low-level", run(records=records, tasks=tasks)))
     assert [(row["radius, m"], row["Pick-up"], row["Put"]) for row in rows] == [
         ("0.06, 0.5", "100.0", "100.0"), ("0.5", "0.0", "-"),
@@ -151,15 +184,25 @@ def test_episodes_and_endings_have_a_row_per_task():
     assert put["in the sphere at the start, %"] == "-"  # it is in the hand
     assert (pick["closest, m"], pick["steps"], pick["collisions"]) == ("0.40", "2.0", "2.0")
     pick, put = own(table("How episodes ended", run()))
-    assert (pick["step limit"], pick["released elsewhere"], put["released elsewhere"]) == ("1", "0", "1")
+    assert (pick["step limit"], pick["released elsewhere"], put["released elsewhere"]) == (
+        "1",
+        "0",
+        "1",
+    )
 
 
 def test_success_above_the_floor_is_that_of_the_same_episodes():
     endings = {("a", 1): "done", ("a", 2): "done", ("b", 1): "gave up", ("b", 2): "done"}
     policy = [episode(*key, ended) for key, ended in endings.items()]
-    still = [episode("a", 1), *(episode(*key, "gave up") for key in [("a", 2), ("b", 1)]), episode("b", 7)]
+    still = [
+        episode("a", 1),
+        *(episode(*key, "gave up") for key in [("a", 2), ("b", 1)]),
+        episode("b", 7),
+    ]
     own_row, floor = own(table("Low-level", run(records=policy), run("still", still)))
-    assert own_row["Pick-up above still"].startswith("33.3 [")  # of the three that both have: 2 against 1
+    assert own_row["Pick-up above still"].startswith(
+        "33.3 ["
+    )  # of the three that both have: 2 against 1
     assert (own_row["Put above still"], floor["Pick-up above still"]) == ("-", "-")
     (alone,) = own(table("Low-level", run(records=policy)))
     assert alone["Pick-up above still"] == "-"
@@ -182,7 +225,10 @@ def test_what_is_left_out_is_told_with_its_reason():
 def test_many_reasons_are_counted_at_the_end():
     records = [episode("a", index, "", excluded=f"reason {index}") for index in range(8)]
     notes = table("Low-level", run(records=records)).notes
-    assert notes[1:-1] == (*(f"1 left out: reason {index}" for index in range(5)), "3 more reasons to leave out")
+    assert notes[1:-1] == (
+        *(f"1 left out: reason {index}" for index in range(5)),
+        "3 more reasons to leave out",
+    )
 
 
 def test_an_episode_that_ended_scores_and_no_other_does():

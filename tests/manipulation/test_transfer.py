@@ -43,10 +43,14 @@ def differences(here, wanted, held):
     for key in here.objects.keys() & wanted.objects.keys():
         item, there = here.objects[key], wanted.objects[key]
         found += [(key, state) for state in STATES if getattr(item, state) != getattr(there, state)]
-        apart = math.dist(msgspec.structs.astuple(item.position), msgspec.structs.astuple(there.position))
+        apart = math.dist(
+            msgspec.structs.astuple(item.position), msgspec.structs.astuple(there.position)
+        )
         if there.pickupable and apart > 0.01:
             found.append((key, f"{apart} m away"))
-        if key not in held and sorted(item.parent_receptacles or ()) != sorted(there.parent_receptacles or ()):
+        if key not in held and sorted(item.parent_receptacles or ()) != sorted(
+            there.parent_receptacles or ()
+        ):
             found.append((key, f"in {item.parent_receptacles}, not {there.parent_receptacles}"))
     return found
 
@@ -66,9 +70,13 @@ def test_after_it_every_thing_is_where_and_as_it_should_be(name, request):
 
 def test_the_moments_have_what_makes_it_hard(kitchen, drawers):
     """Slices, open and shut doors, things shut in, and things in the hand."""
-    views = [start.view for start in (*kitchen.states.starts.values(), *drawers.states.starts.values())]
+    views = [
+        start.view for start in (*kitchen.states.starts.values(), *drawers.states.starts.values())
+    ]
     first = kitchen.states.starts[12].view
-    assert any(key not in first.objects for view in views for key in view.objects if "TomatoSliced" in key)
+    assert any(
+        key not in first.objects for view in views for key in view.objects if "TomatoSliced" in key
+    )
     assert {item.object_type for view in views for item in view.objects.values() if item.is_open} >= {
         "Drawer", "Fridge", "Microwave",
     }  # fmt: skip
@@ -76,7 +84,10 @@ def test_the_moments_have_what_makes_it_hard(kitchen, drawers):
     for number, opened in ((59, False), (87, True)):
         view = drawers.states.starts[number].view
         (drawer,) = view.objects[FORK].parent_receptacles
-        assert (view.objects[drawer].object_type, view.objects[drawer].is_open) == ("Drawer", opened)
+        assert (view.objects[drawer].object_type, view.objects[drawer].is_open) == (
+            "Drawer",
+            opened,
+        )
 
 
 def test_it_can_be_done_again_and_from_any_moment_to_any_other_later_one(kitchen):
@@ -108,15 +119,23 @@ def test_states_are_set_either_way(drawers):
     wanted = replace(view, objects=changed)
 
     def states(view):
-        return {key: [getattr(item, state) for state in STATES] for key, item in view.objects.items()}
+        return {
+            key: [getattr(item, state) for state in STATES] for key, item in view.objects.items()
+        }
 
     assert states(wanted) != states(view)
     transfer(drawers.simulator, wanted)
     assert states(drawers.simulator.view) == states(wanted)
     transfer(drawers.simulator, view)
-    cooked = {key for key, item in changed.items() if item.is_cooked and not view.objects[key].is_cooked}
-    back = {key: value for key, value in states(view).items() if key not in cooked}  # nobody uncooks a potato
-    assert {key: value for key, value in states(drawers.simulator.view).items() if key not in cooked} == back
+    cooked = {
+        key for key, item in changed.items() if item.is_cooked and not view.objects[key].is_cooked
+    }
+    back = {
+        key: value for key, value in states(view).items() if key not in cooked
+    }  # nobody uncooks a potato
+    assert {
+        key: value for key, value in states(drawers.simulator.view).items() if key not in cooked
+    } == back
 
 
 def test_what_is_missing_is_named(drawers):
@@ -133,14 +152,18 @@ def test_what_is_missing_is_named(drawers):
 
 def test_an_episode_whose_things_are_missing_counts_for_nobody(drawers):
     start = drawers.states.starts[13]
-    unknown = msgspec.structs.replace(start.view.objects[start.object_id], object_id="Elephant|+01.00|+00.00|+02.00")
+    unknown = msgspec.structs.replace(
+        start.view.objects[start.object_id], object_id="Elephant|+01.00|+00.00|+02.00"
+    )
     view = replace(start.view, objects=start.view.objects | {unknown.object_id: unknown})
     for changes in ({"object_id": unknown.object_id}, {"receptacle_id": unknown.object_id}):
         missing = replace(start, view=view, **changes)
         real = drawers.states.starts
         drawers.states.starts[13] = missing
         try:
-            with pytest.raises(InfeasibleError, match=r"^Elephant\|.* cannot be brought to where it was$"):
+            with pytest.raises(
+                InfeasibleError, match=r"^Elephant\|.* cannot be brought to where it was$"
+            ):
                 drawers.begin(13)
         finally:
             real[13] = start

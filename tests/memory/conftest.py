@@ -11,7 +11,9 @@ def observed():
     """Lets a memory observe steps without a file behind their frames; returns what asks it."""
 
     def observe(memory, n_past, tokens_per_frame=10, logs=(), write=None, name="t", seed=0):
-        facts = TrajectoryFacts(name=name, tokens_per_frame=tokens_per_frame, seed=seed, write=write)
+        facts = TrajectoryFacts(
+            name=name, tokens_per_frame=tokens_per_frame, seed=seed, write=write
+        )
         steps = [
             Observation(
                 number=number,

@@ -15,8 +15,16 @@ def numbers(recalled):
     return [item.number for item in recalled]
 
 
-@given(kind=st.sampled_from(ALL), n_past=st.integers(0, 40), budget=budgets, k=st.integers(1, 50), data=st.data())
-def test_frames_are_distinct_in_time_order_and_as_many_as_there_is_room_for(observed, kind, n_past, budget, k, data):
+@given(
+    kind=st.sampled_from(ALL),
+    n_past=st.integers(0, 40),
+    budget=budgets,
+    k=st.integers(1, 50),
+    data=st.data(),
+)
+def test_frames_are_distinct_in_time_order_and_as_many_as_there_is_room_for(
+    observed, kind, n_past, budget, k, data
+):
     clues = tuple(sorted(data.draw(st.sets(st.integers(0, max(0, n_past)), max_size=5))))
     recalled = observed(kind(k=k), n_past)(budget=budget, clues=clues)
     found = numbers(recalled)
@@ -46,7 +54,17 @@ def test_draws_depend_on_seed_trajectory_and_question_alone(observed):
         return numbers(observed(Random(k=5), 30, **about)(text))
 
     assert drawn() == drawn()
-    assert len({tuple(drawn()), tuple(drawn("What is it?")), tuple(drawn(seed=1)), tuple(drawn(name="u"))}) == 4
+    assert (
+        len(
+            {
+                tuple(drawn()),
+                tuple(drawn("What is it?")),
+                tuple(drawn(seed=1)),
+                tuple(drawn(name="u")),
+            }
+        )
+        == 4
+    )
 
 
 def test_a_model_that_counts_no_tokens_gets_k_frames(observed):

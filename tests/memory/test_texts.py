@@ -36,7 +36,11 @@ def test_the_last_lines_that_fit_the_budget_are_recalled(observed, budget):
     lines = ask()[0].splitlines(keepends=True)
     recalled = ask(budget=budget)
     assert tokens_of(recalled, 10) <= budget
-    fitting = [n for n in range(len(lines) + 1) if math.ceil(len("".join(lines[len(lines) - n :])) / 4) <= budget]
+    fitting = [
+        n
+        for n in range(len(lines) + 1)
+        if math.ceil(len("".join(lines[len(lines) - n :])) / 4) <= budget
+    ]
     assert "".join(recalled) == "".join(lines[len(lines) - fitting[-1] :])
 
 
@@ -48,7 +52,9 @@ def test_notes_are_written_on_every_window_with_the_current_view_in_the_last(obs
         return " a mug\non the  table"
 
     (text,) = observed(Notes(window=2, tokens=7), 4, write=write)()
-    assert text == "".join(f"{at}: a mug on the table\n" for at in ("Steps 0-1", "Steps 2-3", "Step 4"))
+    assert text == "".join(
+        f"{at}: a mug on the table\n" for at in ("Steps 0-1", "Steps 2-3", "Step 4")
+    )
     assert [frames for frames, _, _ in asked] == [["0", "1"], ["2", "3"], ["4"]]
     assert {limit for _, _, limit in asked} == {7}
     assert asked[0][1].startswith("\nSteps 0-1 of an embodied agent's trajectory")

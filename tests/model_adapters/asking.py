@@ -3,7 +3,7 @@
 from typing import Any
 
 from model_adapters import Decoding, Part, Turn
-from model_adapters.hf.prompt import token_ids
+from model_adapters.hf.prompting.prompt import token_ids
 
 __all__ = ["require_same", "talk_of", "up_to", "user"]
 
@@ -26,7 +26,9 @@ def talk_of(model: Any, turns: tuple[Turn, ...]) -> Any:
     return talk
 
 
-def require_same(model: Any, turns: tuple[Turn, ...], ids: list[int], reply: list[int], n_new: int) -> None:
+def require_same(
+    model: Any, turns: tuple[Turn, ...], ids: list[int], reply: list[int], n_new: int
+) -> None:
     """A model of `hf` reads these ids from the turns, and replies what is given, up to where it ends its turn."""
     talk = talk_of(model, turns)
     assert talk.n_tokens == len(ids)

@@ -21,7 +21,9 @@ from transformers import (
     LlavaProcessor,
 )
 from transformers.models.clip.image_processing_pil_clip import CLIPImageProcessorPil
-from transformers.models.deepseek_vl.image_processing_pil_deepseek_vl import DeepseekVLImageProcessorPil
+from transformers.models.deepseek_vl.image_processing_pil_deepseek_vl import (
+    DeepseekVLImageProcessorPil,
+)
 from transformers.models.deepseek_vl.processing_deepseek_vl import DeepseekVLProcessor
 from transformers.models.gemma3.image_processing_pil_gemma3 import Gemma3ImageProcessorPil
 from transformers.models.idefics3.image_processing_pil_idefics3 import Idefics3ImageProcessorPil
@@ -60,7 +62,9 @@ VISION = {
 
 
 def _tokenizer(special: tuple[str, ...], **named: str) -> Any:
-    return train_tokenizer(("<s>", "</s>", *special), begin="<s>", end="</s>", pad="</s>", named=named)
+    return train_tokenizer(
+        ("<s>", "</s>", *special), begin="<s>", end="</s>", pad="</s>", named=named
+    )
 
 
 def _save(folder: Path, model: Any, processor: Any) -> None:
@@ -144,7 +148,12 @@ def _gemma3(folder: Path, line_breaks: tuple[str, ...] = ()) -> None:
         eoi_token_index=ids["eoi_token"],
         mm_tokens_per_image=4,
         vision_config={"model_type": "siglip_vision_model", "vision_use_head": False, **VISION},
-        text_config={"vocab_size": len(tokenizer), "sliding_window": 64, "query_pre_attn_scalar": HEAD, **TEXT},
+        text_config={
+            "vocab_size": len(tokenizer),
+            "sliding_window": 64,
+            "query_pre_attn_scalar": HEAD,
+            **TEXT,
+        },
     )
     model = Gemma3ForConditionalGeneration(config)
     torch.nn.init.normal_(model.model.multi_modal_projector.mm_input_projection_weight, std=0.5)

@@ -70,7 +70,9 @@ for folder, prompts in asked["prompts"].items():
 print(json.dumps(found))
 """
 
-Answers = Callable[[Mapping[Path, Sequence[Sequence[Turn]]], int], dict[Path, list[tuple[list[int], list[int]]]]]
+Answers = Callable[
+    [Mapping[Path, Sequence[Sequence[Turn]]], int], dict[Path, list[tuple[list[int], list[int]]]]
+]
 
 
 @pytest.fixture(scope="session")
@@ -133,7 +135,9 @@ def answer_plainly() -> Answers:
     def answer(prompts: Mapping[Path, Sequence[Sequence[Turn]]], new: int) -> dict[Path, list[Any]]:
         if not PEERS.is_dir():
             pytest.skip("torchvision is not set aside in test-peers (make test does it)")
-        asked = {str(folder): [_as_json(turns) for turns in listed] for folder, listed in prompts.items()}
+        asked = {
+            str(folder): [_as_json(turns) for turns in listed] for folder, listed in prompts.items()
+        }
         run = subprocess.run(
             [sys.executable, "-c", PLAINLY],
             input=json.dumps({"new": new, "prompts": asked}),

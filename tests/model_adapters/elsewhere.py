@@ -20,7 +20,15 @@ __all__ = ["Seen", "elsewhere", "move"]
 
 _HERE, _ELSEWHERE = torch.device("cpu"), torch.device("meta")
 _MOVES = {"_to_copy", "copy_", "to"}
-_READS = {"_local_scalar_dense", "equal", "is_nonzero", "masked_select", "nonzero", "unique_dim", "_unique2"}
+_READS = {
+    "_local_scalar_dense",
+    "equal",
+    "is_nonzero",
+    "masked_select",
+    "nonzero",
+    "unique_dim",
+    "_unique2",
+}
 
 
 @dataclass
@@ -82,7 +90,11 @@ def _ours(leaves: Sequence[Any]) -> list[_Elsewhere]:
 
 
 def _theirs(leaves: Sequence[Any]) -> list[torch.Tensor]:
-    return [leaf for leaf in leaves if isinstance(leaf, torch.Tensor) and not isinstance(leaf, _Elsewhere)]
+    return [
+        leaf
+        for leaf in leaves
+        if isinstance(leaf, torch.Tensor) and not isinstance(leaf, _Elsewhere)
+    ]
 
 
 def _plain(leaf: Any) -> Any:
@@ -112,7 +124,9 @@ def _wrapped(out: Any, ours: Sequence[_Elsewhere], seen: Seen, name: str) -> Any
     return tree_map(wrap, out)
 
 
-def _target(func: Any, args: Sequence[Any], leaves: Sequence[Any], ours: Sequence[_Elsewhere]) -> torch.device:
+def _target(
+    func: Any, args: Sequence[Any], leaves: Sequence[Any], ours: Sequence[_Elsewhere]
+) -> torch.device:
     """Where the result of an operation lies."""
     if func._overloadname == "other":
         return args[1].device  # type: ignore[no-any-return]
@@ -122,7 +136,9 @@ def _target(func: Any, args: Sequence[Any], leaves: Sequence[Any], ours: Sequenc
     return named[0] if named else _ELSEWHERE if ours else _HERE
 
 
-def _dispatched(func: Any, args: Sequence[Any], kwargs: Mapping[str, Any], seen: Seen | None = None) -> Any:
+def _dispatched(
+    func: Any, args: Sequence[Any], kwargs: Mapping[str, Any], seen: Seen | None = None
+) -> Any:
     """Carry out one operation of torch."""
     leaves, name = tree_leaves((args, kwargs)), func._schema.name.removeprefix("aten::")
     ours, theirs = _ours(leaves), _theirs(leaves)
@@ -143,14 +159,22 @@ def _indexed(func: Callable[..., Any], args: Sequence[Any]) -> Any:
     leaves = tree_leaves(args)
     ours, target = _ours(leaves), args[0]
     seen, index = ours[0].seen, args[1] if isinstance(args[1], tuple) else (args[1],)
-    seen.reads["mask"] += sum(isinstance(part, _Elsewhere) and part.dtype == torch.bool for part in index)
+    seen.reads["mask"] += sum(
+        isinstance(part, _Elsewhere) and part.dtype == torch.bool for part in index
+    )
     if isinstance(target, _Elsewhere):
-        seen.brought["index"] += sum(isinstance(part, list) for part in index) + len(_theirs(leaves))
+        seen.brought["index"] += sum(isinstance(part, list) for part in index) + len(
+            _theirs(leaves)
+        )
     else:
         seen.reads["written out"] += 1
     with torch._C.DisableTorchFunction():
         out = func(*tree_map(_plain, args))
-    return out if out is None or not isinstance(target, _Elsewhere) else _wrapped(out, ours, seen, "index")
+    return (
+        out
+        if out is None or not isinstance(target, _Elsewhere)
+        else _wrapped(out, ours, seen, "index")
+    )
 
 
 def _attended(func: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
@@ -158,7 +182,9 @@ def _attended(func: Callable[..., Any], args: Sequence[Any], kwargs: Mapping[str
     if _theirs(leaves):
         raise RuntimeError("attention over tensors on two devices")
     with _disable_current_modes():
-        return _Elsewhere(func(*tree_map(_plain, args), **tree_map(_plain, kwargs)), _ours(leaves)[0].seen)
+        return _Elsewhere(
+            func(*tree_map(_plain, args), **tree_map(_plain, kwargs)), _ours(leaves)[0].seen
+        )
 
 
 class _Making(TorchFunctionMode):

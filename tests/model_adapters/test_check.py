@@ -69,12 +69,18 @@ class HashConversation(Transcript):
         ids = tuple(map(ord, text))
         for string in decoding.stop:
             text = text.split(string)[0]
-        counted = (len(ids), _size(self.turns), 0) if self.capabilities.counts_tokens else (None, None, None)
+        counted = (
+            (len(ids), _size(self.turns), 0)
+            if self.capabilities.counts_tokens
+            else (None, None, None)
+        )
         return Reply(text, *counted, ids if self.capabilities.token_ids else None)
 
     def text(self, decoding: Decoding) -> str:
         parts = [(turn.role, part) for turn in self.turns for part in turn.parts]
-        key = "\n".join(f"{role}:{part if isinstance(part, str) else part.digest}" for role, part in parts)
+        key = "\n".join(
+            f"{role}:{part if isinstance(part, str) else part.digest}" for role, part in parts
+        )
         if not decoding.greedy:
             key += f"\n{decoding.seed}"
         if not self.capabilities.deterministic:
@@ -86,7 +92,9 @@ class HashConversation(Transcript):
 
 
 def _size(turns: Sequence[Turn]) -> int:
-    return sum(len(part) if isinstance(part, str) else 10 for turn in turns for part in turn.parts) + len(turns)
+    return sum(
+        len(part) if isinstance(part, str) else 10 for turn in turns for part in turn.parts
+    ) + len(turns)
 
 
 def _able(**capabilities: Any) -> Model:
@@ -173,15 +181,21 @@ def _reply_with_any_choices(self: Any, decoding: Decoding) -> Reply:
     return HashConversation.reply(self, replace(decoding, choices=()))
 
 
-def _replies_to_the_first(self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+def _replies_to_the_first(
+    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
+) -> list[Reply]:
     return Transcript.replies(self, continuations[:1], decoding)
 
 
-def _replies_backwards(self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+def _replies_backwards(
+    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
+) -> list[Reply]:
     return Transcript.replies(self, continuations, decoding)[::-1]
 
 
-def _replies_that_append(self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
+def _replies_that_append(
+    self: Any, continuations: Sequence[Sequence[Part]], decoding: Decoding
+) -> list[Reply]:
     self.append(*continuations[0])
     return Transcript.replies(self, continuations, decoding)
 
@@ -229,7 +243,10 @@ def _rewind_anywhere(self: Any, mark: Mark) -> None:
             {"reply": _reply_to_anything},
             "reply.. to an empty conversation does not raise ModelError; call",
         ),
-        ({"reply": _reply_to_the_assistant}, "whose last turn is the assistant's does not raise ModelError"),
+        (
+            {"reply": _reply_to_the_assistant},
+            "whose last turn is the assistant's does not raise ModelError",
+        ),
         ({"reply": _reply_without_ids}, "a reply has no token_ids"),
         ({"reply": _reply_with_more_ids}, "n_reply_tokens is not the number of token_ids"),
         (
@@ -253,7 +270,10 @@ def test_a_broken_conversation_is_named(methods: dict[str, Any], clause: str) ->
 
 @pytest.mark.parametrize(
     ("identity", "clause"),
-    [(lambda self: {"a": {1}}, "JSON values"), (lambda self: {"a": (1,)}, "changes when written as JSON")],
+    [
+        (lambda self: {"a": {1}}, "JSON values"),
+        (lambda self: {"a": (1,)}, "changes when written as JSON"),
+    ],
 )
 def test_a_broken_identity_is_named(identity: Method, clause: str) -> None:
     with pytest.raises(ContractError, match=clause):
@@ -276,7 +296,9 @@ def test_a_wrong_count_of_a_frames_tokens_is_named(count: int) -> None:
         ({"max_in_flight": 0}, "max_in_flight is below 1"),
     ],
 )
-def test_capabilities_that_are_not_the_models_are_named(claims: dict[str, Any], clause: str) -> None:
+def test_capabilities_that_are_not_the_models_are_named(
+    claims: dict[str, Any], clause: str
+) -> None:
     broken = type("Broken", (HashModel,), {"capabilities": Capabilities(**claims)})()
     broken.conversation = HashConversation
     with pytest.raises(ContractError, match=clause):
@@ -308,18 +330,26 @@ def _text_of_no_choice(self: Any, decoding: Decoding) -> str:
 
 
 def _text_drawn_anew(self: Any, decoding: Decoding) -> str:
-    return HashConversation.text(self, replace(decoding, seed=decoding.seed + random.getrandbits(60)))
+    return HashConversation.text(
+        self, replace(decoding, seed=decoding.seed + random.getrandbits(60))
+    )
 
 
 @pytest.mark.parametrize(
     ("capabilities", "text", "clause"),
     [
         (Capabilities(sampling=True), _text_of_no_seed, "no seed changes a reply at temperature 2"),
-        (Capabilities(sampling=True), _text_drawn_anew, "the same seed does not give the same reply"),
+        (
+            Capabilities(sampling=True),
+            _text_drawn_anew,
+            "the same seed does not give the same reply",
+        ),
         (Capabilities(choices=True), _text_of_no_choice, "a reply is none of its choices"),
     ],
 )
-def test_a_claim_that_does_not_hold_is_named(capabilities: Capabilities, text: Method, clause: str) -> None:
+def test_a_claim_that_does_not_hold_is_named(
+    capabilities: Capabilities, text: Method, clause: str
+) -> None:
     with pytest.raises(ContractError, match=clause):
         check_adapter(_talking(capabilities, text=text))
 
@@ -346,5 +376,7 @@ def test_what_is_missing_is_named() -> None:
     with pytest.raises(ContractError, match=r"object lacks a member of Model: .*tokens_per_frame"):
         check_adapter(object())  # type: ignore[arg-type]
     silent = type("Silent", (HashModel,), {"conversation": lambda self: Transcript()})()
-    with pytest.raises(ContractError, match="Transcript lacks a member of Conversation: n_tokens, reply"):
+    with pytest.raises(
+        ContractError, match="Transcript lacks a member of Conversation: n_tokens, reply"
+    ):
         check_adapter(silent)

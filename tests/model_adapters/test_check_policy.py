@@ -69,9 +69,13 @@ def test_no_step_is_named() -> None:
 
 def test_an_episode_that_is_remembered_is_named_unless_chance_is_admitted() -> None:
     remembering = type("Remembering", (Scripted,), {"reset": lambda self: None})
-    with pytest.raises(ContractError, match=r"after reset\(\) the same frames do not give the same actions"):
+    with pytest.raises(
+        ContractError, match=r"after reset\(\) the same frames do not give the same actions"
+    ):
         check_adapter(remembering())
-    check_adapter(type("Random", (remembering,), {"capabilities": Capabilities(deterministic=False)})())
+    check_adapter(
+        type("Random", (remembering,), {"capabilities": Capabilities(deterministic=False)})()
+    )
 
 
 def test_a_policy_without_reset_or_with_a_bad_identity_is_named() -> None:

@@ -2,9 +2,9 @@
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.storage.packaged import packaged_folder
 from model_adapters import Decoding, check_adapter, load
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 

@@ -50,6 +50,8 @@ def test_what_does_not_fit_is_named_with_all_options(given: dict[str, str], comp
     assert "it takes: text=a, count=3, part=0.5, flag=true, limit=none" in str(caught.value)
 
 
-@pytest.mark.parametrize(("options", "shown"), [(NoOptions, "no options"), (Options, "text=a, count=3")])
+@pytest.mark.parametrize(
+    ("options", "shown"), [(NoOptions, "no options"), (Options, "text=a, count=3")]
+)
 def test_describe(options: Any, shown: str) -> None:
     assert describe(options).startswith(shown)

@@ -26,7 +26,11 @@ def test_what_a_model_can_do_is_let_through(able: dict[str, Any], asked: dict[st
 @pytest.mark.parametrize(
     ("able", "asked", "complaint"),
     [
-        ({"choices": True}, {"temperature": 0.5}, "m decodes greedily only, not at temperature 0.5; ask at"),
+        (
+            {"choices": True},
+            {"temperature": 0.5},
+            "m decodes greedily only, not at temperature 0.5; ask at",
+        ),
         (
             {"sampling": True},
             {"choices": ("yes", "no")},
@@ -34,21 +38,30 @@ def test_what_a_model_can_do_is_let_through(able: dict[str, Any], asked: dict[st
         ),
     ],
 )
-def test_what_it_cannot_do_is_refused(able: dict[str, Any], asked: dict[str, Any], complaint: str) -> None:
+def test_what_it_cannot_do_is_refused(
+    able: dict[str, Any], asked: dict[str, Any], complaint: str
+) -> None:
     with pytest.raises(ModelError, match=complaint):
         check_decoding("m", Capabilities(**able), up_to(3, **asked))
 
 
 def test_only_a_users_turn_can_be_replied_to() -> None:
     check_turns("m", Capabilities(), user("What?"))
-    with pytest.raises(ModelError, match="m has nothing to reply to: the conversation is empty; append a user turn"):
+    with pytest.raises(
+        ModelError, match="m has nothing to reply to: the conversation is empty; append a user turn"
+    ):
         check_turns("m", Capabilities(), ())
-    with pytest.raises(ModelError, match="nothing to reply to: the last turn is the assistant's; append a user turn"):
+    with pytest.raises(
+        ModelError,
+        match="nothing to reply to: the last turn is the assistant's; append a user turn",
+    ):
         check_turns("m", Capabilities(), (*user("What?"), Turn("assistant", ("This.",))))
 
 
 def test_a_video_needs_a_video_input(tmp_path: Path) -> None:
     turns = user(Video((FrameRef(tmp_path / "a.png"),), 1.0), "What?")
     check_turns("m", Capabilities(video_input=True), turns)
-    with pytest.raises(ModelError, match="m has no video input; give it the video's frames as images"):
+    with pytest.raises(
+        ModelError, match="m has no video input; give it the video's frames as images"
+    ):
         check_turns("m", Capabilities(), turns)

@@ -10,7 +10,17 @@ from typing import Any
 import pytest
 
 from infthor_eval.errors import ModelError, UsageError
-from model_adapters import Capabilities, Policy, adapter_identity, label, load, model_note, names, options, registry
+from model_adapters import (
+    Capabilities,
+    Policy,
+    adapter_identity,
+    label,
+    load,
+    model_note,
+    names,
+    options,
+    registry,
+)
 from model_adapters.built_in import BUILT_IN
 from model_adapters.options import NoOptions
 from model_adapters.registry import model_description
@@ -48,7 +58,9 @@ def test_far_off_name_lists_all() -> None:
 
 
 def test_unknown_option_names_the_nearest_and_all_with_defaults() -> None:
-    with pytest.raises(UsageError, match=r"no option dtyp; did you mean dtype\?.*share_prefix=true"):
+    with pytest.raises(
+        UsageError, match=r"no option dtyp; did you mean dtype\?.*share_prefix=true"
+    ):
         load("qwen2.5-vl-tiny", {"dtyp": "float32"}, 0)
 
 
@@ -94,7 +106,9 @@ class Outside:
 
 def _install(monkeypatch: pytest.MonkeyPatch, target: str, name: str = "outside") -> None:
     point = EntryPoint(name, target, registry.ENTRY_POINTS)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [point] if group == point.group else [])
+    monkeypatch.setattr(
+        registry, "entry_points", lambda group: [point] if group == point.group else []
+    )
 
 
 def _import_as_outside(monkeypatch: pytest.MonkeyPatch, adapter: type) -> None:
@@ -102,7 +116,9 @@ def _import_as_outside(monkeypatch: pytest.MonkeyPatch, adapter: type) -> None:
     monkeypatch.setattr("outside_package.Outside", adapter, raising=False)
 
 
-def test_models_of_other_packages_come_through_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_models_of_other_packages_come_through_entry_points(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     _install(monkeypatch, "outside_package:Outside")
     _import_as_outside(monkeypatch, Outside)
     model: Any = load("outside", {"sure": "yes"}, 7)
@@ -119,7 +135,9 @@ def test_models_of_other_packages_come_through_entry_points(monkeypatch: pytest.
         ("json:loads", "Options and build"),
     ],
 )
-def test_a_broken_entry_point_is_one_line(monkeypatch: pytest.MonkeyPatch, target: str, complaint: str) -> None:
+def test_a_broken_entry_point_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, target: str, complaint: str
+) -> None:
     _install(monkeypatch, target)
     with pytest.raises(ModelError, match=complaint):
         load("outside", {}, 0)
@@ -149,7 +167,9 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_an_adapter_of_another_package_has_its_version_and_source_in_its_identity(installed: Path) -> None:
+def test_an_adapter_of_another_package_has_its_version_and_source_in_its_identity(
+    installed: Path,
+) -> None:
     before = adapter_identity("dummy")
     assert before.keys() == {"package", "version", "source"}
     assert (before["package"], before["version"]) == ("Dummy-Robot", "1.2")
@@ -187,7 +207,10 @@ def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path)
         ({}, "qwen2.5-vl"),
         ({"dtype": "float32"}, "qwen2.5-vl"),
         ({"pretrained": "Qwen/Qwen2.5-VL-3B-Instruct"}, "Qwen2.5-VL-3B-Instruct"),
-        ({"pretrained": "Qwen/Qwen2.5-VL-3B-Instruct", "revision": "refs/pr/1"}, "Qwen2.5-VL-3B-Instruct@refs-pr-1"),
+        (
+            {"pretrained": "Qwen/Qwen2.5-VL-3B-Instruct", "revision": "refs/pr/1"},
+            "Qwen2.5-VL-3B-Instruct@refs-pr-1",
+        ),
         ({"pretrained": "/data/my models/step 10/"}, "step-10"),
         ({"pretrained": "~/.hidden"}, "hidden"),
         ({"pretrained": ""}, "qwen2.5-vl"),
@@ -200,7 +223,9 @@ def test_a_run_is_called_by_its_checkpoint(given: dict[str, str], expected: str)
 
 
 @pytest.mark.parametrize("pretrained", [".", "..", "/", "./", "../.."])
-def test_any_label_is_one_component_of_a_path(pretrained: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_any_label_is_one_component_of_a_path(
+    pretrained: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = tmp_path / "here" / "there"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
@@ -215,7 +240,9 @@ def test_tiny_models_are_described_as_random_and_the_nano_model_as_trained() -> 
     assert len(tiny) == 6
     for name in tiny:
         assert (
-            model_description(name) == model_note(name) == "random weights, for trying the harness; scores are near 0"
+            model_description(name)
+            == model_note(name)
+            == "random weights, for trying the harness; scores are near 0"
         )
     assert model_description("qwen2.5-vl-nano") == "small, trained, bundled with the package"
     assert (model_note("qwen2.5-vl-nano"), model_description("qwen2.5-vl")) == ("", "")

@@ -45,35 +45,49 @@ def test_a_turn_of_nothing_is_none_and_its_neighbours_touch() -> None:
 
 
 SAID = st.lists(
-    st.tuples(st.sampled_from(ROLES), st.lists(st.one_of(st.text("ab", max_size=2), st.integers(0, 5)), max_size=3)),
+    st.tuples(
+        st.sampled_from(ROLES),
+        st.lists(st.one_of(st.text("ab", max_size=2), st.integers(0, 5)), max_size=3),
+    ),
     max_size=8,
 )
 
 
 def _append(talk: Transcript, message: Any, frames: list[FrameRef]) -> None:
     for role, numbered in message:
-        talk.append(*(frames[part] if isinstance(part, int) else part for part in numbered), role=role)
+        talk.append(
+            *(frames[part] if isinstance(part, int) else part for part in numbered), role=role
+        )
 
 
 def _letters(message: Any) -> list[tuple[Role, str | int]]:
-    whole = [(role, part if isinstance(part, str) else [part]) for role, parts in message for part in parts]
+    whole = [
+        (role, part if isinstance(part, str) else [part])
+        for role, parts in message
+        for part in parts
+    ]
     return [(role, each) for role, part in whole for each in part]
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(message=SAID, more=SAID)
-def test_turns_hold_what_was_said_and_leave_no_joint(frames: list[FrameRef], message: Any, more: Any) -> None:
+def test_turns_hold_what_was_said_and_leave_no_joint(
+    frames: list[FrameRef], message: Any, more: Any
+) -> None:
     talk = Transcript()
     _append(talk, message, frames)
     turns, here = talk.turns, talk.mark()
     numbered = [
-        (turn.role, [part if isinstance(part, str) else frames.index(part) for part in turn.parts]) for turn in turns
+        (turn.role, [part if isinstance(part, str) else frames.index(part) for part in turn.parts])
+        for turn in turns
     ]
     assert _letters(numbered) == _letters(message)
     assert all(turn.parts for turn in turns)
     assert all(one.role != other.role for one, other in pairwise(turns))
     assert not any(
-        isinstance(one, str) and isinstance(other, str) for turn in turns for one, other in pairwise(turn.parts)
+        isinstance(one, str) and isinstance(other, str)
+        for turn in turns
+        for one, other in pairwise(turn.parts)
     )
     _append(talk, more, frames)
     talk.rewind(here)

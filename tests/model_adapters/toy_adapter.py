@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from infthor_eval.formats.digests import digest
+from infthor_eval.storage.digests import digest
 from model_adapters import Capabilities, Reply, Transcript, check_decoding, check_turns
 
 CAPABILITIES = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=3)
@@ -19,7 +19,13 @@ class Talk(Transcript):
     def reply(self, decoding):
         check_decoding("toy", CAPABILITIES, decoding)
         check_turns("toy", CAPABILITIES, self.turns)
-        text = digest("\n".join(part if isinstance(part, str) else part.digest for t in self.turns for part in t.parts))
+        text = digest(
+            "\n".join(
+                part if isinstance(part, str) else part.digest
+                for t in self.turns
+                for part in t.parts
+            )
+        )
         for stop in decoding.stop:
             text = text.split(stop)[0]
         return Reply(text[: decoding.max_new_tokens])

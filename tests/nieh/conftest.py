@@ -20,9 +20,13 @@ def data(make_nieh_set: Callable[..., Path]) -> Path:
 def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
     """A run on that set, ready to be executed; keyword arguments are the model's and those of `RunOptions`."""
 
-    def make(model: str = "oracle", model_options: dict[str, str] | None = None, **changes: object) -> PreparedRun:
+    def make(
+        model: str = "oracle", model_options: dict[str, str] | None = None, **changes: object
+    ) -> PreparedRun:
         settings = {"tasks": ("nieh",), "data": data, "output": tmp_path / "out", **changes}
-        ((request, suite),) = RunOptions((ModelSpec(model, model_options or {}),), **settings).requests()
+        ((request, suite),) = RunOptions(
+            (ModelSpec(model, model_options or {}),), **settings
+        ).requests()
         return prepare(request, suite)
 
     return make

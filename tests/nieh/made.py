@@ -4,8 +4,8 @@ from typing import Any
 
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.results.summary import NiehSummary, summarise
 from infthor_eval.nieh.scoring import SCORERS, scores
-from infthor_eval.nieh.summary import NiehSummary, summarise
 from infthor_eval.runs import RunHeader, RunSummary, Tokens, UnitRecord
 
 _PAYLOAD = ("question", "question_type", "file", "guess", "shown_clues", "recall")
@@ -24,8 +24,12 @@ def record(
     about |= {name: changes.pop(name) for name in _PAYLOAD if name in changes}
     found = {} if reply is None else scores(reply, answers)
     found = changes.pop("scores", found)
-    column = Question("t", "?", tuple(range(max(1, n_clues))), answers, absence=n_clues == 0).clue_column
-    payload = NiehAnswer(**about, n_clues=n_clues, clue_column=column, answers=answers, reply=reply, scores=found)
+    column = Question(
+        "t", "?", tuple(range(max(1, n_clues))), answers, absence=n_clues == 0
+    ).clue_column
+    payload = NiehAnswer(
+        **about, n_clues=n_clues, clue_column=column, answers=answers, reply=reply, scores=found
+    )
     fields = {
         "task": "nieh_gt",
         "id": f"q{number}",
@@ -55,14 +59,19 @@ def identity(
         "metrics": {"names": list(metrics)},
         "data": "d",
         "simulator": simulator,
-        "skipped": [{"question_id": f"x{i}", "variant": "", "reason": reason} for i, reason in enumerate(skipped)],
+        "skipped": [
+            {"question_id": f"x{i}", "variant": "", "reason": reason}
+            for i, reason in enumerate(skipped)
+        ],
     }
     named = {"name": model, "checkpoint": checkpoint, "n_parameters": n_parameters}
     model_identity = {key: value for key, value in named.items() if value is not None}
     return {"model": model_identity, "tasks": {"nieh_gt": about}, "frames": frames}
 
 
-def run_of(about: dict[str, Any], records: list[UnitRecord[NiehAnswer]], name: str = "a run") -> RunSummary:
+def run_of(
+    about: dict[str, Any], records: list[UnitRecord[NiehAnswer]], name: str = "a run"
+) -> RunSummary:
     """The run with these records, summed up."""
     found: NiehSummary = summarise(about, records)
     return RunSummary(RunHeader(suite="nieh", name=name, config=about), found)

@@ -21,7 +21,9 @@ def requests(make_nieh_set):
     root = make_nieh_set(QUESTIONS, n_frames=6, size=24)
 
     def find(frames, context="trajectory", seed=0):
-        found = find_samples({"context": context, "data": str(root), "frames": frames, "seed": seed})
+        found = find_samples(
+            {"context": context, "data": str(root), "frames": frames, "seed": seed}
+        )
         made = []
         for sample in found.samples:
             parts, text = found.request(sample)
@@ -71,7 +73,9 @@ def test_shuffled_frames_are_the_same_in_another_order_for_every_question(reques
 
 
 def test_other_frames_are_those_at_the_same_places_of_another_trajectory(requests):
-    for (traj_id, parts, _), (_, others, _) in zip(requests("shown", "clues"), requests("other", "clues"), strict=True):
+    for (traj_id, parts, _), (_, others, _) in zip(
+        requests("shown", "clues"), requests("other", "clues"), strict=True
+    ):
         assert {name[0] for name in names(others)} < {"a", "b", "c"} - {traj_id}
         assert [name[1:] for name in names(others)] == [name[1:] for name in names(parts)]
     assert requests("other") == requests("other")
@@ -79,7 +83,9 @@ def test_other_frames_are_those_at_the_same_places_of_another_trajectory(request
 
 
 def test_what_cannot_be_is_refused(requests, make_nieh_set):
-    with pytest.raises(UsageError, match="frames is 'none'; it is one of shown, blank, shuffled, other"):
+    with pytest.raises(
+        UsageError, match="frames is 'none'; it is one of shown, blank, shuffled, other"
+    ):
         requests("none")
     root = make_nieh_set(QUESTIONS[:2], name="one")
     with pytest.raises(UsageError, match="on one trajectory only"):

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from infthor_eval.errors import DataError
-from infthor_eval.nieh.baselines import Oracle
+from infthor_eval.nieh.asking.baselines import Oracle
 from infthor_eval.nieh.metrics import PUBLISHED, metrics_of
 from infthor_eval.runs import Catalog, execute
 
@@ -54,7 +54,10 @@ def test_the_files_function_makes_the_scores_and_the_published_scorers_stay_out(
     found = document["summary"]["tasks"]["nieh_own"]
     assert found["metrics"] == ["letters", "plain"]
     scores = found["by_clues"]["total"]["scores"]
-    assert {name: score["mean"] for name, score in scores.items()} == {"letters": pytest.approx(0.27), "plain": 0.6}
+    assert {name: score["mean"] for name, score in scores.items()} == {
+        "letters": pytest.approx(0.27),
+        "plain": 0.6,
+    }
 
 
 def test_tasks_with_and_without_metrics_of_their_own_run_together(prepared, own):
@@ -76,20 +79,34 @@ def test_another_source_of_the_function_is_another_run(prepared, own):
 
 
 BAD_REPLIES = [
-    ("    return {'letters': 1 / 0, 'plain': 1}\n", "ZeroDivisionError in own.py:2 (measure)", "division by zero"),
+    (
+        "    return {'letters': 1 / 0, 'plain': 1}\n",
+        "ZeroDivisionError in own.py:2 (measure)",
+        "division by zero",
+    ),
     ("    return {'letters': 1.0}\n", "KeyError in metrics.py:", "no 'plain'"),
     (
         "    return {'letters': 'many', 'plain': 1}\n",
         "ValueError in metrics.py:",
         "could not convert string to float: 'many'",
     ),
-    ("    return {'letters': float('nan'), 'plain': 1}\n", "ValueError in metrics.py:", "letters is nan"),
-    ("    return {'letters': 1, 'plain': float('inf')}\n", "ValueError in metrics.py:", "plain is inf"),
+    (
+        "    return {'letters': float('nan'), 'plain': 1}\n",
+        "ValueError in metrics.py:",
+        "letters is nan",
+    ),
+    (
+        "    return {'letters': 1, 'plain': float('inf')}\n",
+        "ValueError in metrics.py:",
+        "plain is inf",
+    ),
     ("    pass\nmeasure = 3\n", "TypeError in metrics.py:", "'int' object is not callable"),
 ]
 
 
-@pytest.mark.parametrize(("body", "place", "said"), BAD_REPLIES, ids=[said for _, _, said in BAD_REPLIES])
+@pytest.mark.parametrize(
+    ("body", "place", "said"), BAD_REPLIES, ids=[said for _, _, said in BAD_REPLIES]
+)
 def test_a_function_that_fails_fails_the_sample_by_name_and_place(prepared, own, body, place, said):
     own(f"def measure(doc, results):\n{body}")
     outcome = execute(prepared(tasks=("nieh_own",)))
@@ -98,13 +115,19 @@ def test_a_function_that_fails_fails_the_sample_by_name_and_place(prepared, own,
         assert record.failure.startswith(f"process_results fails on {record.id}: {place}")
         assert record.failure.endswith(f": {said}; traceback in journal/tracebacks.txt")
         assert "\n" not in record.failure
-    assert (outcome.folder / "journal" / "tracebacks.txt").read_text().count("attempt 1\nTraceback (most") == 1
+    assert (outcome.folder / "journal" / "tracebacks.txt").read_text().count(
+        "attempt 1\nTraceback (most"
+    ) == 1
     again = execute(prepared(tasks=("nieh_own",)))  # its journal can be read
     assert {record.attempt for record in again.records} == {2}
 
 
 def test_a_function_that_fails_on_one_reply_costs_one_sample(prepared, own):
-    own(MEASURE.replace("    said,", "    assert 'sink' not in doc['question'], 'no\\nsink'\n    said,"))
+    own(
+        MEASURE.replace(
+            "    said,", "    assert 'sink' not in doc['question'], 'no\\nsink'\n    said,"
+        )
+    )
     outcome = execute(prepared(tasks=("nieh_own",)))
     (failed,) = [record for record in outcome.records if record.failure]
     assert failed.payload.question == "Is there a sink?"
@@ -115,21 +138,49 @@ def test_a_function_that_fails_on_one_reply_costs_one_sample(prepared, own):
 
 LIST = OWN[OWN.index("metric_list") :]
 BAD_FILES = [
-    (OWN.replace("aggregation: mean", "aggregation: median"), MEASURE, "metric_list: letters is not averaged"),
+    (
+        OWN.replace("aggregation: mean", "aggregation: median"),
+        MEASURE,
+        "metric_list: letters is not averaged",
+    ),
     (OWN.replace(LIST, "metric_list: []\n"), MEASURE, "names its metrics under metric_list"),
-    (OWN.replace(LIST, "metric_list: [letters]\n"), MEASURE, "metric_list: 'letters' is not a mapping"),
-    (OWN.replace(LIST, "metric_list: [{aggregation: mean}]\n"), MEASURE, "metric_list: .* is not a mapping"),
-    (OWN.replace("higher_is_better: true", "higher_is_better: false"), MEASURE, "letters is better when lower"),
-    (OWN.replace("own.measure", "own.gauge"), MEASURE, "process_results own.gauge cannot be imported"),
-    (OWN.replace("own.measure", "nowhere_at_all.measure"), MEASURE, "nowhere_at_all.measure cannot be imported"),
+    (
+        OWN.replace(LIST, "metric_list: [letters]\n"),
+        MEASURE,
+        "metric_list: 'letters' is not a mapping",
+    ),
+    (
+        OWN.replace(LIST, "metric_list: [{aggregation: mean}]\n"),
+        MEASURE,
+        "metric_list: .* is not a mapping",
+    ),
+    (
+        OWN.replace("higher_is_better: true", "higher_is_better: false"),
+        MEASURE,
+        "letters is better when lower",
+    ),
+    (
+        OWN.replace("own.measure", "own.gauge"),
+        MEASURE,
+        "process_results own.gauge cannot be imported",
+    ),
+    (
+        OWN.replace("own.measure", "nowhere_at_all.measure"),
+        MEASURE,
+        "nowhere_at_all.measure cannot be imported",
+    ),
     (OWN.replace("own.measure", "measure"), MEASURE, "process_results measure cannot be imported"),
     (OWN, "def measure(:\n", "process_results own.measure cannot be imported"),
     (OWN, "1 / 0\n", "process_results own.measure cannot be imported .*division by zero"),
 ]
 
 
-@pytest.mark.parametrize(("content", "function", "said"), BAD_FILES, ids=[said for *_, said in BAD_FILES])
-def test_a_file_whose_metrics_cannot_be_had_is_refused_in_one_line(prepared, own, content, function, said):
+@pytest.mark.parametrize(
+    ("content", "function", "said"), BAD_FILES, ids=[said for *_, said in BAD_FILES]
+)
+def test_a_file_whose_metrics_cannot_be_had_is_refused_in_one_line(
+    prepared, own, content, function, said
+):
     own(function, content)
     with pytest.raises(DataError, match=said) as caught:
         prepared(tasks=("nieh_own",))
@@ -149,12 +200,17 @@ def test_of_our_scorers_a_task_has_those_that_it_lists(own):
     own(task=ours.replace(LIST, "metric_list: [{metric: reference}]\n"))
     assert (metrics_of(task()).names, metrics_of(task()).code) == (("reference",), {})
     own(task=ours)
-    with pytest.raises(DataError, match="letters is none of our scorers, reference, strict; name its process_results"):
+    with pytest.raises(
+        DataError,
+        match="letters is none of our scorers, reference, strict; name its process_results",
+    ):
         metrics_of(task())
 
 
 def test_baselines_are_measured_by_the_files_function_too(prepared, own):
-    own("def measure(doc, results):\n    return {'letters': results[0] == doc['question'], 'plain': True}\n")
+    own(
+        "def measure(doc, results):\n    return {'letters': results[0] == doc['question'], 'plain': True}\n"
+    )
     (found,) = execute(prepared(Oracle.name, tasks=("nieh_own",))).summary.summary.tasks.values()
     assert found.by_clues["total"].scores["letters"].mean == 0.0
     assert found.by_clues["total"].scores["plain"].mean == 1.0

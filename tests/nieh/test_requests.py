@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from infthor_eval.formats.digests import digest
 from infthor_eval.formats.video import Video
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import Catalog
+from infthor_eval.storage.digests import digest
 
 # By task: samples asked, samples skipped, digest of all requests (frames by name). Contexts that a CLIP model or a
 # memory chooses are not among them.
@@ -68,6 +68,11 @@ def test_requests_are_what_they_were(task):
 
 def test_every_task_is_among_them():
     retrieved = {"nieh_clip_retrieval", "nieh_published_clip_10", "nieh_published_clip_20"}
-    by_others = retrieved | {"nieh_memory", "nieh_memory_frames", "nieh_memory_notes", "nieh_mini_memory"}
+    by_others = retrieved | {
+        "nieh_memory",
+        "nieh_memory_frames",
+        "nieh_memory_notes",
+        "nieh_mini_memory",
+    }
     ours = {name for name, task in Catalog.find_packaged().tasks.items() if task.suite == "nieh"}
     assert set(EXPECTED) == ours - by_others

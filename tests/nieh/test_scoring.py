@@ -11,7 +11,9 @@ from infthor_eval.nieh import score
 from infthor_eval.nieh.scoring import scores
 
 GOLDENS = Path(__file__).parents[1] / "goldens"
-names = st.from_regex(r"[a-z]{3,9}( [a-z]{3,9})?", fullmatch=True).filter(lambda name: "and" not in name.split())
+names = st.from_regex(r"[a-z]{3,9}( [a-z]{3,9})?", fullmatch=True).filter(
+    lambda name: "and" not in name.split()
+)
 answers = st.lists(names, min_size=1, max_size=5)
 
 
@@ -137,7 +139,9 @@ def test_one_answer_more_than_there_are_costs_something(gold, more):
 def test_a_wrong_answer_more_never_gains(said, gold, wrong):
     if score(wrong, [gold[0]], "strict") or any(score(wrong, [item], "strict") for item in gold):
         return
-    assert score(", ".join([*said, wrong]), gold, "strict") <= score(", ".join(said), gold, "strict")
+    assert score(", ".join([*said, wrong]), gold, "strict") <= score(
+        ", ".join(said), gold, "strict"
+    )
 
 
 @given(answers, st.randoms())

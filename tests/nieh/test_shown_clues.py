@@ -33,7 +33,12 @@ def clues(n_shown, n_clues, n_after):
 
 @pytest.mark.parametrize(
     ("numbers", "expected"),
-    [((8, 7), clues(2, 2, 1)), ((5, 6), clues(1, 2, 3)), ((1, 4, 2), clues(0, 3, 5)), ((9, 9, 3), clues(1, 2, 0))],
+    [
+        ((8, 7), clues(2, 2, 1)),
+        ((5, 6), clues(1, 2, 3)),
+        ((1, 4, 2), clues(0, 3, 5)),
+        ((9, 9, 3), clues(1, 2, 0)),
+    ],
     ids=["all", "some", "none", "a clue twice"],
 )
 def test_the_end_of_a_trajectory_shows_late_clues(shown, numbers, expected):
@@ -59,9 +64,14 @@ def test_clues_that_follow_each_other_can_reach_out_of_the_haystack(shown):
 
 def test_retrieved_frames_show_the_clues_among_them(make_nieh_set):
     question = Question("t", "Where was the mug?", (4, 5, 7), ("Shelf",))
-    data, context = NiehSet(make_nieh_set([question], n_frames=10, size=8)), CONTEXTS["clip_retrieval"]
+    data, context = (
+        NiehSet(make_nieh_set([question], n_frames=10, size=8)),
+        CONTEXTS["clip_retrieval"],
+    )
     retrieved = Sample(question, (1, 4, 7))  # as the retriever gives them, in time order
-    assert shown_clues(TaskSamples(data, "clip_retrieval", context, [], [], {}), retrieved) == clues(2, 3, 2)
+    assert shown_clues(
+        TaskSamples(data, "clip_retrieval", context, [], [], {}), retrieved
+    ) == clues(2, 3, 2)
 
 
 # A frame a second of a film of 50 frames would be five, and is rounded down to four: 0, 16, 33 and 49.
@@ -69,12 +79,18 @@ def test_retrieved_frames_show_the_clues_among_them(make_nieh_set):
     ("fps", "numbers", "expected"),
     [
         (1, (16, 17, 33), clues(2, 3, 16)),
-        (1, (1, 2, 3), clues(0, 3, 46)),  # positions in the film that is shown, not in the trajectory
+        (
+            1,
+            (1, 2, 3),
+            clues(0, 3, 46),
+        ),  # positions in the film that is shown, not in the trajectory
         (10, (16, 17, 33), clues(3, 3, 16)),
     ],
 )
 @pytest.mark.parametrize("has_film", [True, False])
-def test_a_video_shows_the_frames_sampled_from_it(shown, write_video, has_film, fps, numbers, expected):
+def test_a_video_shows_the_frames_sampled_from_it(
+    shown, write_video, has_film, fps, numbers, expected
+):
     def prepare(root):
         if has_film:
             write_video(root / "metadata" / "t" / "t_10fps.mp4", range(0, 250, 5))
@@ -85,7 +101,9 @@ def test_a_video_shows_the_frames_sampled_from_it(shown, write_video, has_film, 
 def test_frames_are_counted_by_their_place_not_their_number(shown):
     def number_by_tens(root):
         path = root / "metadata" / "t" / "metadata.json"
-        entries = [entry | {"img_idx": 10 * entry["img_idx"]} for entry in json.loads(path.read_text())]
+        entries = [
+            entry | {"img_idx": 10 * entry["img_idx"]} for entry in json.loads(path.read_text())
+        ]
         path.write_text(json.dumps(entries))
 
     settings = {"ctx_size": 2, "tokens_per_frame": 512, "prepare": number_by_tens}

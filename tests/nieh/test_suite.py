@@ -28,11 +28,17 @@ def cells(outcome):
 def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepared):
     outcome = execute(prepared())
     assert Counter(record.task for record in outcome.records) == {"nieh_gt": 5, "nieh_full": 5}
-    assert all(record.payload.reply == ", ".join(map(str, record.payload.answers)) for record in outcome.records)
+    assert all(
+        record.payload.reply == ", ".join(map(str, record.payload.answers))
+        for record in outcome.records
+    )
     export(outcome)
     (results,) = outcome.folder.glob("lm_eval/*/results_*.json")
     measured = json.loads(results.read_text())["results"]
-    assert {task: measured[task]["strict,none"] for task in measured} == {"nieh_gt": 1.0, "nieh_full": 1.0}
+    assert {task: measured[task]["strict,none"] for task in measured} == {
+        "nieh_gt": 1.0,
+        "nieh_full": 1.0,
+    }
     assert len(list(outcome.folder.glob("lm_eval/*/samples_nieh_*.jsonl"))) == 2
 
 
@@ -40,7 +46,11 @@ def test_the_same_command_goes_on_and_another_starts_anew(prepared):
     watchers = Watcher(), Watcher()
     first, again = (execute(prepared(), watcher) for watcher in watchers)
     assert [(len(watcher.made), len(watcher.found)) for watcher in watchers] == [(10, 0), (0, 10)]
-    assert (again.folder, again.summary, again.records) == (first.folder, first.summary, first.records)
+    assert (again.folder, again.summary, again.records) == (
+        first.folder,
+        first.summary,
+        first.records,
+    )
     for changes in ({"seed": 1}, {"limit": 1}, {"tasks": ("nieh_gt",)}, {"model": "blind"}):
         assert execute(prepared(**changes)).folder != first.folder
     assert read_run(first.folder, RECORDS) == (first.summary.header, first.records)
@@ -50,12 +60,24 @@ def test_the_results_file_says_what_the_summary_says(prepared):
     outcome = execute(prepared(name="mine"))
     document = json.loads((outcome.folder / "results.json").read_text())
     assert outcome.folder.parent.name == "mine"
-    assert document.keys() == {"suite", "name", "config", "n_missing", "primary_metrics", "summary", "usage"}
+    assert document.keys() == {
+        "suite",
+        "name",
+        "config",
+        "n_missing",
+        "primary_metrics",
+        "summary",
+        "usage",
+    }
     assert (document["suite"], document["name"]) == ("nieh", "mine")
     assert document["config"] == outcome.summary.header.config
     strict = document["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]
     assert strict.keys() == {"mean", "stderr", "low", "high", "bootstrap", "n_trajectories"}
-    assert strict["mean"] == outcome.summary.summary.tasks["nieh_gt"].by_clues["total"].scores["strict"].mean == 1.0
+    assert (
+        strict["mean"]
+        == outcome.summary.summary.tasks["nieh_gt"].by_clues["total"].scores["strict"].mean
+        == 1.0
+    )
 
 
 def test_a_changed_frame_of_the_same_size_is_noticed(prepared, data):
@@ -119,14 +141,16 @@ class Talk:
         self.model.asked.append(parts)
         for part in parts[:-1]:
             part.load()
-        return Reply("first line\nmug", n_reply_tokens=2, n_context_tokens=len(parts), n_cached_tokens=0)
+        return Reply(
+            "first line\nmug", n_reply_tokens=2, n_context_tokens=len(parts), n_cached_tokens=0
+        )
 
 
 @pytest.fixture
 def recorder(monkeypatch):
     """Takes the place of the tiny model."""
     model = Recorder()
-    monkeypatch.setattr("infthor_eval.runs.binding.load", lambda *_: model)
+    monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
     return model
 
 
@@ -139,9 +163,10 @@ def test_a_model_is_asked_by_trajectory_and_in_the_published_words(prepared, rec
         "answer. Answer with a single word or words.\nQuestion: Is there a mug?"
     )
     assert set(replies(outcome).values()) == {"first line\nmug"}
-    assert {(record.tokens.context, record.tokens.cached, record.tokens.reply) for record in outcome.records} == {
-        (7, 0, 2)
-    }
+    assert {
+        (record.tokens.context, record.tokens.cached, record.tokens.reply)
+        for record in outcome.records
+    } == {(7, 0, 2)}
 
 
 def test_a_unit_that_fails_is_recorded_and_the_run_goes_on(prepared, recorder, data):
@@ -157,7 +182,9 @@ def test_a_unit_that_fails_is_recorded_and_the_run_goes_on(prepared, recorder, d
 def test_a_failed_unit_is_tried_again_by_the_next_run(prepared, recorder, data):
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     whole = frame.read_bytes()
-    frame.write_bytes(whole[:60] + bytes(len(whole) - 60))  # its size is part of the set's fingerprint
+    frame.write_bytes(
+        whole[:60] + bytes(len(whole) - 60)
+    )  # its size is part of the set's fingerprint
     failed = {record.key for record in execute(prepared(TINY)).records if record.failure}
     frame.write_bytes(whole)
     watcher = Watcher()
@@ -192,11 +219,16 @@ def test_the_tiny_model_runs_through_and_shares_prefixes(prepared):
     by_trajectory = {}
     for record in watcher.made:  # in the order of asking
         by_trajectory.setdefault(record.cluster, []).append(record.tokens.cached)
-    assert {traj_id: len(cached) for traj_id, cached in by_trajectory.items()} == {"traj_a": 3, "traj_b": 2}
+    assert {traj_id: len(cached) for traj_id, cached in by_trajectory.items()} == {
+        "traj_a": 3,
+        "traj_b": 2,
+    }
     assert all(cached[0] < min(cached[1:]) for cached in by_trajectory.values())
 
 
-def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it(prepared, monkeypatch):
+def test_batches_give_the_same_replies_and_one_that_fails_takes_no_other_with_it(
+    prepared, monkeypatch
+):
     tasks = ("nieh_full",)
     alone = execute(prepared(TINY, tasks=tasks))
     together = execute(prepared(TINY, {"batch_size": "4"}, tasks=tasks))
@@ -242,8 +274,12 @@ def test_one_of_a_batch_that_cannot_be_answered_fails_alone(prepared, monkeypatc
 # -- sizes and limits
 
 
-def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told(prepared, recorder, monkeypatch):
-    monkeypatch.setattr(Recorder, "capabilities", Capabilities(counts_tokens=False, token_ids=False))
+def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told(
+    prepared, recorder, monkeypatch
+):
+    monkeypatch.setattr(
+        Recorder, "capabilities", Capabilities(counts_tokens=False, token_ids=False)
+    )
     monkeypatch.setattr(Recorder, "tokens_per_frame", lambda *_: None)
     tasks = ("nieh_truncate_head_8k",)
     with pytest.raises(UsageError, match="which recorder does not count; give --tokens-per-frame"):
@@ -255,8 +291,12 @@ def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told
 
 
 def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(make_nieh_set):
-    asked = [Question("t", f"Is there a mug on {step}?", (step,), ("yes",)) for step in (14, 15, 16, 17)]
-    outside = [Question("t", f"Is there a cup on {step}?", (step,), ("yes",)) for step in (90, 91, 92)]
+    asked = [
+        Question("t", f"Is there a mug on {step}?", (step,), ("yes",)) for step in (14, 15, 16, 17)
+    ]
+    outside = [
+        Question("t", f"Is there a cup on {step}?", (step,), ("yes",)) for step in (90, 91, 92)
+    ]
     questions = [outside[0], asked[0], asked[1], outside[1], asked[2], outside[2], asked[3]]
     root = make_nieh_set(questions, n_frames=30, size=56)
     config = {"context": "haystack", "data": str(root), "ctx_size": 10, "tokens_per_frame": 1000}
@@ -286,9 +326,16 @@ def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(mak
 
 
 def test_the_limit_takes_from_all_trajectories(make_nieh_set):
-    questions = [Question(t, f"Is there a mug {n}?", (1,), ("yes",)) for t in ("a", "b", "c") for n in range(9)]
+    questions = [
+        Question(t, f"Is there a mug {n}?", (1,), ("yes",))
+        for t in ("a", "b", "c")
+        for n in range(9)
+    ]
     root = make_nieh_set(questions, size=56)
-    asked = [find_samples({"context": "clues", "data": str(root), "seed": seed}, 4).samples for seed in (0, 0, 1)]
+    asked = [
+        find_samples({"context": "clues", "data": str(root), "seed": seed}, 4).samples
+        for seed in (0, 0, 1)
+    ]
     assert {sample.question.traj_id for sample in asked[0]} == {"a", "b", "c"}
     assert asked[0] == asked[1] != asked[2]
 
@@ -298,7 +345,10 @@ def test_baselines_answer_the_same_whatever_runs_beside_them(prepared, make_nieh
     key = {"one": ("yes", "yes", "no"), "two": ("no", "no", "yes")}
     for name, answers in key.items():
         root = make_nieh_set(
-            [Question(f"t{i}", f"Is there a {name} {i}?", (i,), (answer,)) for i, answer in enumerate(answers)],
+            [
+                Question(f"t{i}", f"Is there a {name} {i}?", (i,), (answer,))
+                for i, answer in enumerate(answers)
+            ],
             size=56,
             name=name,
         )
@@ -335,17 +385,24 @@ def sampling(task_files):
     return write
 
 
-def test_a_temperature_in_the_task_file_samples_and_the_seed_decides_what(prepared, sampling, tmp_path):
+def test_a_temperature_in_the_task_file_samples_and_the_seed_decides_what(
+    prepared, sampling, tmp_path
+):
     def said(settings, seed=0, folder="out"):
         sampling(settings)
-        return replies(execute(prepared(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder)))
+        return replies(
+            execute(prepared(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder))
+        )
 
     greedy = said("max_gen_toks: 12, do_sample: false, temperature: 0.0")
     drawn = said("max_gen_toks: 12, do_sample: true, temperature: 2.0")
     assert drawn != greedy
     assert said("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
     assert said("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
-    assert said("max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top") == greedy
+    assert (
+        said("max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top")
+        == greedy
+    )
 
 
 def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampling, tmp_path):
@@ -355,7 +412,8 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampli
     sampling("max_gen_toks: 12, do_sample: true, temperature: 2.0")
     options = {"pretrained": str(tmp_path / "checkpoint"), "device": "cpu"}
     first, second = (
-        replies(execute(prepared("qwen2.5-vl", options, tasks=("nieh_gt",), seed=seed))) for seed in (0, 1)
+        replies(execute(prepared("qwen2.5-vl", options, tasks=("nieh_gt",), seed=seed)))
+        for seed in (0, 1)
     )
     assert first.keys() == second.keys()
     assert first != second
@@ -377,7 +435,9 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampli
         ("max_gen_toks: many", "max_gen_toks is 'many'; it is a whole number"),
     ],
 )
-def test_settings_that_would_not_act_are_refused_before_a_model_is_loaded(prepared, sampling, settings, said):
+def test_settings_that_would_not_act_are_refused_before_a_model_is_loaded(
+    prepared, sampling, settings, said
+):
     sampling(settings if "max_gen_toks" in settings else f"max_gen_toks: 12, {settings}")
     with pytest.raises(UsageError, match=rf"nieh_gt\.yaml: generation_kwargs: {said}") as caught:
         prepared(TINY, tasks=("nieh_gt",))

@@ -33,7 +33,9 @@ class Thinker(Talk):
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch):
-    monkeypatch.setitem(BUILT_IN, "toy", BuiltIn(f"{Toy.__module__}:Toy", f"{Toy.__module__}:Options"))
+    monkeypatch.setitem(
+        BUILT_IN, "toy", BuiltIn(f"{Toy.__module__}:Toy", f"{Toy.__module__}:Options")
+    )
     monkeypatch.setattr(Toy, "conversation", lambda self: Thinker())
     LIMITS.clear()
 
@@ -46,7 +48,9 @@ def answers_of(output):
 
 def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run):
     data = make_nieh_set(QUESTIONS, size=56)
-    code, _, err = run("--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
+    code, _, err = run(
+        "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+    )
     assert code == 0, err
     answers = answers_of(tmp_path / "out")
     assert {question: payload.get("thinking") for question, payload in answers.items()} == {
@@ -69,7 +73,16 @@ def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run):
 
 def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run):
     data = make_nieh_set(QUESTIONS, size=56)
-    arguments = ["--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "toy",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     assert run(*arguments, "--max-thinking-tokens", 1000)[0] == 0
     assert {limit for limit, _ in LIMITS} == {1050}
     assert "0 evaluated now" not in run(*arguments)[2]  # another run
@@ -77,7 +90,9 @@ def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run):
     assert code == 2 and "--max-thinking-tokens 0: give 1 or more" in err
 
 
-def test_a_stop_string_ends_the_answer_and_not_the_thoughts(make_nieh_set, tmp_path, run, monkeypatch):
+def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
+    make_nieh_set, tmp_path, run, monkeypatch
+):
     monkeypatch.setitem(SAYS, "first", "<think>a\ncup</think>mug\ncup")
     data = make_nieh_set(QUESTIONS[:1], size=56)
     task = tmp_path / "own.yaml"

@@ -15,7 +15,9 @@ from ..bundled import BUNDLED
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch):
-    monkeypatch.setitem(BUILT_IN, "toy", BuiltIn(f"{Toy.__module__}:Toy", f"{Toy.__module__}:Options"))
+    monkeypatch.setitem(
+        BUILT_IN, "toy", BuiltIn(f"{Toy.__module__}:Toy", f"{Toy.__module__}:Options")
+    )
 
 
 def test_it_keeps_the_contract():
@@ -29,26 +31,34 @@ def test_it_runs_the_bundled_set(tmp_path, run):
     assert f"toy: {2 * n} evaluated now" in err
     (results,) = tmp_path.rglob("results.json")
     tasks = json.loads(results.read_text())["summary"]["tasks"]
-    assert {name: task["n"] for name, task in tasks.items()} == {"nieh_mini_gt": n, "nieh_mini_full": n}
+    assert {name: task["n"] for name, task in tasks.items()} == {
+        "nieh_mini_gt": n,
+        "nieh_mini_full": n,
+    }
     row = next(line.split() for line in out.splitlines() if line.split()[:1] == ["toy"])
     assert row[-1] == str(n)
     again = run("--model", "toy", "--tasks", "nieh_mini", "--output", tmp_path)[2]
     assert f"0 evaluated now, {2 * n} resumed" in again
 
 
-def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(make_nieh_set, tmp_path, run, monkeypatch):
+def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(
+    make_nieh_set, tmp_path, run, monkeypatch
+):
     def reply(self, decoding):
         return self.turns[0].parts[99]
 
     monkeypatch.setattr(Talk, "reply", reply)
     data = make_nieh_set(size=56)
-    code, _, err = run("--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
-    place = f"{Path(__file__).name}:{reply.__code__.co_firstlineno + 1} (reply)"
-    failure = (
-        f"toy fails on the request (IndexError in {place}: tuple index out of range); fix the adapter, or report it"
+    code, _, err = run(
+        "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
     )
+    place = f"{Path(__file__).name}:{reply.__code__.co_firstlineno + 1} (reply)"
+    failure = f"toy fails on the request (IndexError in {place}: tuple index out of range); fix the adapter, or report it"
     assert code == 1
-    assert f"nieh_gt: 5 sample(s) failed, counted as wrong: {failure}; traceback in journal/tracebacks.txt" in err
+    assert (
+        f"nieh_gt: 5 sample(s) failed, counted as wrong: {failure}; traceback in journal/tracebacks.txt"
+        in err
+    )
     (text,) = [path.read_text() for path in (tmp_path / "out").rglob("journal/tracebacks.txt")]
     assert text.count("Traceback (most recent call last)") == 1
     assert text.count("\nas for nieh_gt: ") == 4
@@ -57,10 +67,21 @@ def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(make_nieh_
 
 def test_a_context_that_is_measured_in_tokens_wants_their_number(make_nieh_set, tmp_path, run):
     data = make_nieh_set(n_frames=70, size=56)
-    arguments = ["--model", "toy", "--tasks", "nieh_truncate_head_8k", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "toy",
+        "--tasks",
+        "nieh_truncate_head_8k",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     code, _, err = run(*arguments)
     assert (code, len(err.strip().splitlines())) == (2, 1)
     assert "a size in tokens, which toy does not count; give --tokens-per-frame" in err
     assert run(*arguments, "--tokens-per-frame", 500)[0] == 0
     (samples,) = (tmp_path / "out").rglob("samples_*.jsonl")
-    assert {len(json.loads(line)["doc"]["frames"]) for line in samples.read_text().splitlines()} == {16}
+    assert {
+        len(json.loads(line)["doc"]["frames"]) for line in samples.read_text().splitlines()
+    } == {16}

@@ -3,10 +3,10 @@
 import pytest
 
 from infthor_eval.nieh import units
-from infthor_eval.nieh.answering import BaselineAnswerer
+from infthor_eval.nieh.asking.answering import BaselineAnswerer
 from infthor_eval.nieh.records import Guess
 from infthor_eval.runs import Unit, execute
-from infthor_eval.runs.binding import bind_run
+from infthor_eval.runs.work.binding import bind_run
 
 
 class _Guesses(dict):
@@ -20,14 +20,18 @@ def events(monkeypatch):
     happened = []
     answer = BaselineAnswerer.answer
     monkeypatch.setattr(units, "find_guesses", lambda *_: happened.append("learned") or _Guesses())
-    monkeypatch.setattr(BaselineAnswerer, "answer", lambda *given: happened.append("asked") or answer(*given))
+    monkeypatch.setattr(
+        BaselineAnswerer, "answer", lambda *given: happened.append("asked") or answer(*given)
+    )
     return happened
 
 
 def test_a_question_is_asked_before_guesses_are_learned(prepared, events):
     outcome = execute(prepared())
     assert events[0] == "asked"
-    assert [record.payload.guess.form for record in outcome.records] == [record.id for record in outcome.records]
+    assert [record.payload.guess.form for record in outcome.records] == [
+        record.id for record in outcome.records
+    ]
 
 
 def test_every_record_of_a_unit_has_its_guess(prepared, events):

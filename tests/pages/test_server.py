@@ -13,7 +13,9 @@ import pytest
 from infthor_eval.errors import UsageError
 from infthor_eval.pages.server import PageServer, file_route, serve_pages
 
-pytest.importorskip("uvicorn", reason="the extra `page` is not installed: pip install 'infthor-eval[page]'")
+pytest.importorskip(
+    "uvicorn", reason="the extra `page` is not installed: pip install 'infthor-eval[page]'"
+)
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse
 from starlette.routing import Route
@@ -37,12 +39,19 @@ def fail(_request: Request) -> PlainTextResponse:
 @pytest.fixture(scope="module")
 def server() -> Iterator[PageServer]:
     routes = [Route("/", thread_name), Route("/echo", echo, methods=["POST"]), Route("/fail", fail)]
-    with serve_pages([*routes, file_route("/report.css", "infthor_eval.report.web", "report.css")]) as running:
+    with serve_pages(
+        [*routes, file_route("/report.css", "infthor_eval.report.web", "report.css")]
+    ) as running:
         yield running
 
 
 def ask(
-    server: PageServer, path: str | None = None, *, method: str = "GET", body: str | None = None, **headers: str
+    server: PageServer,
+    path: str | None = None,
+    *,
+    method: str = "GET",
+    body: str | None = None,
+    **headers: str,
 ) -> http.client.HTTPResponse:
     """The answer to a request; its path is one below the first page's, or any that begins with a slash."""
     first = urlsplit(server.address).path
@@ -60,11 +69,15 @@ def test_who_has_the_address_gets_the_page(server: PageServer) -> None:
 
 
 def test_what_is_posted_from_the_page_arrives(server: PageServer) -> None:
-    answer = ask(server, "echo", method="POST", body="an apple", Origin=f"http://127.0.0.1:{server.port}")
+    answer = ask(
+        server, "echo", method="POST", body="an apple", Origin=f"http://127.0.0.1:{server.port}"
+    )
     assert (answer.status, answer.read()) == (200, b"an apple")
 
 
-@pytest.mark.parametrize("path", ["/", "/echo", "//", "/%2e%2e/", "/wrong/", "/%ff/", "/wrong/report.css", "/%C3%A9/"])
+@pytest.mark.parametrize(
+    "path", ["/", "/echo", "//", "/%2e%2e/", "/wrong/", "/%ff/", "/wrong/report.css", "/%C3%A9/"]
+)
 def test_another_token_is_refused(server: PageServer, path: str) -> None:
     answer = ask(server, path)
     assert answer.status == 403
@@ -79,7 +92,13 @@ def test_part_of_the_token_is_refused(server: PageServer) -> None:
 
 @pytest.mark.parametrize(
     "origin",
-    ["http://example.com", "null", "https://127.0.0.1:{port}", "http://localhost:{port}", "http://127.0.0.1:1"],
+    [
+        "http://example.com",
+        "null",
+        "https://127.0.0.1:{port}",
+        "http://localhost:{port}",
+        "http://127.0.0.1:1",
+    ],
 )
 @pytest.mark.parametrize("method", ["GET", "POST"])
 def test_another_origin_is_refused(server: PageServer, origin: str, method: str) -> None:
@@ -88,7 +107,9 @@ def test_another_origin_is_refused(server: PageServer, origin: str, method: str)
     assert (answer.status, answer.read()) == (403, b"Refused: another page asked.\n")
 
 
-@pytest.mark.parametrize("host", ["example.com", "example.com:80", "127.0.0.1.example.com", "127.0.0.2", "[::1]", ""])
+@pytest.mark.parametrize(
+    "host", ["example.com", "example.com:80", "127.0.0.1.example.com", "127.0.0.2", "[::1]", ""]
+)
 def test_another_host_is_refused(server: PageServer, host: str) -> None:
     answer = ask(server, Host=host)
     assert (answer.status, answer.read()) == (403, b"Refused: these pages are at 127.0.0.1.\n")
@@ -118,7 +139,9 @@ def test_a_file_of_a_package_has_its_type(server: PageServer) -> None:
     assert b"--paper" in answer.read()
 
 
-def test_an_error_is_logged_and_tells_the_browser_nothing(server: PageServer, caplog: pytest.LogCaptureFixture) -> None:
+def test_an_error_is_logged_and_tells_the_browser_nothing(
+    server: PageServer, caplog: pytest.LogCaptureFixture
+) -> None:
     answer = ask(server, "fail")
     assert (answer.status, answer.read()) == (500, b"Internal Server Error")
     for _ in range(1000):  # it is logged after the answer is sent
@@ -130,7 +153,9 @@ def test_an_error_is_logged_and_tells_the_browser_nothing(server: PageServer, ca
 
 def test_other_machines_cannot_reach_it(server: PageServer) -> None:
     try:
-        (own,) = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+        (own,) = {
+            info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)
+        }
     except (OSError, ValueError):
         pytest.skip("this machine has no address, or several")
     if own == "127.0.0.1":
@@ -155,7 +180,10 @@ def test_it_ends_with_its_context_and_frees_its_port() -> None:
 def test_a_port_that_is_taken_is_an_error_of_one_line(server: PageServer) -> None:
     for port in (server.port, 65536):
         with (
-            pytest.raises(UsageError, match=rf"--port {port}: cannot be had .*; give another, or none for a free one"),
+            pytest.raises(
+                UsageError,
+                match=rf"--port {port}: cannot be had .*; give another, or none for a free one",
+            ),
             serve_pages([], port=port),
         ):
             pass
@@ -163,5 +191,7 @@ def test_a_port_that_is_taken_is_an_error_of_one_line(server: PageServer) -> Non
 
 def test_without_the_extra_there_is_an_error_of_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "uvicorn", None)
-    with pytest.raises(UsageError, match=r"Starlette and uvicorn .*pip install 'infthor-eval\[page\]'"):
+    with pytest.raises(
+        UsageError, match=r"Starlette and uvicorn .*pip install 'infthor-eval\[page\]'"
+    ):
         serve_pages([]).__enter__()

@@ -51,7 +51,16 @@ _THINGS = {
 
 
 def kitchen(
-    where=None, held=None, opened=(), on=(), hidden=(), at=(0, 0), facing=0, horizon=30.0, refused=False, without=()
+    where=None,
+    held=None,
+    opened=(),
+    on=(),
+    hidden=(),
+    at=(0, 0),
+    facing=0,
+    horizon=30.0,
+    refused=False,
+    without=(),
 ):
     """The kitchen; everything lies on the first table unless said otherwise.
 
@@ -76,9 +85,14 @@ def kitchen(
     for key, fields in _THINGS.items():
         place = {"parent_receptacles": [parents[key]]} if key in parents else {"is_picked_up": True}
         objects.append(thing(key, pickupable=True, **fields, **place, visible=key not in hidden))
-    inside = {key: [child for child, parent in parents.items() if parent == key] for key in [*_FURNITURE, *_THINGS]}
+    inside = {
+        key: [child for child, parent in parents.items() if parent == key]
+        for key in [*_FURNITURE, *_THINGS]
+    }
     objects = [
-        msgspec.structs.replace(item, receptacle_object_ids=inside[item.object_id]) if item.receptacle else item
+        msgspec.structs.replace(item, receptacle_object_ids=inside[item.object_id])
+        if item.receptacle
+        else item
         for item in objects
         if item.object_id not in without
     ]

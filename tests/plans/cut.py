@@ -32,7 +32,9 @@ def _documents() -> dict[str, str]:
         return {json.loads(line)["traj_id"]: line for line in lines}
 
 
-def cut(name: str, n_plans: int = 4, *, final: bool = False, called: str | None = None) -> dict[str, Any]:
+def cut(
+    name: str, n_plans: int = 4, *, final: bool = False, called: str | None = None
+) -> dict[str, Any]:
     """The document of a trajectory of the first sub-goals of another.
 
     Args:
@@ -49,7 +51,12 @@ def cut(name: str, n_plans: int = 4, *, final: bool = False, called: str | None 
     for part in parts:
         for key, end in (("high_pddl_idx", n_plans), ("low_pddl_idx", len(plan["low_actions"]))):
             part[key] = [part[key][0], min(part[key][1], end)]
-    document |= {"sub_trajs": parts, "sub_tasks": document["sub_tasks"][: len(parts)], "images": [], "object_log": []}
+    document |= {
+        "sub_trajs": parts,
+        "sub_tasks": document["sub_tasks"][: len(parts)],
+        "images": [],
+        "object_log": [],
+    }
     if final:
         document["long_horizon_task"] = document["sub_tasks"][-1]
     return document | {"traj_id": called or name}

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.episodes.records import DONE
-from infthor_eval.plans.recorded_runs import PlansRun
+from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import RECORDS, PlanRecord, StepRecord
 from infthor_eval.runs import RunHeader, Tokens, UnitRecord
-from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.journals.journal import Journal
 
 TASK = "infthor_plans"
 RULES = {"name": "default"}
@@ -31,7 +31,13 @@ def identity(
         "config": {"dataset_kwargs": {}},
     }
     model = dict(model or {"name": "a model"})
-    return {"suite": "plans", "model": model, "simulator": simulator, "frames": "shown", "tasks": {task: about}}
+    return {
+        "suite": "plans",
+        "model": model,
+        "simulator": simulator,
+        "frames": "shown",
+        "tasks": {task: about},
+    }
 
 
 def plan(
@@ -58,7 +64,9 @@ def plan(
         task=0,
         first_step=first,
         n_expert_steps=end - first,
-        steps=(StepRecord(n_context_tokens=context_of_step),) if context_of_step is not None else (),
+        steps=(StepRecord(n_context_tokens=context_of_step),)
+        if context_of_step is not None
+        else (),
         reward=reward,
         max_reward=most,
         ended=ended,
@@ -81,7 +89,9 @@ def made_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any
     return PlansRun(label, header, records)
 
 
-def planner_run(records: Sequence[UnitRecord[PlanRecord]], label: str = "planner", **about: Any) -> PlansRun:
+def planner_run(
+    records: Sequence[UnitRecord[PlanRecord]], label: str = "planner", **about: Any
+) -> PlansRun:
     return made_run(label, records, model={"name": "planner", "baseline": "planner"}, **about)
 
 

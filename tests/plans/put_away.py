@@ -25,7 +25,9 @@ def pen_put_away(**changes: Any) -> dict[str, Any]:
     held, place = (put[key].split("|")[0] for key in ("objectId", "receptacleObjectId"))
     n_fewer = end - first - 1
     for low in plan["low_actions"]:
-        low["high_idx"] = min(low["high_idx"], first) if low["high_idx"] < end else low["high_idx"] - n_fewer
+        low["high_idx"] = (
+            min(low["high_idx"], first) if low["high_idx"] < end else low["high_idx"] - n_fewer
+        )
     after["high_pddl_idx"] = [number - n_fewer for number in after["high_pddl_idx"]]
     low = before["low_pddl_idx"][1], after["low_pddl_idx"][0]
     plan["high_pddl"][first:end] = []
@@ -44,7 +46,9 @@ def put_away_without_actions(name: str = FORK, n_plans: int = 6, **changes: Any)
     return _with_task(document, "Fork", "Drawer", first, (low, low))
 
 
-def _with_task(document: dict[str, Any], held: str, place: str, first: int, low: tuple[int, int]) -> dict[str, Any]:
+def _with_task(
+    document: dict[str, Any], held: str, place: str, first: int, low: tuple[int, int]
+) -> dict[str, Any]:
     """Insert the task of putting away behind the first one, with its one sub-goal."""
     high = {
         "discrete_action": {"action": "PutObject", "args": [held, place]},
@@ -59,9 +63,19 @@ def _with_task(document: dict[str, Any], held: str, place: str, first: int, low:
     own = {"high_pddl_idx": [first, first + 1], "low_pddl_idx": list(low), "subgoal": text}
     parts = [before, own, *rest]
     document["sub_trajs"] = [part | {"sub_traj_idx": number} for number, part in enumerate(parts)]
-    info = {"goal": "put object", "movable": held, "pickup": None, "receptacle": place, "scene": "1"}
+    info = {
+        "goal": "put object",
+        "movable": held,
+        "pickup": None,
+        "receptacle": place,
+        "scene": "1",
+    }
     # Its parameters are those of the task before it, as the generator leaves them.
-    task = {"task_info": info, "task_desc": text, "pddl_params": document["sub_tasks"][0]["pddl_params"]}
+    task = {
+        "task_info": info,
+        "task_desc": text,
+        "pddl_params": document["sub_tasks"][0]["pddl_params"],
+    }
     document["sub_tasks"].insert(1, task)
     return document
 

@@ -119,7 +119,11 @@ def test_the_history_is_the_sequence_that_models_are_trained_on(simulator, tmp_p
     environment.reset(last)
     play(environment, last)
     past = environment.past(last)
-    text = "".join(part if isinstance(part, str) else "<image>" for segment in past.all for part in segment.parts())
+    text = "".join(
+        part if isinstance(part, str) else "<image>"
+        for segment in past.all
+        for part in segment.parts()
+    )
     text_file = (BUNDLED / "metadata" / found.traj_id / "traj.txt").read_text().strip()
     assert text_file.startswith(text)
     assert text_file[len(text) :].startswith("<|act|>")
@@ -145,12 +149,16 @@ def segmenting_simulator():
         yield simulator
 
 
-def test_a_disk_that_was_full_in_between_changes_nothing_that_is_remembered(segmenting_simulator, tmp_path):
+def test_a_disk_that_was_full_in_between_changes_nothing_that_is_remembered(
+    segmenting_simulator, tmp_path
+):
     pasts = []
     for name, number in (("sound", 0), ("full", 6)):
         (tmp_path / name).mkdir()
         frames = _FullFor(tmp_path / name, number)
-        environment = PlanEnvironment(trajectory(), segmenting_simulator, frames=frames, in_words=True)
+        environment = PlanEnvironment(
+            trajectory(), segmenting_simulator, frames=frames, in_words=True
+        )
         if number:
             with pytest.raises(DataError, match="full"):
                 environment.reset(1)
@@ -158,7 +166,9 @@ def test_a_disk_that_was_full_in_between_changes_nothing_that_is_remembered(segm
         pasts.append(environment.past(1))
     sound, full = pasts
     assert sound.state == full.state
-    assert [len(segment.steps) for segment in sound.all] == [len(segment.steps) for segment in full.all]
+    assert [len(segment.steps) for segment in sound.all] == [
+        len(segment.steps) for segment in full.all
+    ]
 
 
 def test_an_expert_that_is_refused_here_is_named_and_the_plans_before_go_on(simulator):
@@ -170,13 +180,17 @@ def test_an_expert_that_is_refused_here_is_named_and_the_plans_before_go_on(simu
     environment = PlanEnvironment(found, simulator)
     assert play(environment, 4)[-1].info.ended == Ended.DONE
     for plan in (5, 6):
-        with pytest.raises(ExpertRefusedError, match=r"OpenObject Wardrobe, in plan 5\) is refused here"):
+        with pytest.raises(
+            ExpertRefusedError, match=r"OpenObject Wardrobe, in plan 5\) is refused here"
+        ):
             environment.reset(plan)
     environment.reset(0)
 
 
 def test_a_task_without_a_goal_is_named(tmp_path):
-    document = json.loads((BUNDLED / "metadata" / bundled_name("kitchen-2") / "traj_data.json").read_text())
+    document = json.loads(
+        (BUNDLED / "metadata" / bundled_name("kitchen-2") / "traj_data.json").read_text()
+    )
     document["sub_tasks"][0]["task_info"]["goal"] = ""
     path = tmp_path / "trajectory.json"
     path.write_text(json.dumps(document))
@@ -207,7 +221,11 @@ def test_a_simulator_that_keeps_no_copies_repeats_what_was_done(simulator, monke
     query = simulator.query
     unsaved = query("Pass")
     object.__setattr__(unsaved, "success", False)
-    monkeypatch.setattr(simulator, "query", lambda action, **kw: unsaved if "State" in action else query(action, **kw))
+    monkeypatch.setattr(
+        simulator,
+        "query",
+        lambda action, **kw: unsaved if "State" in action else query(action, **kw),
+    )
     environment = PlanEnvironment(found, simulator)
     environment.reset(1)
     environment.step("RotateLeft")

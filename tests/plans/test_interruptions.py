@@ -26,16 +26,31 @@ OURS = "from infthor_eval.cli import main; main()"
 
 def same(records):
     """What is to be equal in two runs: all but times, attempts and faults."""
-    return [msgspec.structs.replace(record, seconds=0.0, attempt=1, faults=()) for record in records]
+    return [
+        msgspec.structs.replace(record, seconds=0.0, attempt=1, faults=()) for record in records
+    ]
 
 
 def found(output):
     (folder,) = (path.parent for path in output.rglob("journal"))
-    return same(read_run(folder, RECORDS)[1]), json.loads((folder / "results.json").read_text())["summary"]
+    return same(read_run(folder, RECORDS)[1]), json.loads((folder / "results.json").read_text())[
+        "summary"
+    ]
 
 
 def start(data, output, *more):
-    arguments = ["run", "--model", "random", "--tasks", "infthor_plans", "--data", data, "--output", output, *more]
+    arguments = [
+        "run",
+        "--model",
+        "random",
+        "--tasks",
+        "infthor_plans",
+        "--data",
+        data,
+        "--output",
+        output,
+        *more,
+    ]
     return subprocess.Popen(
         [sys.executable, "-c", OURS, *map(str, arguments)],
         stdout=subprocess.PIPE,
@@ -128,7 +143,9 @@ def n_restarts(outcome):
 
 
 @pytest.mark.parametrize("model", ["planner", "random"])
-def test_a_simulator_that_dies_in_mid_plan_changes_no_result_and_is_counted(prepared, tmp_path, calls, model):
+def test_a_simulator_that_dies_in_mid_plan_changes_no_result_and_is_counted(
+    prepared, tmp_path, calls, model
+):
     whole = execute(prepared(model, output=tmp_path / "whole"))
     n_calls = calls.n
     calls.deadly_from_now(random.Random(3).sample(range(1, n_calls), 2))
@@ -148,7 +165,9 @@ def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepared, tmp_pa
 
 @pytest.mark.usefixtures("shared_simulator")
 @pytest.mark.parametrize("n_failures", [1, 2, 3])
-def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(prepared, tmp_path, monkeypatch, n_failures):
+def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(
+    prepared, tmp_path, monkeypatch, n_failures
+):
     whole = execute(prepared(output=tmp_path / "whole"))
     step, failures = PlanEnvironment.step, []
 
@@ -173,7 +192,10 @@ def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(prepared, tmp_p
 def test_no_simulator_outlives_a_run_that_is_killed(tmp_path):
     process = start(write(tmp_path / "data", cut(FORK, 4)), tmp_path / "out")
     wait_for(2, tmp_path / "out", process)
-    children = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
+    children = [
+        int(pid)
+        for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    ]
     os.kill(process.pid, signal.SIGKILL)
     process.communicate()
     assert children

@@ -33,7 +33,11 @@ def alfred(number):
     if not path.exists():
         pytest.skip("ALFRED's trajectories are not at ../shared/data")
     with gzip.open(path) as lines:
-        return [TrajectorySource(path, line, raw).read() for line, raw in enumerate(lines, 1) if line <= number]
+        return [
+            TrajectorySource(path, line, raw).read()
+            for line, raw in enumerate(lines, 1)
+            if line <= number
+        ]
 
 
 def test_our_plans():
@@ -79,8 +83,12 @@ def test_alfred_plans():
         plans, tasks = plans_of(trajectory, Words.NATURAL), tasks_of(trajectory)
         assert len(tasks) == 1 and tasks[0].task.task_type == trajectory.task_type
         assert tasks[0].text == trajectory.turk_annotations["anns"][0]["task_desc"]
-        assert not any(plan.is_final for plan in plans)  # the sub-goal without an action is none of them
-        assert len(plans) == len(trajectory.plan.high_pddl) - ("End" in repr(trajectory.plan.high_pddl[-1]))
+        assert not any(
+            plan.is_final for plan in plans
+        )  # the sub-goal without an action is none of them
+        assert len(plans) == len(trajectory.plan.high_pddl) - (
+            "End" in repr(trajectory.plan.high_pddl[-1])
+        )
 
 
 def check(trajectory):
@@ -101,8 +109,14 @@ def changed(trajectory, change):
 FAULTS = [
     (lambda it: it["sub_tasks"][1]["task_info"].update(goal=""), "task 1: a task has no goal"),
     (lambda it: it["sub_tasks"].pop(), "3 parts for 2 tasks"),
-    (lambda it: it["sub_trajs"][0].update(high_pddl_idx=[0, 99]), "task 0 has sub-goals 0 to 99 of 24"),
-    (lambda it: it["plan"]["low_actions"][3].update(high_idx=7), "action 4 belongs to sub-goal 0, out of order"),
+    (
+        lambda it: it["sub_trajs"][0].update(high_pddl_idx=[0, 99]),
+        "task 0 has sub-goals 0 to 99 of 24",
+    ),
+    (
+        lambda it: it["plan"]["low_actions"][3].update(high_idx=7),
+        "action 4 belongs to sub-goal 0, out of order",
+    ),
     (lambda it: it["plan"]["low_actions"][-1].update(high_idx=77), "there is no sub-goal 77"),
     (
         lambda it: it["plan"]["high_pddl"][2]["discrete_action"].update(action="Fly"),

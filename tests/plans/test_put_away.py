@@ -6,7 +6,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.plans.environment import PlanEnvironment
-from infthor_eval.plans.history import PublishedHistory
+from infthor_eval.plans.history.forms import PublishedHistory
 from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.runs import execute
@@ -44,7 +44,11 @@ def test_it_is_a_task_with_one_plan_about_the_very_objects():
     assert tasks[1].task == Task(TaskType.PUT_AWAY, "Pen", "DiningTable")
     assert [plan.task for plan in plans] == [0] * 4 + [1] + [2] * 4
     plan = plans[PUT]
-    assert (plan.kind, plan.text, plan.in_task) == (PlanKind.PUT, "put the Pen in the DiningTable", True)
+    assert (plan.kind, plan.text, plan.in_task) == (
+        PlanKind.PUT,
+        "put the Pen in the DiningTable",
+        True,
+    )
     assert plan.low[1] - plan.low[0] == 22
     assert (plan.object_id, plan.receptacle_id) == (
         "Pen|-02.05|+00.75|-00.82",
@@ -80,7 +84,9 @@ def test_baselines_are_evaluated_on_it(prepared, tmp_path):
     assert found[PUT].goal == "put the Pen on the DiningTable"
     for name in ("random", "scripted", "history"):
         others = execute(prepared(name, data=data))
-        assert [record.payload.index for record in others.records if record.cluster == PEN] == list(range(9))
+        assert [record.payload.index for record in others.records if record.cluster == PEN] == list(
+            range(9)
+        )
         assert not any(record.excluded for record in others.records)
 
 
@@ -101,8 +107,14 @@ def test_the_published_history_has_its_goal_and_its_plan(simulator, tmp_path):
     parts = PublishedHistory().recall(environment.past(PUT + 1), len)
     shown = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
     begins = "<|goal|>Your main goal: put the Pen on the DiningTable<|goal|><image>"
-    assert f"{begins}<|plan|>Plan: put the Pen in the DiningTable<|plan|><|act|><|act|>RotateLeft<|act|>" in shown
-    assert "<|act|>PutObject Pen DiningTable<|act|><image><|goal|>Your main goal: look at a mug" in shown
+    assert (
+        f"{begins}<|plan|>Plan: put the Pen in the DiningTable<|plan|><|act|><|act|>RotateLeft<|act|>"
+        in shown
+    )
+    assert (
+        "<|act|>PutObject Pen DiningTable<|act|><image><|goal|>Your main goal: look at a mug"
+        in shown
+    )
 
 
 # -- files of before July 2026: the sub-goal without an action
@@ -116,7 +128,14 @@ def test_without_actions_it_is_no_plan_and_the_others_are():
         TaskType.PLACE_TWO,
     ]
     plans = plans_of(trajectory, Words.PUBLISHED)
-    assert [(plan.high, plan.task) for plan in plans] == [(0, 0), (1, 0), (2, 0), (3, 0), (5, 2), (6, 2)]
+    assert [(plan.high, plan.task) for plan in plans] == [
+        (0, 0),
+        (1, 0),
+        (2, 0),
+        (3, 0),
+        (5, 2),
+        (6, 2),
+    ]
 
 
 @pytest.mark.usefixtures("shared_simulator")
@@ -130,7 +149,9 @@ def test_without_actions_the_default_goes_on_and_the_published_loop_is_over(prep
 
 @pytest.mark.usefixtures("shared_simulator")
 @pytest.mark.parametrize(("name", "n_plans", "is_last"), [(FORK, 6, True), (CANDLE, 16, False)])
-def test_final_scripts_go_on_but_after_the_last_task_before_it(prepared, tmp_path, name, n_plans, is_last):
+def test_final_scripts_go_on_but_after_the_last_task_before_it(
+    prepared, tmp_path, name, n_plans, is_last
+):
     data = write(tmp_path / "final", put_away_without_actions(name, n_plans, final=True))
     published = {"protocol": "published", "rewards": "published"}
     first, *_ = execute(prepared(tasks=("infthor_final",), data=data, **published)).records

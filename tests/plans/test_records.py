@@ -7,7 +7,14 @@ import pytest
 
 from infthor_eval.plans.records import PlanRecord
 
-PLAN = {"type": "plan", "index": 0, "kind": "GotoLocation", "plan": "go to the mug", "goal": "", "task": 0}
+PLAN = {
+    "type": "plan",
+    "index": 0,
+    "kind": "GotoLocation",
+    "plan": "go to the mug",
+    "goal": "",
+    "task": 0,
+}
 PLAN |= {"first_step": 0, "n_expert_steps": 3}
 
 

@@ -91,7 +91,11 @@ def test_looks_and_turns_are_steps():
         ("RotateRight", None, kitchen(at=(0, 0), horizon=0.0)),
         ("MoveAhead", None, kitchen(at=(0, 1), horizon=0.0)),
         ("LookDown", None, kitchen(at=(0, 1), horizon=30.0)),
-        ("RotateRight", None, kitchen(at=(0, 1), facing=90, horizon=30.0)),  # one ahead is lost behind turns
+        (
+            "RotateRight",
+            None,
+            kitchen(at=(0, 1), facing=90, horizon=30.0),
+        ),  # one ahead is lost behind turns
         ("LookDown", None, kitchen(at=(0, 1), facing=0, horizon=60.0)),
     ]
     assert run(DEFAULT, target, start, events, grid=CORRIDOR) == [
@@ -166,7 +170,13 @@ PICKUPS = [
         [("MoveAhead", None, kitchen(at=(0, 1))), ("PickupObject", MUG, kitchen(refused=True))],
         [(0.0, GOES_ON), (0.0, FAILED)],
     ),
-    ("refused and of no use", PICKUP, kitchen(), [("MoveAhead", None, kitchen(refused=True))], [(0.0, FAILED)]),
+    (
+        "refused and of no use",
+        PICKUP,
+        kitchen(),
+        [("MoveAhead", None, kitchen(refused=True))],
+        [(0.0, FAILED)],
+    ),
 ]
 
 OTHERS = [
@@ -258,7 +268,13 @@ PUTS = [
         [("PutObject", FRIDGE, IN_FRIDGE)],
         [(2.0, DONE)],
     ),
-    ("onto a closed lid", ON_THE_LID, HOLDING, [("PutObject", TOILET, kitchen({MUG: TOILET}))], [(2.0, DONE)]),
+    (
+        "onto a closed lid",
+        ON_THE_LID,
+        HOLDING,
+        [("PutObject", TOILET, kitchen({MUG: TOILET}))],
+        [(2.0, DONE)],
+    ),
     (
         "taken out again",
         STOW,
@@ -449,11 +465,36 @@ MOST = [
     (CLEAN, HOLDING, CLEAN_MUG, 7.0),
     (HEAT, HOLDING, None, 2.0),
     (COOL, HOLDING, None, 6.0),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 9), 0), goal_horizon=60.0), kitchen(), None, 5.6),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 3), 0), goal_horizon=30.0), kitchen(), None, 4.2),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 2), 0), goal_horizon=30.0), kitchen(), None, 4.2),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 0), 0), goal_horizon=30.0), kitchen(), EXAMINE, 9.0),
-    (PlanTarget(PlanKind.GOTO, goal_stand=GridPose((7, 7), 0), goal_horizon=30.0), kitchen(), None, 0.0),
+    (
+        PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 9), 0), goal_horizon=60.0),
+        kitchen(),
+        None,
+        5.6,
+    ),
+    (
+        PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 3), 0), goal_horizon=30.0),
+        kitchen(),
+        None,
+        4.2,
+    ),
+    (
+        PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 2), 0), goal_horizon=30.0),
+        kitchen(),
+        None,
+        4.2,
+    ),
+    (
+        PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 0), 0), goal_horizon=30.0),
+        kitchen(),
+        EXAMINE,
+        9.0,
+    ),
+    (
+        PlanTarget(PlanKind.GOTO, goal_stand=GridPose((7, 7), 0), goal_horizon=30.0),
+        kitchen(),
+        None,
+        0.0,
+    ),
 ]
 
 
@@ -487,7 +528,9 @@ def test_the_rule_sets_differ_in_who_scores_and_grounds_alone():
 
 
 def test_unknown_rules():
-    with pytest.raises(UsageError, match=r"unknown reward rules 'defualt'; did you mean 'default'\?"):
+    with pytest.raises(
+        UsageError, match=r"unknown reward rules 'defualt'; did you mean 'default'\?"
+    ):
         reward_rules("defualt")
 
 
@@ -496,7 +539,10 @@ def test_unknown_rules():
     [
         (PlanTarget(PlanKind.GOTO), "this GotoLocation plan has no pose to reach"),
         (PlanTarget(PlanKind.PICKUP), "this PickupObject plan has no object"),
-        (PlanTarget(PlanKind.OPEN, "Safe|0|0|0"), r"this OpenObject plan is about Safe\|0\|0\|0, which"),
+        (
+            PlanTarget(PlanKind.OPEN, "Safe|0|0|0"),
+            r"this OpenObject plan is about Safe\|0\|0\|0, which",
+        ),
         (PlanTarget(PlanKind.PUT, MUG), "the PutObject plan's receptacle is None"),
         (PlanTarget(PlanKind.COOL, FRIDGE), "this CoolObject plan has no object"),
     ],
@@ -508,11 +554,15 @@ def test_plans_that_nobody_can_carry_out(target, words):
 
 def test_a_way_needs_the_grid():
     with pytest.raises(ValueError, match="needs the grid"):
-        PlanReward(DEFAULT, PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 9), 0)), ELSEWHERE, kitchen())
+        PlanReward(
+            DEFAULT, PlanTarget(PlanKind.GOTO, goal_stand=GridPose((0, 9), 0)), ELSEWHERE, kitchen()
+        )
 
 
 def test_after_the_end():
     plan = PlanReward(DEFAULT, PICKUP, ELSEWHERE, kitchen())
-    assert plan.after({"action": "PickupObject", "objectId": MUG}, kitchen(), HOLDING) == StepReward(2.0, done=True)
+    assert plan.after(
+        {"action": "PickupObject", "objectId": MUG}, kitchen(), HOLDING
+    ) == StepReward(2.0, done=True)
     with pytest.raises(ValueError, match="over"):
         plan.after({"action": "MoveAhead"}, HOLDING, HOLDING)

@@ -3,7 +3,7 @@
 import msgspec
 import psutil
 
-from infthor_eval.plans.baselines import BASELINES
+from infthor_eval.plans.actors.baselines import BASELINES
 from infthor_eval.runs import Silent, execute
 from model_adapters import Capabilities
 

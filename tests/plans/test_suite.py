@@ -26,7 +26,11 @@ def summary(outcome, task="infthor_plans"):
 
 def cells(outcome, title):
     """A table's one row, by the names of its columns."""
-    (table,) = [table for table in outcome.run.suite.tables([outcome.summary]) if table.title.startswith(title)]
+    (table,) = [
+        table
+        for table in outcome.run.suite.tables([outcome.summary])
+        if table.title.startswith(title)
+    ]
     (row,) = [row for row in table.rows if not row.is_published]
     return dict(zip((column.name for column in table.columns), row.cells, strict=False))
 
@@ -40,7 +44,9 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
     found = {(record.cluster, record.payload.index): record.payload for record in outcome.records}
     # By hand, from the expert's actions: eleven steps and a look, the last of which leaves a step (done with fewer
     # than three to go); what is closed is opened and closed around a thing.
-    assert {key: (plan.ended, len(plan.steps), plan.n_expert_steps) for key, plan in found.items()} == {
+    assert {
+        key: (plan.ended, len(plan.steps), plan.n_expert_steps) for key, plan in found.items()
+    } == {
         (FORK, 0): ("done", 10, 12),
         (FORK, 1): ("done", 2, 3),
         (FORK, 2): ("done", 1, 1),
@@ -59,11 +65,17 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
     assert all(plan.reward == plan.max_reward for plan in found.values())
     assert [key for key, plan in found.items() if plan.goal_reached] == [(FORK, 3)]
     assert [step.reward for step in found[FORK, 3].steps] == [2, 7, 2]
-    assert [plan.goal for plan in payloads(outcome)] == ["put a mug on the desk"] * 2 + ["put a fork in the drawer"] * 4
+    assert [plan.goal for plan in payloads(outcome)] == ["put a mug on the desk"] * 2 + [
+        "put a fork in the drawer"
+    ] * 4
     assert [plan.first_step for plan in payloads(outcome)] == [0, 9, 0, 12, 15, 16]
     task = summary(outcome)
     assert (task.n_plans, task.n_trajectories, task.n_failed, task.n_actions) == (6, 2, 0, 24)
-    assert task.reward.mean == task.max_reward.mean == pytest.approx(((6 + 2 + 4.2 + 11) + (5.4 + 2)) / 2)
+    assert (
+        task.reward.mean
+        == task.max_reward.mean
+        == pytest.approx(((6 + 2 + 4.2 + 11) + (5.4 + 2)) / 2)
+    )
     assert {name: (rate.mean, rate.n) for name, rate in task.success.items()} == {
         "Go to": (1, 3),
         "Pick up": (1, 2),
@@ -126,7 +138,11 @@ def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, tmp_path):
 def test_what_a_baseline_does_in_a_trajectory_depends_on_no_other(prepared, data, tmp_path):
     alone = payloads(execute(prepared("random")))
     write(data / "more", cut(MUG, 1))
-    beside = [record for record in execute(prepared("random", output=tmp_path / "b")).records if record.cluster == FORK]
+    beside = [
+        record
+        for record in execute(prepared("random", output=tmp_path / "b")).records
+        if record.cluster == FORK
+    ]
     assert [record.payload for record in beside] == alone
 
 
@@ -134,7 +150,9 @@ def test_habits_are_learnt_in_other_scenes_alone(prepared, data, tmp_path):
     alone = payloads(execute(prepared("history")))
     assert {step.action for plan in alone for step in plan.steps} == {"NoOp"}
     write(data / "more", cut(MUG, 4))
-    learnt = [record.payload for record in execute(prepared("history", output=tmp_path / "b")).records[4:]]
+    learnt = [
+        record.payload for record in execute(prepared("history", output=tmp_path / "b")).records[4:]
+    ]
     assert learnt[0].steps[0].action == "MoveAhead"
     assert learnt[1].steps[0].message.startswith("PickupObject Fork: ")  # the cabinet is closed
     assert learnt[1].ended == "not in view"
@@ -160,9 +178,15 @@ def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_pat
         task = summary(outcome)
         assert (task.n_plans, task.n_failed, sum(task.endings.values())) == (2, 0, 2)
         ((reason, number),) = task.excluded.items()
-        assert reason.startswith("the expert's action 15 (OpenObject Wardrobe, in plan 2) is refused here: ")
+        assert reason.startswith(
+            "the expert's action 15 (OpenObject Wardrobe, in plan 2) is refused here: "
+        )
         assert number == 2
-        assert {name: rate.n for name, rate in task.success.items()} == {"Go to": 1, "Pick up": 1, "total": 2}
+        assert {name: rate.n for name, rate in task.success.items()} == {
+            "Go to": 1,
+            "Pick up": 1,
+            "total": 2,
+        }
         assert cells(outcome, "Plans completed")["excluded"] == "2"
         (table, *_) = outcome.run.suite.tables([outcome.summary])
         assert f"2 left out: {reason}" in table.notes
@@ -170,7 +194,9 @@ def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_pat
 
 def test_a_plan_about_what_is_not_there_counts_for_nobody(prepared, tmp_path):
     document = cut(FORK)
-    document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = "Elephant|+00.00|+00.00|+00.00"
+    document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = (
+        "Elephant|+00.00|+00.00|+00.00"
+    )
     outcome = execute(prepared(data=write(tmp_path / "elephant", document)))
     task = summary(outcome)
     assert task.excluded == {"the scene has no object for 'Elephant|+00.00|+00.00|+00.00'": 1}
@@ -216,12 +242,18 @@ BROKEN = {
         lambda it: it["plan"]["high_pddl"][1]["discrete_action"].update(action="Juggle"),
         "sub-goal 1 is 'Juggle'; there are GotoLocation",
     ),
-    "no goal": (lambda it: it["sub_tasks"][0]["task_info"].update(goal=""), "task 0: a task has no goal"),
+    "no goal": (
+        lambda it: it["sub_tasks"][0]["task_info"].update(goal=""),
+        "task 0: a task has no goal",
+    ),
     "an action without a name": (
         lambda it: it["plan"]["low_actions"][5]["api_action"].update(action=" "),
         "not a trajectory (Expected `str` matching regex",
     ),
-    "no action": (lambda it: it["plan"].update(low_actions=[]), "no plan with an action; leave it out"),
+    "no action": (
+        lambda it: it["plan"].update(low_actions=[]),
+        "no plan with an action; leave it out",
+    ),
 }
 
 
@@ -252,7 +284,10 @@ def test_files_that_cannot_be_read_are_skipped_too(prepared, data):
     task = summary(outcome)
     assert (sum(task.skipped.values()), task.n_trajectories) == (3, 2)
     assert cells(outcome, "Plans completed")["skipped"] == "3"
-    assert all(any(name in reason for reason in task.skipped) for name in ("a.jsonl.gz", "c.json", "d.jsonl:2"))
+    assert all(
+        any(name in reason for reason in task.skipped)
+        for name in ("a.jsonl.gz", "c.json", "d.jsonl:2")
+    )
 
 
 def one_line(caught):
@@ -283,13 +318,20 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
 # -- final tasks
 
 
-def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_published_rows(prepared, tmp_path, monkeypatch):
+def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_published_rows(
+    prepared, tmp_path, monkeypatch
+):
     row = PublishedRow("a paper's model", (), 7.0, (10.0, 20.0, 30.0, 25.0))
-    table = PublishedTable("Table 5", "here", "plans", "", "success", ("Go to", "Pick up", "Put", "total"), (row,))
+    table = PublishedTable(
+        "Table 5", "here", "plans", "", "success", ("Go to", "Pick up", "Put", "total"), (row,)
+    )
     monkeypatch.setattr("infthor_eval.plans.tables.published_tables", {"plans": (table,)}.get)
     data = write(tmp_path / "final", cut(FORK, 6, final=True), cut(MUG, 2))
     outcome = execute(prepared(tasks=("infthor_final",), data=data))
-    assert [(record.cluster, record.payload.index, record.payload.is_final) for record in outcome.records] == [
+    assert [
+        (record.cluster, record.payload.index, record.payload.is_final)
+        for record in outcome.records
+    ] == [
         (FORK, 4, True),
         (FORK, 5, True),
     ]
@@ -297,22 +339,45 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
     assert (task.n_plans, task.n_trajectories, task.success["total"].mean) == (2, 1, 1)
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     assert not any(row.is_published for row in table.rows)
-    assert any(note.startswith("Published rows stand beside runs with --protocol published") for note in table.notes)
-    theirs = execute(prepared(tasks=("infthor_final",), data=data, protocol="published", rewards="published"))
+    assert any(
+        note.startswith("Published rows stand beside runs with --protocol published")
+        for note in table.notes
+    )
+    theirs = execute(
+        prepared(tasks=("infthor_final",), data=data, protocol="published", rewards="published")
+    )
     (table, *_) = theirs.run.suite.tables([theirs.summary])
     (published,) = [row for row in table.rows if row.is_published]
-    assert published.cells == ("a paper's model", "published, Table 5", "10.0", "20.0", "30.0*", "25.0")
+    assert published.cells == (
+        "a paper's model",
+        "published, Table 5",
+        "10.0",
+        "20.0",
+        "30.0*",
+        "25.0",
+    )
     plain = execute(prepared(data=data))
     assert len(plain.records) == 8
     assert not any(row.is_published for row in plain.run.suite.tables([plain.summary])[0].rows)
 
 
 def test_where_no_trajectory_has_a_final_task_that_is_said(prepared, run, data, tmp_path):
-    with pytest.raises(UsageError, match="infthor_final: no trajectory there has a final task") as caught:
+    with pytest.raises(
+        UsageError, match="infthor_final: no trajectory there has a final task"
+    ) as caught:
         prepared(tasks=("infthor_final",))
     one_line(caught)
     code, out, err = run(
-        "--model", "planner", "--tasks", "infthor_final", "--data", data, "--output", tmp_path / "o", "--limit", 3
+        "--model",
+        "planner",
+        "--tasks",
+        "infthor_final",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "o",
+        "--limit",
+        3,
     )
     assert (code, out) == (2, "")
     assert len(err.strip().splitlines()) == 1
@@ -326,7 +391,10 @@ def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_n
     first, *others = outcome.records
     assert first.payload.ended == "refused by the simulator"  # it walks on and on
     assert {record.payload.ended for record in others} == {NOT_ATTEMPTED}
-    assert all((plan.steps, plan.reward, plan.max_reward) == ((), 0, None) for plan in payloads(outcome)[1:])
+    assert all(
+        (plan.steps, plan.reward, plan.max_reward) == ((), 0, None)
+        for plan in payloads(outcome)[1:]
+    )
     task = summary(outcome)
     assert (task.n_plans, task.endings) == (4, {NOT_ATTEMPTED: 3, "refused by the simulator": 1})
     assert task.success["total"].mean == 0
@@ -336,9 +404,11 @@ def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_n
     assert execute(prepared(after_failure="stop")).records[-1].payload.done
 
 
-def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(prepared, monkeypatch):
+def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
+    prepared, monkeypatch
+):
     from infthor_eval.errors import ModelError
-    from infthor_eval.plans import baselines
+    from infthor_eval.plans.actors.protocols import baselines
 
     act = baselines._ExpertActor.act
 
@@ -408,7 +478,11 @@ def test_a_setting_that_would_not_act_is_refused(prepared, task_file, settings, 
 def test_settings_of_a_task_file_act_and_options_go_before_them(prepared, task_file):
     task_file("max_steps: 2, rewards: published")
     plans = payloads(execute(prepared()))
-    assert Counter(plan.ended for plan in plans) == {"step limit": 1, "done": 2, "refused by the simulator": 1}
+    assert Counter(plan.ended for plan in plans) == {
+        "step limit": 1,
+        "done": 2,
+        "refused by the simulator": 1,
+    }
     plans = payloads(execute(prepared(rewards="default")))
     assert Counter(plan.ended for plan in plans) == {"step limit": 2, "done": 2}
 
@@ -418,13 +492,24 @@ def test_settings_of_a_task_file_act_and_options_go_before_them(prepared, task_f
     [
         ("", "no dataset_kwargs; tasks of plans need dataset_kwargs, generation_kwargs"),
         ("dataset_kwargs: 5", "dataset_kwargs must be a mapping of settings"),
-        ("dataset_kwargs: {}\ngeneration_kwargs: {max_gen_toks: 0}", "max_new_tokens must be at least 1, not 0"),
-        ("dataset_kwargs: {}\ngeneration_kwargs: {max_gen_toks: 9, beams: 2}", "generation_kwargs: beams is not known"),
-        ("dataset_kwargs: {}\ngeneration_kwargs: 7", "generation_kwargs is 7; it is a mapping of settings"),
+        (
+            "dataset_kwargs: {}\ngeneration_kwargs: {max_gen_toks: 0}",
+            "max_new_tokens must be at least 1, not 0",
+        ),
+        (
+            "dataset_kwargs: {}\ngeneration_kwargs: {max_gen_toks: 9, beams: 2}",
+            "generation_kwargs: beams is not known",
+        ),
+        (
+            "dataset_kwargs: {}\ngeneration_kwargs: 7",
+            "generation_kwargs is 7; it is a mapping of settings",
+        ),
     ],
 )
 def test_what_is_wrong_beside_the_settings_is_refused_too(prepared, task_files, more, said):
-    (task_files / "plans" / "infthor_plans.yaml").write_text(f"include: _plans.yaml\ntask: infthor_plans\n{more}\n")
+    (task_files / "plans" / "infthor_plans.yaml").write_text(
+        f"include: _plans.yaml\ntask: infthor_plans\n{more}\n"
+    )
     with pytest.raises((DataError, UsageError)) as caught:
         prepared(data=None)
     assert said in one_line(caught)
@@ -446,7 +531,10 @@ def test_another_setting_is_another_run(prepared, data):
         {"constrained": True},
         {"greedy": True},
         {"frames": "blank"},
-        {"tasks": ("infthor_final",), "data": write(data.parent / "final", cut(CANDLE, 2, final=True))},
+        {
+            "tasks": ("infthor_final",),
+            "data": write(data.parent / "final", cut(CANDLE, 2, final=True)),
+        },
     ):
         assert identity(**changes) != plain
     document = cut(FORK)

@@ -35,7 +35,11 @@ def test_a_way_longer_than_the_experts_counts_less(n_agent, n_expert, ended, wei
     assert path_weighted([done_in(n_agent, n_expert, ended)]) == weighted
 
 
-@given(st.lists(st.tuples(st.integers(1, 30), st.integers(1, 30), st.booleans()), min_size=1, max_size=8))
+@given(
+    st.lists(
+        st.tuples(st.integers(1, 30), st.integers(1, 30), st.booleans()), min_size=1, max_size=8
+    )
+)
 def test_it_is_never_above_the_share_of_completed_plans(plans):
     records = [
         done_in(n_agent, n_expert, "done" if done else "step limit", index)

@@ -7,9 +7,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from infthor_eval.manipulation.curves import arm_curves
-from infthor_eval.manipulation.radii import success_by_radius
-from infthor_eval.manipulation.replay_frames import ArmFrame, ArmObservation, EpisodeTitle, NearbyObject, Reach
+from infthor_eval.manipulation.recorded.curves import arm_curves
+from infthor_eval.manipulation.recorded.radii import success_by_radius
+from infthor_eval.manipulation.recorded.replay_frames import (
+    ArmFrame,
+    ArmObservation,
+    EpisodeTitle,
+    NearbyObject,
+    Reach,
+)
 from infthor_eval.report.figures.curve_tables import curves_table, one_panel
 from infthor_eval.report.figures.curves import draw_curves
 from infthor_eval.report.figures.radius import draw_radii, radii_table
@@ -24,7 +30,9 @@ GREEN, RED = (26, 127, 55), (193, 39, 45)
 NAMED, HAND = (213, 94, 0), (0, 114, 178)
 MUG = NearbyObject("Mug", ((0.1, 0.6), (0.1, 0.7), (0.2, 0.7), (0.2, 0.6)), 0.8, 0.9, is_named=True)
 TABLE = NearbyObject("SideTable", ((-0.3, 0.5), (-0.3, 1.2), (0.4, 1.2), (0.4, 0.5)), 0.0, 0.8)
-FAR = NearbyObject("Sofa", ((3.0, 0.5), (3.0, 1.2), (4.0, 1.2), (4.0, 0.5)), 0.0, 0.8, is_named=False)
+FAR = NearbyObject(
+    "Sofa", ((3.0, 0.5), (3.0, 1.2), (4.0, 1.2), (4.0, 0.5)), 0.0, 0.8, is_named=False
+)
 WAY = ((0.0, 0.3, 0.8), (0.1, 0.5, 0.9))
 JOINTS = ((0.0, 0.0, 0.8), (0.0, 0.2, 0.9))
 REACH = Reach(JOINTS, WAY[-1], 0.2, WAY, (TABLE, MUG, FAR), (-0.4, -0.1, 0.5), (0.5, 0.9, 1.2))
@@ -42,8 +50,16 @@ END = replace(
 
 
 def runs():
-    records = [episode(name, number, kind) for name in "ab" for number, kind in enumerate(("pickup", "put"))]
-    lost = [episode(name, number, kind, done=False) for name in "ab" for number, kind in enumerate(("pickup", "put"))]
+    records = [
+        episode(name, number, kind)
+        for name in "ab"
+        for number, kind in enumerate(("pickup", "put"))
+    ]
+    lost = [
+        episode(name, number, kind, done=False)
+        for name in "ab"
+        for number, kind in enumerate(("pickup", "put"))
+    ]
     return [made_run("m", lost, radius=0.1), made_run("m", records), planner_run(records)]
 
 
@@ -72,16 +88,41 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
         assert words in said
     assert said.count("the expert's step (low-level action)") == 3
     table = curves_table(curves)
-    names = ["run", "reward", "95 % interval", "of the bound, %", "of pick-ups", "of puts", "at step"]
+    names = [
+        "run",
+        "reward",
+        "95 % interval",
+        "of the bound, %",
+        "of pick-ups",
+        "of puts",
+        "at step",
+    ]
     assert [column.name for column in table.columns] == [*names, "episodes", "failed"]
-    assert table.rows[1].cells == ("run 1", "4.00", "[4.00, 4.00]", "100.0", "2.00", "2.00", "1", "4", "0")
+    assert table.rows[1].cells == (
+        "run 1",
+        "4.00",
+        "[4.00, 4.00]",
+        "100.0",
+        "2.00",
+        "2.00",
+        "1",
+        "4",
+        "0",
+    )
 
 
 def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
     found = success_by_radius(runs())
     one, other = (draw_radii(found, tmp_path, name)[1] for name in ("one", "other"))
     assert one.read_bytes() == other.read_bytes()
-    for words in ("Pick-up", "Put", "m", "planner-arm", "in the sphere at the start", "success (%)"):
+    for words in (
+        "Pick-up",
+        "Put",
+        "m",
+        "planner-arm",
+        "in the sphere at the start",
+        "success (%)",
+    ):
         assert words in texts(one)
     with Image.open(tmp_path / "one.png") as picture:
         assert min(picture.size) > 300
@@ -115,7 +156,12 @@ def test_the_ending_is_green_or_red_and_what_is_told_is_written():
     assert RED in colours(draw_arm_frame(lost, ""))
     assert not {GREEN, RED} & colours(draw_arm_frame(START, ""))
     plain = draw_arm_frame(END, "").tobytes()
-    for change in ({"refusals": ("Collided",)}, {"note": "differs"}, {"requests": ("other",)}, {"n_collisions": 3}):
+    for change in (
+        {"refusals": ("Collided",)},
+        {"note": "differs"},
+        {"requests": ("other",)},
+        {"n_collisions": 3},
+    ):
         assert draw_arm_frame(replace(END, **change), "").tobytes() != plain
 
 

@@ -16,11 +16,15 @@ ABOVE = "strict, above guessing"
 
 
 def asked(number, reply, score=0.5, mean=0.5):
-    return record(number, reply, guess=Guess(form="f", scores={"strict": score}, form_scores={"strict": mean}))
+    return record(
+        number, reply, guess=Guess(form="f", scores={"strict": score}, form_scores={"strict": mean})
+    )
 
 
 def compared(first, second, presenter=None):
-    return {one.metric: one for one in compare(NiehSuite(), presenter or NiehPresenter(), first, second)}
+    return {
+        one.metric: one for one in compare(NiehSuite(), presenter or NiehPresenter(), first, second)
+    }
 
 
 def test_further_scores_are_those_above_guessing_where_guessing_does_not_solve_the_form():
@@ -35,7 +39,10 @@ def test_further_scores_are_those_above_guessing_where_guessing_does_not_solve_t
 
 def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
     # Question 0 has no guess and 1 is solved by guessing; the others count, of one form with a guess of 0.5 each.
-    replies = (("mug", "mug", "cup", "cup", "mug", "mug"), ("mug", "cup", "mug", "mug", "mug", "cup"))
+    replies = (
+        ("mug", "mug", "cup", "cup", "mug", "mug"),
+        ("mug", "cup", "mug", "mug", "mug", "cup"),
+    )
     runs = [
         [record(0, first), asked(1, second, 1.0, 1.0), *map(asked, (2, 3, 6, 7), counted)]
         for first, second, *counted in replies
@@ -46,7 +53,10 @@ def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
     assert (plain.first, plain.second, plain.difference.estimate.n) == (4 / 6, 4 / 6, 6)
     # From 2 of 4 right to 3 of 4: (0.5 - 0.5) / 0.5 = 0 and (0.75 - 0.5) / 0.5 = 0.5.
     assert (above.first, above.second, above.difference.estimate.n) == (0.0, 0.5, 4)
-    assert (above.difference.estimate.mean, above.difference.estimate.n_clusters) == (pytest.approx(0.5), 2)
+    assert (above.difference.estimate.mean, above.difference.estimate.n_clusters) == (
+        pytest.approx(0.5),
+        2,
+    )
     assert above.is_share
     row = comparison_table(found.values(), "a", "b").rows[-1].cells
     assert row[:6] == ("nieh_gt", ABOVE, "%", "0.00", "50.00", "+50.00")
@@ -73,7 +83,13 @@ def test_a_metric_that_one_run_has_not_is_not_compared():
 
 
 def test_units_that_one_run_alone_has_are_counted_and_without_a_shared_one_there_is_an_error():
-    found = compared([asked(0, "mug"), asked(1, "mug")], [asked(1, "mug"), asked(2, "mug"), asked(3, "mug")])
-    assert {metric: one.n_unshared for metric, one in found.items()} == {"reference": 3, "strict": 3, ABOVE: 3}
+    found = compared(
+        [asked(0, "mug"), asked(1, "mug")], [asked(1, "mug"), asked(2, "mug"), asked(3, "mug")]
+    )
+    assert {metric: one.n_unshared for metric, one in found.items()} == {
+        "reference": 3,
+        "strict": 3,
+        ABOVE: 3,
+    }
     with pytest.raises(DataError, match="share no unit of the same task"):
         compared([record(0, "mug")], [record(1, "mug")])

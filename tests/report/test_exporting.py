@@ -13,9 +13,9 @@ from infthor_eval.report.exporting import export_tables
 from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
 
 # What a table's cell may hold; blanks in a row are one, and control characters are written out.
-CELLS = st.text(st.characters(categories=("L", "N", "P", "S"), include_characters=" \n"), max_size=12).map(
-    lambda text: " ".join(text.split())
-)
+CELLS = st.text(
+    st.characters(categories=("L", "N", "P", "S"), include_characters=" \n"), max_size=12
+).map(lambda text: " ".join(text.split()))
 TABLES = st.lists(st.tuples(CELLS, CELLS), min_size=1, max_size=4)
 
 
@@ -46,15 +46,24 @@ def test_every_number_of_csv_has_a_column_of_its_own_and_a_missing_one_is_empty(
         assert heading == ["a", "a low", "a high", "95 % low", "95 % high", "n"]
         for line, rate, (low, high) in zip(lines, rates, ends, strict=False):
             numbers = [None if rate is None else rate.mean, low, high, low, high, 1234]
-            assert line == ["" if value is None else f"{value:.1f}" for value in numbers[:5]] + ["1234"]
+            assert line == ["" if value is None else f"{value:.1f}" for value in numbers[:5]] + [
+                "1234"
+            ]
     assert set(lines[-1]) == {""}
 
 
 def test_a_plain_number_stands_in_the_first_of_several_columns():
     both = TableCell("12.5 (4)", {"": "12.5", "questions": "4"})
     rows = (Row((both,)), Row(("20.25",), is_published=True), Row(("+1.00 =",)))
-    assert read_csv(Table("", (Column("one"),), rows))[:3] == [["one", "one questions"], ["12.5", "4"], ["20.25", ""]]
-    assert export_tables([Table("", (Column("one"),), rows)], "markdown").splitlines()[2] == "| 12.5 (4) |"
+    assert read_csv(Table("", (Column("one"),), rows))[:3] == [
+        ["one", "one questions"],
+        ["12.5", "4"],
+        ["20.25", ""],
+    ]
+    assert (
+        export_tables([Table("", (Column("one"),), rows)], "markdown").splitlines()[2]
+        == "| 12.5 (4) |"
+    )
 
 
 _COMMANDS = {

@@ -7,9 +7,14 @@ import pytest
 from PIL import Image
 
 from infthor_eval.errors import DataError
-from infthor_eval.plans.curves import plan_curves
+from infthor_eval.plans.recorded.curves import plan_curves
 from infthor_eval.plans.records import RECORDS
-from infthor_eval.report.figures.curve_tables import curves_table, embedded_label, one_panel, read_panels
+from infthor_eval.report.figures.curve_tables import (
+    curves_table,
+    embedded_label,
+    one_panel,
+    read_panels,
+)
 from infthor_eval.report.figures.curves import draw_curves
 from infthor_eval.report.figures.style import looks_of
 from infthor_eval.runs import read_run
@@ -22,7 +27,13 @@ EXAMPLE = Path(__file__).parents[2] / "docs" / "figure7_panels.yaml"
 
 def records(reward: float, *, tokens: bool = True):
     return [
-        plan(name, index, (10 * index, 10 * index + 10), reward + number, context=100 * index if tokens else None)
+        plan(
+            name,
+            index,
+            (10 * index, 10 * index + 10),
+            reward + number,
+            context=100 * index if tokens else None,
+        )
         for number, name in enumerate(("a", "b", "c"))
         for index in range(4)
     ]
@@ -88,14 +99,26 @@ def test_a_bound_without_tokens_leaves_one_column(tmp_path):
 
 def test_the_label_names_the_embedded_runs_where_not_all_are():
     assert embedded_label(plan_curves(runs(simulator="unity"))) is None
-    mixed = plan_curves([made_run("m", records(1.0)), made_run("n", records(1.0), simulator="unity")])
+    mixed = plan_curves(
+        [made_run("m", records(1.0)), made_run("n", records(1.0), simulator="unity")]
+    )
     assert embedded_label(mixed) == "embedded simulator (m): not comparable with the paper's curves"
 
 
 def test_the_table_has_the_ends():
     table = curves_table(plan_curves(runs()))
     # Of the first run, 4 plans in each of three trajectories: 4, 8 and 12 points; 8, 12 and 16 of the planner.
-    assert table.rows[0].cells == ("model $x$ & <y>", "8.00", "[-1.94, 17.94]", "66.7", "40", "300", "12", "0", "0")
+    assert table.rows[0].cells == (
+        "model $x$ & <y>",
+        "8.00",
+        "[-1.94, 17.94]",
+        "66.7",
+        "40",
+        "300",
+        "12",
+        "0",
+        "0",
+    )
     assert table.rows[-1].cells[:4] == ("planner", "12.00", "[2.06, 21.94]", "100.0")
     assert table.rows[1].cells[5] == "-"
     assert table.rows[-1].cells[5] == "300"
@@ -107,7 +130,12 @@ def test_panels_have_their_runs_and_the_bound(tmp_path):
     file.write_text("First: ['model $x$ & <y>']\nSecond: [_random]\n")
     _, svg = draw_curves(curves, read_panels(file, curves), tmp_path, "figure7")
     said = texts(svg)
-    assert [said.count(words) for words in ("First", "Second", "planner", "_random")] == [1, 1, 2, 1]
+    assert [said.count(words) for words in ("First", "Second", "planner", "_random")] == [
+        1,
+        1,
+        2,
+        1,
+    ]
     assert "context tokens are not reported" in said
 
 
@@ -163,7 +191,13 @@ def test_runs_beyond_the_number_of_lines_take_them_again():
 def long_records(done: float, *, tokens: bool = True):
     """Two trajectories of plans of thirty steps of 700 tokens, up to half a million; a part of them is done."""
     return [
-        plan(name, index, (30 * index, 30 * index + 30), 4.0 * done, context=21_000 * (index + 1) if tokens else None)
+        plan(
+            name,
+            index,
+            (30 * index, 30 * index + 30),
+            4.0 * done,
+            context=21_000 * (index + 1) if tokens else None,
+        )
         for name, n_plans in (("a", 24), ("b", 23))
         for index in range(n_plans)
     ]
@@ -171,8 +205,12 @@ def long_records(done: float, *, tokens: bool = True):
 
 def test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each(tmp_path, run):
     made = [made_run(name, long_records((number + 1) / 16)) for number, name in enumerate(NAMES)]
-    folders = [write_run(each, tmp_path) for each in (*made, planner_run(long_records(1.0, tokens=False)))]
-    code, said, err = run("report", *folders, "--figure", "7", "--panels", EXAMPLE, "--out", tmp_path)
+    folders = [
+        write_run(each, tmp_path) for each in (*made, planner_run(long_records(1.0, tokens=False)))
+    ]
+    code, said, err = run(
+        "report", *folders, "--figure", "7", "--panels", EXAMPLE, "--out", tmp_path
+    )
     assert (code, err) == (0, "")
     assert "in no panel" not in said
     words = texts(tmp_path / "figure7.svg")
@@ -185,37 +223,79 @@ def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run, monkey
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "data", cut(CANDLE, 2))
     asked = ("--tasks", "infthor_plans", "--data", "data", "--rewards", "published")
-    training = ("--model", "llava-onevision-tiny", "--model-args", "dtype=float32,rope=yarn:4", "--set")
+    training = (
+        "--model",
+        "llava-onevision-tiny",
+        "--model-args",
+        "dtype=float32,rope=yarn:4",
+        "--set",
+    )
     for words in (
         ("replay", "data", "--out", "set"),
-        ("train", "--recipe", "infthor_32k", "--data", "set", "--out", "trained", *training, "max_steps=1"),
+        (
+            "train",
+            "--recipe",
+            "infthor_32k",
+            "--data",
+            "set",
+            "--out",
+            "trained",
+            *training,
+            "max_steps=1",
+        ),
         ("--model", "planner", *asked),
         *(_asked_as(name, *asked) for name in NAMES),
     ):
         code, _, err = run(*words)
         assert code == 0, f"{words}\n{err}"
-    code, said, _ = run("report", *sorted(Path("results").glob("*/*")), "--figure", "7", "--panels", EXAMPLE)
+    code, said, _ = run(
+        "report", *sorted(Path("results").glob("*/*")), "--figure", "7", "--panels", EXAMPLE
+    )
     assert code == 0
     assert "in no panel" not in said
     assert {line.split()[0] for line in said.splitlines() if line.split()} >= {*NAMES, "planner"}
     words = texts(Path("results/figures/figure7.svg"))
     assert words.count("planner") == 6
-    replies = {name: _replies(Path("results", name)) for name in (FT[32], f"{FT[32]}-longrope4", f"{FT[32]}-yarn4")}
+    replies = {
+        name: _replies(Path("results", name))
+        for name in (FT[32], f"{FT[32]}-longrope4", f"{FT[32]}-yarn4")
+    }
     plain, longrope, yarn = replies.values()
-    assert plain == longrope != yarn  # as the published logs; contexts are within the original length
+    assert (
+        plain == longrope != yarn
+    )  # as the published logs; contexts are within the original length
     assert not any("continuation" in word or "differ" in word for word in words)
 
 
 def _replies(folder: Path) -> list[list[str | None]]:
     (journal,) = folder.iterdir()
-    return [[step.reply for step in record.payload.steps] for record in read_run(journal, RECORDS)[1]]
+    return [
+        [step.reply for step in record.payload.steps] for record in read_run(journal, RECORDS)[1]
+    ]
 
 
 def _asked_as(name: str, *asked: str) -> tuple[str, ...]:
     """The command of docs/figures.md that makes the run of this name, with a tiny model in the place of the large."""
-    _, trained, extended = re.fullmatch(r"(llava-ft\d+k)(@yarn4)?(?:-(.+))?", name).groups(default="")
-    model = "llava-onevision,pretrained=trained/checkpoint" if trained else "llava-onevision-tiny,dtype=float32"
+    _, trained, extended = re.fullmatch(r"(llava-ft\d+k)(@yarn4)?(?:-(.+))?", name).groups(
+        default=""
+    )
+    model = (
+        "llava-onevision,pretrained=trained/checkpoint"
+        if trained
+        else "llava-onevision-tiny,dtype=float32"
+    )
     model, _, options = model.partition(",")
     rope = ("--rope", re.sub(r"(\d+)$", r":\1", extended)) if extended else ()
     options = f"{options},prompt=plain,max_tokens=0"
-    return ("--model", model, "--model-args", options, *rope, "--history", "published", *asked, "--name", name)
+    return (
+        "--model",
+        model,
+        "--model-args",
+        options,
+        *rope,
+        "--history",
+        "published",
+        *asked,
+        "--name",
+        name,
+    )

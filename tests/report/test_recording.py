@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from infthor_eval.plans.replay_frames import (
+from infthor_eval.plans.recorded.replay_frames import (
     FloorPose,
     MapObject,
     PlanFrame,
@@ -16,11 +16,18 @@ from infthor_eval.plans.replay_frames import (
 )
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.report.recordings.fonts import break_lines, fit_line, font, one_line
-from infthor_eval.report.recordings.plan_pictures import draw_plan_frame, draw_plan_title, plan_pictures
+from infthor_eval.report.recordings.plan_pictures import (
+    draw_plan_frame,
+    draw_plan_title,
+    plan_pictures,
+)
 from infthor_eval.report.recordings.room_map import draw_map
 
 FLOOR = tuple((x * 0.25, z * 0.25) for x in range(8) for z in range(8))
-TABLE, MUG = MapObject("SideTable", (2.0, 0.0), (2.6, 1.0)), MapObject("Mug", (2.2, 0.4), (2.3, 0.5), is_named=True)
+TABLE, MUG = (
+    MapObject("SideTable", (2.0, 0.0), (2.6, 1.0)),
+    MapObject("Mug", (2.2, 0.4), (2.3, 0.5), is_named=True),
+)
 ROOM = RoomMap(FLOOR, (TABLE, MUG), FloorPose((1.75, 0.5), 90))
 FRAME = np.full((300, 300, 3), 90, np.uint8)
 SIGHT = PlanObservation(FRAME, ROOM, FloorPose((0.5, 0.5), 90), ((0.25, 0.5), (0.5, 0.5)))

@@ -25,7 +25,9 @@ def test_each_task_says_what_distinguishes_it_and_that_is_no_setting():
     assert {tuple(task.settings["metadata"]) for task in tasks} == {("version", "suite")}
 
 
-@pytest.mark.parametrize(("name", "near"), [("nieh_ful", "'nieh_full'"), ("neih", "'nieh'"), ("xyz", "nieh_mini_gt")])
+@pytest.mark.parametrize(
+    ("name", "near"), [("nieh_ful", "'nieh_full'"), ("neih", "'nieh'"), ("xyz", "nieh_mini_gt")]
+)
 def test_an_unknown_name_is_answered_with_the_nearest(name, near):
     with pytest.raises(UsageError) as caught:
         Catalog.find_packaged().expand([name])
@@ -55,5 +57,8 @@ def test_a_key_that_the_suite_needs_is_named(tmp_path):
     (tmp_path / "a.yaml").write_text("task: a\nmetadata: {suite: nieh}\ntest_split: test")
     (task,) = Catalog(tmp_path).expand(["a"])
     task.require("test_split")
-    with pytest.raises(DataError, match=r"a\.yaml: no dataset_kwargs; tasks of nieh need test_split, dataset_kwargs"):
+    with pytest.raises(
+        DataError,
+        match=r"a\.yaml: no dataset_kwargs; tasks of nieh need test_split, dataset_kwargs",
+    ):
         task.require("test_split", "dataset_kwargs")

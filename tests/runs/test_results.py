@@ -29,7 +29,10 @@ def test_the_hit_rate_is_a_share_of_what_was_read(counts: list[tuple[int, int]])
 @pytest.mark.parametrize(
     ("usage", "said"),
     [
-        (Usage(2, 1000, 250, 10), "2 requests, 1,000 tokens read (250 of them cached, 25.0 %), 10 written"),
+        (
+            Usage(2, 1000, 250, 10),
+            "2 requests, 1,000 tokens read (250 of them cached, 25.0 %), 10 written",
+        ),
         (Usage(2), "2 requests, 0 tokens read (0 of them cached), 0 written"),
         (
             Usage(2, 1000, 0, 10, 0.5),
@@ -76,7 +79,9 @@ def test_what_a_task_is_known_by_stands_in_the_results(tmp_path: Any) -> None:
 def test_a_run_writes_both_and_results_have_nothing_that_differs(tmp_path: Any) -> None:
     suite = ToySuite()
     outcome = execute(prepare(request(tmp_path), suite))
-    results, took = ((outcome.folder / name).read_bytes() for name in ("results.json", "usage.json"))
+    results, took = (
+        (outcome.folder / name).read_bytes() for name in ("results.json", "usage.json")
+    )
     again = execute(prepare(request(tmp_path), suite))
     assert (again.folder / "results.json").read_bytes() == results
     assert json.loads(took)["requests"] == json.loads(results)["usage"]["requests"]

@@ -28,7 +28,11 @@ class Sums:
     """The bound evaluation."""
 
     def __init__(self):
-        units = [runs.Unit(runs.UnitKey("sums", f"{a}+{b}"), f"from {a}", Sum((a, b))) for a in (1, 2) for b in (3, 4)]
+        units = [
+            runs.Unit(runs.UnitKey("sums", f"{a}+{b}"), f"from {a}", Sum((a, b)))
+            for a in (1, 2)
+            for b in (3, 4)
+        ]
         skipped = [runs.Skipped(runs.UnitKey("sums", "0+0"), "nothing to add")]
         groups = [runs.Group(units[:2]), runs.Group(units[2:])]
         self.workload = runs.Workload(groups, skipped, {"tasks": {"sums": {}}})
@@ -43,7 +47,9 @@ class Sums:
 
     def to_sample(self, record):
         a, b = record.payload.numbers
-        return runs.UnitSample(a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer))
+        return runs.UnitSample(
+            a * 10 + b, {"numbers": [a, b]}, str(a + b), f"{a}+{b}", {}, str(record.payload.answer)
+        )
 
     def close(self):
         pass
@@ -79,7 +85,9 @@ class ToySuite:
         return Prepared(Sums)
 
     def summarise(self, header, records):
-        return Sum((sum(r.failure is None for r in records), sum(r.failure is not None for r in records)))
+        return Sum(
+            (sum(r.failure is None for r in records), sum(r.failure is not None for r in records))
+        )
 
     def scores(self, record):
         return {"right": float(record.payload.answer == sum(record.payload.numbers))}

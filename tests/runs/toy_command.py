@@ -11,7 +11,12 @@ from tests.runs.toy import Sums, ToySuite, suite_of
 
 def request(output, **changes):
     task = TaskFile("sums", "toy", Path("sums.yaml"), {"task": "sums", "metadata": {"version": 1}})
-    fields = {"model": "adder", "tasks": TaskRequest([task], None), "asked": ("sums",), "output": output}
+    fields = {
+        "model": "adder",
+        "tasks": TaskRequest([task], None),
+        "asked": ("sums",),
+        "output": output,
+    }
     return RunRequest(**{**fields, **changes})
 
 

@@ -17,7 +17,9 @@ from .views import thing, view
 MUG = thing("Mug|+01.00|+00.90|+00.00", pickupable=True, distance=1.0)
 NEAR_MUG = thing("Mug|+00.50|+00.90|+00.00", pickupable=True, distance=0.5)
 HIDDEN_MUG = thing("Mug|+00.10|+00.90|+00.00", pickupable=True, distance=0.1, visible=False)
-FRIDGE = thing("Fridge|+02.00|+00.00|+00.00", receptacle=True, openable=True, is_open=True, distance=1.2)
+FRIDGE = thing(
+    "Fridge|+02.00|+00.00|+00.00", receptacle=True, openable=True, is_open=True, distance=1.2
+)
 APPLE = thing("Apple|+00.00|+00.90|+01.00", pickupable=True, sliceable=True, distance=1.0)
 
 
@@ -26,7 +28,9 @@ def test_text_is_read_and_written_alike(text):
     assert str(parse_action(f"  {text} ")) == text
 
 
-@pytest.mark.parametrize("text", ["", "Fly", "PickupObject", "MoveAhead Mug", "PutObject Mug", "pickupobject Mug"])
+@pytest.mark.parametrize(
+    "text", ["", "Fly", "PickupObject", "MoveAhead Mug", "PutObject Mug", "pickupobject Mug"]
+)
 def test_other_text_is_refused(text):
     with pytest.raises(UngroundedError):
         parse_action(text)
@@ -52,7 +56,9 @@ def test_what_does_not_apply_is_told(text, world, words):
 
 
 def test_put_names_the_receptacle():
-    call = ground(parse_action("PutObject Mug Fridge"), view(MUG, FRIDGE, inventory=[MUG.object_id]))
+    call = ground(
+        parse_action("PutObject Mug Fridge"), view(MUG, FRIDGE, inventory=[MUG.object_id])
+    )
     assert call == {"action": "PutObject", "objectId": FRIDGE.object_id}
 
 
@@ -75,17 +81,24 @@ def test_types_of_ids(object_id, object_type):
 
 
 def test_what_is_possible_counts_every_object_in_view():
-    drawers = [thing(f"Drawer|+0{number}.00|+00.50|+00.00", openable=True, receptacle=True) for number in range(3)]
+    drawers = [
+        thing(f"Drawer|+0{number}.00|+00.50|+00.00", openable=True, receptacle=True)
+        for number in range(3)
+    ]
     mug = thing("Mug|+00.20|+00.90|+00.00", pickupable=True)
     hidden = thing("Cup|+00.30|+00.90|+00.00", pickupable=True, visible=False)
     calls = applicable_calls(view(*drawers, mug, hidden), degrees=15.0)
     assert [call["action"] for call in calls].count("OpenObject") == 3
     assert {"action": "LookUp", "degrees": 15.0} in calls
-    assert {call["objectId"] for call in calls if call["action"] == "PickupObject"} == {mug.object_id}
+    assert {call["objectId"] for call in calls if call["action"] == "PickupObject"} == {
+        mug.object_id
+    }
     assert not [call for call in calls if call["action"] == "PutObject"]
     texts = [str(text) for text in applicable_actions(view(*drawers, mug, hidden))]
     assert texts.count("OpenObject Drawer") == 1
     held = view(*drawers, mug, inventory=[mug.object_id])
-    assert [str(text_of_call(call, held)) for call in applicable_calls(held) if call["action"] == "PutObject"] == [
-        "PutObject Mug Drawer"
-    ] * 3
+    assert [
+        str(text_of_call(call, held))
+        for call in applicable_calls(held)
+        if call["action"] == "PutObject"
+    ] == ["PutObject Mug Drawer"] * 3

@@ -42,7 +42,9 @@ def test_a_query_is_no_part_of_the_episode():
         assert simulator.mark().episode == ()
 
 
-@pytest.mark.parametrize("actions", [["MoveAhead", "RotateRight", "LookDown"], ["RotateLeft", "Crouch", "MoveAhead"]])
+@pytest.mark.parametrize(
+    "actions", [["MoveAhead", "RotateRight", "LookDown"], ["RotateLeft", "Crouch", "MoveAhead"]]
+)
 def test_rewinding_brings_the_world_back(actions):
     with Simulator(embedded_launch()) as simulator:
         simulator.reset(SCENE)
@@ -57,7 +59,10 @@ def test_rewinding_brings_the_world_back(actions):
         again = [simulator.step("MoveAhead"), simulator.step("RotateRight")]
         assert all(one.agent == other.agent for one, other in zip(after, again, strict=True))
         # Walking adds rounding errors that a teleport does not: single pixels at edges may differ.
-        assert all(np.mean(one.frame != other.frame) < 1e-3 for one, other in zip(after, again, strict=True))
+        assert all(
+            np.mean(one.frame != other.frame) < 1e-3
+            for one, other in zip(after, again, strict=True)
+        )
 
 
 def test_the_last_two_marks_are_gone_back_to_without_repeating_the_episode(monkeypatch):
@@ -87,7 +92,11 @@ def test_nothing_is_drawn_to_rewind():
         simulator.rewind(mark, exactly=True)
         event = simulator._controller.last_event
         assert event.metadata["lastAction"] == "RestoreState"
-        assert (event.frame, event.depth_frame, event.instance_segmentation_frame) == (None, None, None)
+        assert (event.frame, event.depth_frame, event.instance_segmentation_frame) == (
+            None,
+            None,
+            None,
+        )
 
 
 @pytest.mark.parametrize("exactly", [False, True])
@@ -127,13 +136,19 @@ def test_without_copies_the_way_is_gone_again():
 
 @pytest.mark.parametrize("scene", ["FloorPlan9999", "nowhere"])
 def test_an_unknown_scene_is_one_line(scene):
-    with Simulator(embedded_launch()) as simulator, pytest.raises(SimulatorError, match=scene) as caught:
+    with (
+        Simulator(embedded_launch()) as simulator,
+        pytest.raises(SimulatorError, match=scene) as caught,
+    ):
         simulator.reset(scene)
     assert "\n" not in str(caught.value)
 
 
 def test_an_executable_that_is_not_there():
-    with Simulator(Launch("/nowhere/simulator")) as simulator, pytest.raises(SimulatorError, match="nowhere"):
+    with (
+        Simulator(Launch("/nowhere/simulator")) as simulator,
+        pytest.raises(SimulatorError, match="nowhere"),
+    ):
         simulator.reset(SCENE)
 
 

@@ -36,7 +36,9 @@ def test_moves_without_the_old_force():
 
 
 def test_put_names_the_receptacle_alone():
-    api = ApiAction("PutObject", "Mug|+01.01|+00.90|+00.00", "Fridge|+02.10|+00.00|+00.00", force_action=True)
+    api = ApiAction(
+        "PutObject", "Mug|+01.01|+00.90|+00.00", "Fridge|+02.10|+00.00|+00.00", force_action=True
+    )
     assert call(api) == {
         "action": "PutObject",
         "objectId": FRIDGE.object_id,

@@ -22,13 +22,19 @@ def n_seen(view: SimulatorView) -> int:
     return sum(instance.pixels >= 10 for instance in view.instances.values())
 
 
-@pytest.mark.parametrize("scene", ["kitchen-1", "living-room-4", "bedroom-5", "bathroom-3", "house-3"])
-def test_it_shows_several_times_as_many_objects_as_the_first_frame(simulator: Simulator, scene: str) -> None:
+@pytest.mark.parametrize(
+    "scene", ["kitchen-1", "living-room-4", "bedroom-5", "bathroom-3", "house-3"]
+)
+def test_it_shows_several_times_as_many_objects_as_the_first_frame(
+    simulator: Simulator, scene: str
+) -> None:
     first = simulator.reset(scene)
     places = [Vector(**place) for place in simulator.query("GetReachablePositions").result]
     pose = find_room_view(simulator, places, SIZE * SIZE)
     assert simulator.view.agent == first.agent
-    assert any(abs(place.x - pose.position.x) + abs(place.z - pose.position.z) < 0.01 for place in places)
+    assert any(
+        abs(place.x - pose.position.x) + abs(place.z - pose.position.z) < 0.01 for place in places
+    )
     shown = simulator.query(**teleport_call(pose))
     assert shown.success
     assert n_seen(shown) >= 2 * n_seen(first)

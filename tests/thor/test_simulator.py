@@ -55,7 +55,9 @@ def test_steps_give_views(tmp_path):
         assert simulator.view is view
 
 
-@pytest.mark.parametrize(("action", "message"), [("Refused", "no room"), ("Unknown", "Invalid action")])
+@pytest.mark.parametrize(
+    ("action", "message"), [("Refused", "no room"), ("Unknown", "Invalid action")]
+)
 def test_a_refusal_is_a_view(tmp_path, action, message):
     with Simulator(scripted(tmp_path)) as simulator:
         simulator.reset("kitchen-1")
@@ -119,15 +121,22 @@ def test_what_is_repeated_to_come_to_a_mark_is_kept_for_the_next_time():
         assert simulator.rewind(mark, exactly=True).agent == mark.view.agent
         simulator.step("RotateRight")
         calls, step = [], simulator.step
-        simulator.step = lambda action, **arguments: calls.append(action) or step(action, **arguments)
+        simulator.step = lambda action, **arguments: (
+            calls.append(action) or step(action, **arguments)
+        )
         assert simulator.rewind(mark, exactly=True).agent == mark.view.agent
         assert calls == ["RestoreState"]
 
 
 @pytest.mark.parametrize("fault", ["die!", "hang!"])
 def test_a_simulator_that_never_starts(tmp_path, fault):
-    launch = Launch(scripted(tmp_path, fault, "handshake").executable, timeout=1.0, start_timeout=1.0)
-    with Simulator(launch, max_restarts=1) as simulator, pytest.raises(SimulatorError, match="at starting"):
+    launch = Launch(
+        scripted(tmp_path, fault, "handshake").executable, timeout=1.0, start_timeout=1.0
+    )
+    with (
+        Simulator(launch, max_restarts=1) as simulator,
+        pytest.raises(SimulatorError, match="at starting"),
+    ):
         simulator.reset("kitchen-1")
 
 

@@ -24,14 +24,23 @@ def trajectory(*names, objects=()):
 
 
 def test_the_path_turns_with_the_agent():
-    moved = trajectory("MoveAhead", "RotateLeft", "MoveAhead", "RotateRight", "MoveBack", "MoveRight")
-    assert agent_path(moved) == [(0.5, -1.0), (0.75, -1.0), (0.75, -0.75), (0.5, -0.75), (0.5, -1.0)]
+    moved = trajectory(
+        "MoveAhead", "RotateLeft", "MoveAhead", "RotateRight", "MoveBack", "MoveRight"
+    )
+    assert agent_path(moved) == [
+        (0.5, -1.0),
+        (0.75, -1.0),
+        (0.75, -0.75),
+        (0.5, -0.75),
+        (0.5, -1.0),
+    ]
 
 
 def test_the_file_unites_the_trajectories(tmp_path):
     one = trajectory("MoveAhead", objects=[("OpenObject", "Fridge|1|2|3", None)])
     two = trajectory(
-        "MoveBack", objects=[("PutObject", "Mug|1|2|3", "Sink|4|5|6"), ("PickupObject", "Mug|1|2|3", None)]
+        "MoveBack",
+        objects=[("PutObject", "Mug|1|2|3", "Sink|4|5|6"), ("PickupObject", "Mug|1|2|3", None)],
     )
     write_supplement([one, two], tmp_path / "s.json")
     assert json.loads((tmp_path / "s.json").read_text()) == {

@@ -6,7 +6,11 @@ from hypothesis.extra import numpy as hnp
 from infthor_eval.thor.view import instances_of
 
 
-@given(hnp.arrays(np.uint32, hnp.array_shapes(min_dims=2, max_dims=2, max_side=12), elements=st.integers(0, 3)))
+@given(
+    hnp.arrays(
+        np.uint32, hnp.array_shapes(min_dims=2, max_dims=2, max_side=12), elements=st.integers(0, 3)
+    )
+)
 def test_instances_count_and_box_every_code(codes):
     found = instances_of(codes)
     assert set(found) == set(np.unique(codes).tolist())

@@ -8,7 +8,12 @@ def thing(object_id, **fields):
     parts = object_id.split("|")
     position = Vector(*(float(part) for part in parts[1:4]))
     object_type = parts[4].split("_")[0] if len(parts) > 4 else parts[0]
-    given = {"name": f"{object_type}_{len(object_id)}", "position": position, "visible": True, **fields}
+    given = {
+        "name": f"{object_type}_{len(object_id)}",
+        "position": position,
+        "visible": True,
+        **fields,
+    }
     return ThorObject(object_id=object_id, object_type=object_type, **given)
 
 

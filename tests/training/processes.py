@@ -22,11 +22,22 @@ from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.network import SequenceModel, freeze
 from infthor_eval.training.ranks import Ranks, assign_ranks
-from model_adapters.hf.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 from .twins import PAD, everywhere, loaded, sequence
 
-__all__ = ["CASES", "N_RANKS", "RESULTS", "Case", "CaseResult", "batch_of", "gradients_of", "model_of", "train", "work"]
+__all__ = [
+    "CASES",
+    "N_RANKS",
+    "RESULTS",
+    "Case",
+    "CaseResult",
+    "batch_of",
+    "gradients_of",
+    "model_of",
+    "train",
+    "work",
+]
 
 N_RANKS = 4
 RESULTS = "results.pt"
@@ -98,10 +109,14 @@ def batch_of(case: Case, frames: list[FrameRef]) -> Batch:
 
 def gradients_of(model: SequenceModel) -> dict[str, Tensor]:
     """The gradients that there are."""
-    return {name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None}
+    return {
+        name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None
+    }
 
 
-def train(checkpoint: LoadedCheckpoint, folder: Path, frames: list[FrameRef], ranks: Ranks) -> list[Progress]:
+def train(
+    checkpoint: LoadedCheckpoint, folder: Path, frames: list[FrameRef], ranks: Ranks
+) -> list[Progress]:
     """Two steps of a loop, the first at learning rate 0: so the optimizer has the sum of gradients at equal weights.
 
     In double precision: what differs in how a processor adds up single ones is as large as a small fault would be.
@@ -123,7 +138,11 @@ def work(rank: int, folder: Path, frames: list[FrameRef]) -> None:
     torch.set_num_threads(1)
     os.environ.setdefault("GLOO_SOCKET_IFNAME", "lo")
     dist.init_process_group(
-        "gloo", f"file://{folder / 'meeting'}", timedelta(seconds=120), world_size=N_RANKS, rank=rank
+        "gloo",
+        f"file://{folder / 'meeting'}",
+        timedelta(seconds=120),
+        world_size=N_RANKS,
+        rank=rank,
     )
     results: dict[Any, Any] = {}
     grids = {n_context: assign_ranks(n_context) for n_context in (2, 4)}

@@ -14,10 +14,10 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.plans.segments import PlanSegment, segment_parts
+from infthor_eval.plans.history.segments import PlanSegment, segment_parts
 from infthor_eval.training.action_sequences import recorded_segments, single_plans, windows
 from infthor_eval.training.encoding import SkippedItem, TrainingSequence
-from model_adapters.hf.prompt import Frame
+from model_adapters.hf.prompting.prompt import Frame
 
 _ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
 
@@ -42,7 +42,9 @@ def text_of_ids(encoder, pieces):
 
 
 def trained_text(encoder, sequence):
-    runs = itertools.groupby(zip(sequence.pieces, sequence.has_loss, strict=True), key=lambda pair: pair[1])
+    runs = itertools.groupby(
+        zip(sequence.pieces, sequence.has_loss, strict=True), key=lambda pair: pair[1]
+    )
     return [text_of_ids(encoder, [piece for piece, _ in run]) for trained, run in runs if trained]
 
 
@@ -54,7 +56,9 @@ def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
         shown = NiehSet(bundled_set).frames(name)
         # One frame per action, the last one of it, and the first; those at the start of a task come again.
         assert set(frames) <= set(shown)
-        assert [frame for frame, _ in itertools.groupby(frames)] == sorted(set(frames), key=lambda frame: frame.path)
+        assert [frame for frame, _ in itertools.groupby(frames)] == sorted(
+            set(frames), key=lambda frame: frame.path
+        )
 
 
 def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
@@ -65,23 +69,33 @@ def test_windows_have_every_action_once_and_each_begins_as_a_trajectory_does(bun
         assert len(windows_of_history) > 1
         assert all(window.n_tokens <= 5000 for window in windows_of_history)
         for window in windows_of_history:
-            text = encoder._tokenizer.decode([piece for piece in window.pieces if isinstance(piece, int)])
+            text = encoder._tokenizer.decode(
+                [piece for piece in window.pieces if isinstance(piece, int)]
+            )
             goal = re.match(r"<\|goal\|>Your main goal: (.*?)<\|goal\|>", text)
             assert goal[1] in goals
         actions = [text for window in windows_of_history for text in trained_text(encoder, window)]
-        assert actions == [f"{ACT}{action}{ACT}" for segment in history for action, _ in segment.steps]
+        assert actions == [
+            f"{ACT}{action}{ACT}" for segment in history for action, _ in segment.steps
+        ]
 
 
-def test_single_plans_have_every_action_once_and_each_begins_as_a_trajectory_does(bundled_set, encoder):
+def test_single_plans_have_every_action_once_and_each_begins_as_a_trajectory_does(
+    bundled_set, encoder
+):
     for name in names_in(bundled_set):
         segments = segments_of(bundled_set, name)
         alone = list(single_plans(encoder, name, segments))
         assert len(alone) == sum(bool(segment.steps) for segment in segments)
         actions = [
-            _ACTION.findall(text_of_ids(encoder, [one for one in plan.pieces if isinstance(one, int)]))
+            _ACTION.findall(
+                text_of_ids(encoder, [one for one in plan.pieces if isinstance(one, int)])
+            )
             for plan in alone
         ]
-        assert actions == [[action for action, _ in segment.steps] for segment in segments if segment.steps]
+        assert actions == [
+            [action for action, _ in segment.steps] for segment in segments if segment.steps
+        ]
         assert all(text_of_ids(encoder, plan.pieces[:1]) == "<|goal|>" for plan in alone)
 
 
@@ -92,7 +106,10 @@ def test_windows_cannot_hold_another_plan(bundled_set, encoder):
     ends = itertools.accumulate(window_plans(window) for window in windows_of_history)
     for window, end in zip(windows_of_history[:-1], ends, strict=False):
         more = encoder.pieces(list(history[end].parts()))
-        assert window.n_tokens + sum(1 if isinstance(piece, int) else len(piece.ids) for piece in more) > 5000
+        assert (
+            window.n_tokens + sum(1 if isinstance(piece, int) else len(piece.ids) for piece in more)
+            > 5000
+        )
 
 
 def window_plans(window):
@@ -128,12 +145,15 @@ def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
 
 def test_ids_and_labels_of_a_short_history(tmp_path, encoder, bundled_set):
     first, second = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[:2]
-    window = encoder.actions("one", [PlanSegment("go to the sink", "wash a mug", first, (("MoveAhead", second),))])
+    window = encoder.actions(
+        "one", [PlanSegment("go to the sink", "wash a mug", first, (("MoveAhead", second),))]
+    )
     ids = encoder._tokenizer
     goal, plan, act = ids.convert_tokens_to_ids(["<|goal|>", "<|plan|>", ACT])
     start, end = ids.convert_tokens_to_ids(["<|vision_start|>", "<|vision_end|>"])
     words = {
-        text: ids(text)["input_ids"] for text in ("Your main goal: wash a mug", "Plan: go to the sink", "MoveAhead")
+        text: ids(text)["input_ids"]
+        for text in ("Your main goal: wash a mug", "Plan: go to the sink", "MoveAhead")
     }
     expected = [goal, *words["Your main goal: wash a mug"], goal, start, first, end]
     expected += [plan, *words["Plan: go to the sink"], plan]
@@ -161,7 +181,10 @@ def test_windows_of_any_history(lengths, limit, encoder, bundled_set):
     frame = NiehSet(bundled_set).frames(names_in(bundled_set)[0])[0]
     history = [
         PlanSegment(
-            f"plan {number}", f"goal {number}" if number % 3 == 0 else None, frame, (("MoveAhead", frame),) * length
+            f"plan {number}",
+            f"goal {number}" if number % 3 == 0 else None,
+            frame,
+            (("MoveAhead", frame),) * length,
         )
         for number, length in enumerate(lengths)
     ]
@@ -176,14 +199,23 @@ def test_a_sequence_of_130k_tokens_is_built_and_its_labels_are_right(bundled_set
     actions = ("MoveAhead", "RotateLeft", "PickupObject Mug", "PutObject Mug Fridge", "LookDown")
     cycle = zip(itertools.cycle(actions), itertools.cycle(frames))
     history = [
-        PlanSegment(f"plan {number}", "goal" if number == 0 else None, frames[0], tuple(itertools.islice(cycle, 11)))
+        PlanSegment(
+            f"plan {number}",
+            "goal" if number == 0 else None,
+            frames[0],
+            tuple(itertools.islice(cycle, 11)),
+        )
         for number in range(100)
     ]
     window, *rest = windows(encoder, "long", history, 131_072)
     assert 128_000 < window.n_tokens <= 131_072
     assert len(rest) == 1
     text = text_of(segment_parts(history[: window_plans(window)]))
-    assert trained_text(encoder, window) == [f"{ACT}{action}{ACT}" for action in _ACTION.findall(text)]
+    assert trained_text(encoder, window) == [
+        f"{ACT}{action}{ACT}" for action in _ACTION.findall(text)
+    ]
     assert not any(
-        trained for piece, trained in zip(window.pieces, window.has_loss, strict=True) if not isinstance(piece, int)
+        trained
+        for piece, trained in zip(window.pieces, window.has_loss, strict=True)
+        if not isinstance(piece, int)
     )

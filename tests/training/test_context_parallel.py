@@ -30,11 +30,17 @@ def test_shares_are_all_of_the_sequence(n_tokens: int) -> None:
 @pytest.mark.parametrize("kernel", [causal_attention, _flash_attention])
 @pytest.mark.parametrize("n_own", [1, 300, 700])
 @pytest.mark.parametrize("n_key_heads", [1, 2, 4])
-def test_the_last_queries_see_what_they_see_in_the_whole(kernel: Kernel, n_own: int, n_key_heads: int) -> None:
+def test_the_last_queries_see_what_they_see_in_the_whole(
+    kernel: Kernel, n_own: int, n_key_heads: int
+) -> None:
     torch.manual_seed(0)
-    query, key, value = (torch.randn(2, heads, 700, 8, requires_grad=True) for heads in (4, n_key_heads, n_key_heads))
+    query, key, value = (
+        torch.randn(2, heads, 700, 8, requires_grad=True) for heads in (4, n_key_heads, n_key_heads)
+    )
     weights = torch.randn(2, 4, n_own, 8)
-    whole = scaled_dot_product_attention(query, key, value, is_causal=True, scale=0.5, enable_gqa=True)[:, :, -n_own:]
+    whole = scaled_dot_product_attention(
+        query, key, value, is_causal=True, scale=0.5, enable_gqa=True
+    )[:, :, -n_own:]
     expected = torch.autograd.grad((whole * weights).sum(), (query, key, value))
     result = kernel(query[:, :, -n_own:], key, value, 0.0, 0.5)
     torch.testing.assert_close(result, whole)

@@ -14,7 +14,9 @@ from infthor_eval.training.starting_model import load_starting_model
 
 @pytest.fixture
 def prepared(bundled_set):
-    loaded = load_starting_model("qwen2.5-vl-tiny", {"attn_implementation": "eager"}, "plain", seed=0)
+    loaded = load_starting_model(
+        "qwen2.5-vl-tiny", {"attn_implementation": "eager"}, "plain", seed=0
+    )
     recipe = read_recipe("infthor_32k", {"max_tokens": 5000, "epochs": 1, "parallel.shard": False})
     data = read_training_data(recipe, Encoder(loaded), [bundled_set])
     network = SequenceModel(loaded)

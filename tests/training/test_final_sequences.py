@@ -17,13 +17,13 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
-from infthor_eval.plans.system_prompts import system_prompt
+from infthor_eval.plans.published.system_prompts import system_prompt
 from infthor_eval.training.data import read_history, read_training_data
 from infthor_eval.training.encoding import Encoder, SkippedItem
 from infthor_eval.training.goal_sequences import goals_of_actions
 from infthor_eval.training.recipe import ActionData, Recipe, read_recipe
 from infthor_eval.training.starting_model import load_starting_model
-from model_adapters.hf.prompt import Frame
+from model_adapters.hf.prompting.prompt import Frame
 
 GOLDEN = Path(__file__).parents[1] / "goldens" / "final_sequences.jsonl.gz"
 SIZE = 28
@@ -65,26 +65,39 @@ def make_set(tmp_path, golden):
 
 
 def recipe(form, limit=32768):
-    return Recipe(title="-", model="-", prompt="chat", max_tokens=limit, actions=ActionData(form=form))
+    return Recipe(
+        title="-", model="-", prompt="chat", max_tokens=limit, actions=ActionData(form=form)
+    )
 
 
 def shown(encoder, sequence):
     """The text of a sequence with a mark for each frame, and the names of its frames."""
     pieces = [piece if isinstance(piece, int) else None for piece in sequence.pieces]
     runs = itertools.groupby(pieces, key=lambda piece: piece is None)
-    text = "".join("<image>" * len(list(run)) if frame else encoder._tokenizer.decode(list(run)) for frame, run in runs)
+    text = "".join(
+        "<image>" * len(list(run)) if frame else encoder._tokenizer.decode(list(run))
+        for frame, run in runs
+    )
     return text, [piece.ref.path.name for piece in sequence.pieces if isinstance(piece, Frame)]
 
 
 def trained(encoder, sequence):
-    runs = itertools.groupby(zip(sequence.pieces, sequence.has_loss, strict=True), key=lambda pair: pair[1])
-    return [encoder._tokenizer.decode([piece for piece, _ in run]) for with_loss, run in runs if with_loss]
+    runs = itertools.groupby(
+        zip(sequence.pieces, sequence.has_loss, strict=True), key=lambda pair: pair[1]
+    )
+    return [
+        encoder._tokenizer.decode([piece for piece, _ in run])
+        for with_loss, run in runs
+        if with_loss
+    ]
 
 
 def written(turns):
     """Turns as Qwen's template writes them."""
     image = "<|vision_start|><image><|vision_end|>"
-    return "".join(f"<|im_start|>{role}\n{text.replace('<image>', image)}<|im_end|>\n" for role, text in turns)
+    return "".join(
+        f"<|im_start|>{role}\n{text.replace('<image>', image)}<|im_end|>\n" for role, text in turns
+    )
 
 
 @pytest.mark.parametrize("limit", [131072, 1900, 1200, 900, 620])
@@ -92,7 +105,9 @@ def test_windows_of_goals_are_those_of_the_published_class(golden, make_set, lim
     expected = [line for line in golden if line.get("form") == "goals" and line["limit"] == limit]
     _, segments = read_history(NiehSet(make_set(), needs_questions=False), "t", Words.PUBLISHED)
     windows = [
-        parts for parts in goals_of_actions(segments, limit, 144) if any("<|act|>" in str(part) for part in parts)
+        parts
+        for parts in goals_of_actions(segments, limit, 144)
+        if any("<|act|>" in str(part) for part in parts)
     ]
     assert len(windows) == len(expected)
     for parts, line in zip(windows, expected, strict=True):
@@ -107,7 +122,9 @@ def text_of(parts):
 
 @pytest.mark.parametrize("form", ["goals", "text", "frames"])
 def test_sequences_are_those_of_the_published_classes(golden, make_set, encoder, form):
-    expected = [line for line in golden if line.get("form") == form and line.get("limit", 131072) == 131072]
+    expected = [
+        line for line in golden if line.get("form") == form and line.get("limit", 131072) == 131072
+    ]
     data = read_training_data(recipe(form), encoder, [make_set()])
     assert data.skipped == []
     assert len(data.sequences) == len(expected) > 0
@@ -115,7 +132,9 @@ def test_sequences_are_those_of_the_published_classes(golden, make_set, encoder,
         text, frames = shown(encoder, sequence)
         of_turns = written(line["messages"])
         # A turn without a reply is asked for one; behind a reply the line break is left out. Neither matters.
-        assert text == (f"{of_turns}<|im_start|>assistant\n" if form == "goals" else of_turns.removesuffix("\n"))
+        assert text == (
+            f"{of_turns}<|im_start|>assistant\n" if form == "goals" else of_turns.removesuffix("\n")
+        )
         assert frames[:-1] == line["frames"][:-1]
         assert form == "frames" or frames[-1] == line["frames"][-1]
         assert trained(encoder, sequence) == [said.removesuffix("\n") for said in line["trained"]]
@@ -126,30 +145,46 @@ def test_the_current_frame_is_the_one_before_the_action_where_the_published_clas
 ):
     """Its loop over N retrieved frames overwrites the number of the action with N - 1."""
     trajectory = golden[0]["trajectory"]
-    last = {image["low_idx"]: image["image_name"] for image in trajectory["images"]} | {-1: "000000000.png"}
+    last = {image["low_idx"]: image["image_name"] for image in trajectory["images"]} | {
+        -1: "000000000.png"
+    }
     published = [line["frames"][-1] for line in golden if line.get("form") == "frames"]
     data = read_training_data(recipe("frames"), encoder, [make_set()])
     ours = [shown(encoder, sequence)[1][-1] for sequence in data.sequences]
-    actions = {int(action): entry["top20"] for action, entry in trajectory["retrieved_image"].items()}
+    actions = {
+        int(action): entry["top20"] for action, entry in trajectory["retrieved_image"].items()
+    }
     assert ours == [last[action - 1] for action in actions]
-    assert published == [last[(len(names) - 1 if names else action) - 1] for action, names in actions.items()]
+    assert published == [
+        last[(len(names) - 1 if names else action) - 1] for action, names in actions.items()
+    ]
     assert ours != published
 
 
 @pytest.mark.parametrize(
     ("form", "changes", "reason"),
     [
-        ("text", {"state_summary": None}, "the trajectory has no state_summary, which actions of the form text need"),
+        (
+            "text",
+            {"state_summary": None},
+            "the trajectory has no state_summary, which actions of the form text need",
+        ),
         (
             "frames",
             {"retrieved_image": None},
             "the trajectory has no retrieved_image, which actions of the form frames",
         ),
-        ("frames", {"retrieved_image": {"2": {"top5": []}}}, "retrieved_image is no list top20 for each action"),
+        (
+            "frames",
+            {"retrieved_image": {"2": {"top5": []}}},
+            "retrieved_image is no list top20 for each action",
+        ),
         ("frames", {"images": [1]}, "images is no list of low_idx and image_name"),
     ],
 )
-def test_a_trajectory_without_a_memory_is_left_out_and_told(make_set, encoder, form, changes, reason):
+def test_a_trajectory_without_a_memory_is_left_out_and_told(
+    make_set, encoder, form, changes, reason
+):
     with pytest.raises(Exception, match="no sequence to train on") as caught:
         read_training_data(recipe(form), encoder, [make_set(**changes)])
     assert reason in str(caught.value)
@@ -157,8 +192,14 @@ def test_a_trajectory_without_a_memory_is_left_out_and_told(make_set, encoder, f
 
 def test_actions_that_cannot_be_used_are_left_out_and_told(make_set, encoder, golden):
     retrieved = golden[0]["trajectory"]["retrieved_image"]
-    wrong = {"7": {"top20": []}, "99": {"top20": []}, "3": {"top20": ["000000099.png"]}}  # 7 is between two tasks
-    data = read_training_data(recipe("frames"), encoder, [make_set(retrieved_image=retrieved | wrong)])
+    wrong = {
+        "7": {"top20": []},
+        "99": {"top20": []},
+        "3": {"top20": ["000000099.png"]},
+    }  # 7 is between two tasks
+    data = read_training_data(
+        recipe("frames"), encoder, [make_set(retrieved_image=retrieved | wrong)]
+    )
     assert len(data.sequences) == len(retrieved)
     assert set(data.skipped) == {
         SkippedItem("t, action 7", "belongs to no task"),
@@ -180,9 +221,15 @@ def test_what_is_too_long_is_left_out_and_told(make_set, encoder):
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"prompt": "plain"}, "actions of the form goals follow a system prompt; set prompt to chat"),
+        (
+            {"prompt": "plain"},
+            "actions of the form goals follow a system prompt; set prompt to chat",
+        ),
         ({"actions.form": "plans"}, "sequences of plans have no turns; set prompt to plain"),
-        ({"words": "natural"}, "actions of the form goals are in the published words; leave words out"),
+        (
+            {"words": "natural"},
+            "actions of the form goals are in the published words; leave words out",
+        ),
         ({"actions.form": "goal"}, "Invalid enum value 'goal'"),
     ],
 )
@@ -195,10 +242,16 @@ def test_the_recipes_have_the_published_settings():
     forms = {name: read_recipe(f"final_{name}") for name in ("goals", "text", "frames")}
     for name, settings in forms.items():
         assert settings.actions == ActionData(form=name)
-        assert (settings.optimizer.lr, settings.optimizer.warmup_ratio, settings.epochs) == (1e-5, 0.03, 3)
-        assert settings.model_args["min_pixels"] == settings.model_args["max_pixels"] == str(336 * 336)
+        assert (settings.optimizer.lr, settings.optimizer.warmup_ratio, settings.epochs) == (
+            1e-5,
+            0.03,
+            3,
+        )
+        assert (
+            settings.model_args["min_pixels"] == settings.model_args["max_pixels"] == str(336 * 336)
+        )
     assert (forms["goals"].max_tokens, forms["goals"].parallel.context) == (131072, 16)
     assert forms["text"].max_steps == forms["frames"].max_steps == 60000
-    assert msgspec.structs.replace(forms["text"], title="", source="", actions=None, questions={}) == (
-        msgspec.structs.replace(forms["frames"], title="", source="", actions=None, questions={})
-    )
+    assert msgspec.structs.replace(
+        forms["text"], title="", source="", actions=None, questions={}
+    ) == (msgspec.structs.replace(forms["frames"], title="", source="", actions=None, questions={}))

@@ -64,11 +64,15 @@ def same(first, second):
     return first.keys() == second.keys() and all(first[name].equal(second[name]) for name in first)
 
 
-def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter(recipe, data, tmp_path):
+def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter(
+    recipe, data, tmp_path
+):
     checkpoint, steps = train(recipe, data, tmp_path / "out", epochs=40, save_every=1000)
     assert [done.step for done in steps] == list(range(1, steps[-1].n_steps + 1))
     assert steps[-1].loss < steps[0].loss / 20
-    model = load("qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0)
+    model = load(
+        "qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0
+    )
     samples = find_samples({"data": str(data), "context": "clues"})
     for sample in samples.samples:
         talk = model.conversation()
@@ -97,7 +101,9 @@ def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, d
     whole = start("whole")
     assert whole.communicate()[0].split() == ["1", "12"]
     killed = start("killed")
-    wait_until(lambda: list((tmp_path / "killed").glob("states/checkpoint-*/trainer_state.json")), killed)
+    wait_until(
+        lambda: list((tmp_path / "killed").glob("states/checkpoint-*/trainer_state.json")), killed
+    )
     killed.send_signal(signal.SIGKILL)
     killed.communicate()
     assert not (tmp_path / "killed" / "checkpoint").exists()
@@ -138,10 +144,14 @@ def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
 
 @pytest.mark.parametrize("rope", ["dynamic", "longrope"])
 def test_a_model_is_trained_under_a_rope_of_lengths_and_keeps_it(recipe, data, tmp_path, rope):
-    checkpoint, _ = train(recipe, data, tmp_path / "out", **{"model_args.rope": f"{rope}:4", "max_steps": 1})
+    checkpoint, _ = train(
+        recipe, data, tmp_path / "out", **{"model_args.rope": f"{rope}:4", "max_steps": 1}
+    )
     config = json.loads((checkpoint / "config.json").read_text())
     assert config["text_config"]["rope_parameters"]["rope_type"] == rope
-    model = load("qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0)
+    model = load(
+        "qwen2.5-vl", {"pretrained": str(checkpoint), "dtype": "float32", "max_tokens": "0"}, seed=0
+    )
     talk = model.conversation()
     talk.append("Where is the mug?")
     assert talk.reply(Decoding(max_new_tokens=2)).n_context_tokens > 0

@@ -27,7 +27,10 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> list[FrameRef]:
 @pytest.fixture(scope="module")
 def sequences(frames: list[FrameRef]) -> list[TrainingSequence]:
     checkpoint = loaded("qwen2.5-vl")
-    return [sequence(checkpoint, [frame], answer, answer) for frame, answer in zip(frames, ANSWERS, strict=True)]
+    return [
+        sequence(checkpoint, [frame], answer, answer)
+        for frame, answer in zip(frames, ANSWERS, strict=True)
+    ]
 
 
 @pytest.fixture
@@ -38,7 +41,13 @@ def model() -> SequenceModel:
 
 
 def _settings(**changed: Any) -> LoopSettings:
-    chosen = {"learning_rate": 3e-3, "max_steps": 5, "sequences_per_step": 2, "warmup_ratio": 0.2, **changed}
+    chosen = {
+        "learning_rate": 3e-3,
+        "max_steps": 5,
+        "sequences_per_step": 2,
+        "warmup_ratio": 0.2,
+        **changed,
+    }
     return LoopSettings(**chosen)
 
 
@@ -46,7 +55,11 @@ Report = Callable[[Progress], None]
 
 
 def _run(
-    model: SequenceModel, sequences: list[TrainingSequence], folder: Path, report: Report | None = None, **changed: Any
+    model: SequenceModel,
+    sequences: list[TrainingSequence],
+    folder: Path,
+    report: Report | None = None,
+    **changed: Any,
 ) -> None:
     Loop(model, PAD, sequences, _settings(**changed), folder, on_step=report).run()
 
@@ -59,12 +72,16 @@ def _dying_after(step: int) -> Report:
     return report
 
 
-def test_the_loss_falls(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:
+def test_the_loss_falls(
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path
+) -> None:
     steps: list[Progress] = []
     _run(model, sequences, tmp_path, steps.append, max_steps=20, sequences_per_step=5)
     assert [progress.step for progress in steps] == list(range(1, 21))
     assert steps[-1].loss < steps[0].loss / 4
-    assert steps[0].learning_rate == pytest.approx(3e-3 / 5)  # the first of four steps of a warm-up has a part already
+    assert steps[0].learning_rate == pytest.approx(
+        3e-3 / 5
+    )  # the first of four steps of a warm-up has a part already
     assert steps[4].learning_rate == pytest.approx(3e-3)
     assert all(progress.tokens_per_second > 0 and progress.gradient_norm > 0 for progress in steps)
     assert not model.training
@@ -83,7 +100,9 @@ def test_a_run_that_was_killed_goes_on_to_the_same_weights(
     steps: list[Progress] = []
     _run(again, sequences, tmp_path / "killed", steps.append)
     assert [progress.step for progress in steps] == [4, 5]
-    whole, resumed = (load_file(tmp_path / name / "step-000005/model.safetensors") for name in ("whole", "killed"))
+    whole, resumed = (
+        load_file(tmp_path / name / "step-000005/model.safetensors") for name in ("whole", "killed")
+    )
     assert whole.keys() == resumed.keys()
     assert all(torch.equal(whole[name], resumed[name]) for name in whole)
     for one, other in zip(model.parameters(), again.parameters(), strict=True):
@@ -103,7 +122,9 @@ def test_the_last_checkpoint_alone_is_kept(
     assert [place.name for place in tmp_path.iterdir()] == ["step-000005"]
 
 
-def test_a_run_at_its_end_does_nothing(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:
+def test_a_run_at_its_end_does_nothing(
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path
+) -> None:
     _run(model, sequences, tmp_path)
     steps: list[Progress] = []
     _run(model, sequences, tmp_path, steps.append)
@@ -122,7 +143,9 @@ def test_accumulated_sequences_weigh_by_their_tokens(
     assert steps[0].loss == pytest.approx(expected.item(), rel=1e-5)
 
 
-def test_frozen_parts_stay_as_they_are(model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path) -> None:
+def test_frozen_parts_stay_as_they_are(
+    model: SequenceModel, sequences: list[TrainingSequence], tmp_path: Path
+) -> None:
     before = {name: one.detach().clone() for name, one in model.named_parameters()}
     _run(model, sequences, tmp_path)
     for name, one in model.named_parameters():

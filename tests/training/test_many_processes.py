@@ -14,7 +14,18 @@ from infthor_eval.training.batches import IGNORED, n_labels
 from infthor_eval.training.context_parallel import SequenceSplit
 from infthor_eval.training.ranks import Ranks
 
-from .processes import CASES, N_RANKS, RESULTS, Case, CaseResult, batch_of, gradients_of, model_of, train, work
+from .processes import (
+    CASES,
+    N_RANKS,
+    RESULTS,
+    Case,
+    CaseResult,
+    batch_of,
+    gradients_of,
+    model_of,
+    train,
+    work,
+)
 from .twins import loaded, write_frames
 
 TOLERANCE, DOUBLE = 1e-5, 1e-9  # of single and of double precision
@@ -34,7 +45,9 @@ def frames(folder: Path) -> list[FrameRef]:
 def results(folder: Path, frames: list[FrameRef]) -> Any:
     # Forked from a process that has imported everything once, which takes longer than the work.
     multiprocessing.get_context("forkserver").set_forkserver_preload([work.__module__])
-    torch.multiprocessing.start_processes(work, (folder, frames), nprocs=N_RANKS, start_method="forkserver")
+    torch.multiprocessing.start_processes(
+        work, (folder, frames), nprocs=N_RANKS, start_method="forkserver"
+    )
     return torch.load(folder / RESULTS, weights_only=False)
 
 
@@ -49,7 +62,9 @@ def alone(request: pytest.FixtureRequest, frames: list[FrameRef]) -> tuple[Case,
     return case, CaseResult([loss.item()], gradients_of(model))
 
 
-def _assert_equal(result: dict[str, Tensor], expected: dict[str, Tensor], tolerance: float = TOLERANCE) -> None:
+def _assert_equal(
+    result: dict[str, Tensor], expected: dict[str, Tensor], tolerance: float = TOLERANCE
+) -> None:
     assert result.keys() == expected.keys()
     whole = torch.stack([one.norm() for one in expected.values()]).norm()
     for name, one in expected.items():
@@ -84,13 +99,19 @@ def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> No
     assert shares[1:] == [0, 0, 0]
 
 
-def test_data_groups_of_cut_sequences_train_as_one_process(results: Any, frames: list[FrameRef], folder: Path) -> None:
+def test_data_groups_of_cut_sequences_train_as_one_process(
+    results: Any, frames: list[FrameRef], folder: Path
+) -> None:
     expected = train(loaded("qwen2.5-vl"), folder / "alone", frames, Ranks())
     assert len(expected) == 2
     for result, one in zip(results["loop"], expected, strict=True):
         assert result.loss == pytest.approx(one.loss, rel=DOUBLE)
         assert result.gradient_norm == pytest.approx(one.gradient_norm, rel=DOUBLE)
-        assert (result.step, result.n_steps, result.learning_rate) == (one.step, one.n_steps, one.learning_rate)
+        assert (result.step, result.n_steps, result.learning_rate) == (
+            one.step,
+            one.n_steps,
+            one.learning_rate,
+        )
     ours, theirs = (_moments(folder / name) for name in ("loop", "alone"))
     _assert_equal(ours, theirs, DOUBLE)
 
@@ -112,7 +133,10 @@ def test_weights_in_shards_are_written_whole(results: Any) -> None:
 
 def test_what_cannot_be_cut_is_refused(results: Any) -> None:
     assert "attends in windows of 8 tokens" in results["refused"]["sliding"]
-    assert results["refused"]["three"] == "4 processes cannot share sequences by 3; give a divisor of 4"
+    assert (
+        results["refused"]["three"]
+        == "4 processes cannot share sequences by 3; give a divisor of 4"
+    )
 
 
 def test_labels_are_counted_over_the_whole_sequence(frames: list[FrameRef]) -> None:

@@ -47,7 +47,10 @@ SMALL = NanoRecipe(
 @pytest.fixture(scope="module")
 def small_set(bundled_set, tmp_path_factory):
     """Two trajectories of the bundled set, and the questions on them."""
-    root, names = tmp_path_factory.mktemp("small"), (bundled_name("bedroom-1"), bundled_name("kitchen-2"))
+    root, names = (
+        tmp_path_factory.mktemp("small"),
+        (bundled_name("bedroom-1"), bundled_name("kitchen-2")),
+    )
     for name in names:
         shutil.copytree(bundled_set / "metadata" / name, root / "metadata" / name)
     questions = [item for item in NiehSet(bundled_set).questions if item.traj_id in names]
@@ -59,7 +62,9 @@ def small_set(bundled_set, tmp_path_factory):
 def blank(small_set):
     """The untrained model and its frames."""
     dataset = read_frame_dataset([small_set], image_processor())
-    return build_untrained(SMALL, corpus_texts([small_set], dataset.types), [question_intro()]), dataset
+    return build_untrained(
+        SMALL, corpus_texts([small_set], dataset.types), [question_intro()]
+    ), dataset
 
 
 def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
@@ -67,10 +72,18 @@ def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
     data = NiehSet(small_set)
     index = dataset.index_by_digest()
     for folder in sorted((small_set / "metadata").iterdir()):
-        for frame, step in list(zip(data.frames(folder.name), read_steps(folder), strict=True))[::20]:
+        for frame, step in list(zip(data.frames(folder.name), read_steps(folder), strict=True))[
+            ::20
+        ]:
             at = index[frame.digest]
-            present = {name for name, there in zip(dataset.types, dataset.present[at], strict=True) if there}
-            shown = {name for name, there in zip(dataset.types, dataset.shown[at], strict=True) if there}
+            present = {
+                name
+                for name, there in zip(dataset.types, dataset.present[at], strict=True)
+                if there
+            }
+            shown = {
+                name for name, there in zip(dataset.types, dataset.shown[at], strict=True) if there
+            }
             assert present == {_type(key) for key in step.seen}
             assert shown <= set(step.object_log.visible) | present
 
@@ -97,13 +110,19 @@ def test_frames_are_what_the_familys_own_features_are_made_of(blank):
     ],
 )
 def test_where_a_box_lies(box, cells):
-    cells_of_box = {at for at, there in enumerate(_cell_coverage(torch.tensor([box]), (300, 300))[0]) if there}
+    cells_of_box = {
+        at for at, there in enumerate(_cell_coverage(torch.tensor([box]), (300, 300))[0]) if there
+    }
     assert cells_of_box <= cells
     assert cells_of_box
 
 
 def test_types_are_those_of_parts_and_slices():
-    ids = ("Mug|+01.00|+00.90|-02.00", "Sink|-01.00|+00.50|+01.00|SinkBasin", "Apple|+1|+2|+3|AppleSliced_2")
+    ids = (
+        "Mug|+01.00|+00.90|-02.00",
+        "Sink|-01.00|+00.50|+01.00|SinkBasin",
+        "Apple|+1|+2|+3|AppleSliced_2",
+    )
     assert [_type(key) for key in ids] == ["Mug", "SinkBasin", "AppleSliced"]
     assert ObjectInFrame(pixels=1, box=(0, 0, 1, 1)).visible is False
 
@@ -119,14 +138,18 @@ def test_words_are_tokens(blank):
 
 def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answer(small_set, blank):
     loaded, dataset = blank
-    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0)
+    sampler = SequenceSampler(
+        Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0
+    )
     index, counts = dataset.index_by_digest(), {"yes": 0, "no": 0}
     from infthor_eval.household.wording import noun
 
     words = {noun(name): at for at, name in enumerate(dataset.types)}
     for sequence in sampler.questions(200, synthetic_share=1.0, recalled_share=0.0, n_others=0):
         (frame,) = sequence.frames
-        text = loaded.tokenizer.decode([piece for piece in sequence.pieces if isinstance(piece, int)])
+        text = loaded.tokenizer.decode(
+            [piece for piece in sequence.pieces if isinstance(piece, int)]
+        )
         answer = text.rpartition("?")[2].removesuffix("<|im_end|>")
         about = max((name for name in words if f" {name}" in text), key=len)
         counts[answer] += 1
@@ -136,9 +159,13 @@ def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answe
     assert min(counts.values()) > 70
 
 
-def test_recalled_questions_have_their_clues_among_other_frames_and_end_with_the_last_view(small_set, blank):
+def test_recalled_questions_have_their_clues_among_other_frames_and_end_with_the_last_view(
+    small_set, blank
+):
     loaded, dataset = blank
-    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0)
+    sampler = SequenceSampler(
+        Encoder(loaded), [small_set], dataset, window_tokens=2048, words=Words.PUBLISHED, seed=0
+    )
     data = NiehSet(small_set)
     clues = defaultdict(list)  # by text, which questions on two trajectories may share
     for question in data.questions:
@@ -148,7 +175,9 @@ def test_recalled_questions_have_their_clues_among_other_frames_and_end_with_the
     n_others = set()
     for sequence in sampler.questions(60, synthetic_share=0.0, recalled_share=1.0, n_others=4):
         digests = [frame.digest for frame in sequence.frames]
-        text = loaded.tokenizer.decode([piece for piece in sequence.pieces if isinstance(piece, int)])
+        text = loaded.tokenizer.decode(
+            [piece for piece in sequence.pieces if isinstance(piece, int)]
+        )
         asked = max((known for known in clues if known in text), key=len)
         assert digests[-1] in lasts
         if asked not in absences:
@@ -162,8 +191,14 @@ def test_synthetic_plans_replace_objects_in_plan_and_actions():
     recorded = [
         ("pick up the mug", ["PickupObject Mug"]),
         ("pick up the butterknife", ["PickupObject ButterKnife"]),
-        ("put the mug in the fridge", ["OpenObject Fridge", "PutObject Mug Fridge", "CloseObject Fridge"]),
-        ("put the egg in the microwave", ["OpenObject Microwave", "PutObject Egg Microwave", "CloseObject Microwave"]),
+        (
+            "put the mug in the fridge",
+            ["OpenObject Fridge", "PutObject Mug Fridge", "CloseObject Fridge"],
+        ),
+        (
+            "put the egg in the microwave",
+            ["OpenObject Microwave", "PutObject Egg Microwave", "CloseObject Microwave"],
+        ),
         ("put the egg in the sinkbasin", ["PutObject Egg SinkBasin"]),
         ("go to the fridge", ["MoveAhead", "RotateLeft"]),
     ]
@@ -171,10 +206,30 @@ def test_synthetic_plans_replace_objects_in_plan_and_actions():
     assert {(plan, *actions) for plan, actions in (plans.sample(rng) for _ in range(200))} == {
         ("pick up the mug", "PickupObject Mug"),
         ("pick up the butterknife", "PickupObject ButterKnife"),
-        ("put the mug in the fridge", "OpenObject Fridge", "PutObject Mug Fridge", "CloseObject Fridge"),
-        ("put the egg in the fridge", "OpenObject Fridge", "PutObject Egg Fridge", "CloseObject Fridge"),
-        ("put the mug in the microwave", "OpenObject Microwave", "PutObject Mug Microwave", "CloseObject Microwave"),
-        ("put the egg in the microwave", "OpenObject Microwave", "PutObject Egg Microwave", "CloseObject Microwave"),
+        (
+            "put the mug in the fridge",
+            "OpenObject Fridge",
+            "PutObject Mug Fridge",
+            "CloseObject Fridge",
+        ),
+        (
+            "put the egg in the fridge",
+            "OpenObject Fridge",
+            "PutObject Egg Fridge",
+            "CloseObject Fridge",
+        ),
+        (
+            "put the mug in the microwave",
+            "OpenObject Microwave",
+            "PutObject Mug Microwave",
+            "CloseObject Microwave",
+        ),
+        (
+            "put the egg in the microwave",
+            "OpenObject Microwave",
+            "PutObject Egg Microwave",
+            "CloseObject Microwave",
+        ),
         ("put the egg in the sinkbasin", "PutObject Egg SinkBasin"),
     }
     assert not SyntheticPlans(recorded[-1:])
@@ -182,18 +237,24 @@ def test_synthetic_plans_replace_objects_in_plan_and_actions():
 
 def test_synthetic_plans_have_no_frame_and_loss_on_their_actions(small_set, blank):
     loaded, dataset = blank
-    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0)
+    sampler = SequenceSampler(
+        Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0
+    )
     for plan in sampler.synthetic_plans(20):
         assert not plan.frames
         ends = [
-            at for at, piece in enumerate(plan.pieces) if piece == loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
+            at
+            for at, piece in enumerate(plan.pieces)
+            if piece == loaded.tokenizer.convert_tokens_to_ids("<|plan|>")
         ]
         assert plan.has_loss == tuple(at > ends[1] for at in range(len(plan.pieces)))
 
 
 def test_histories_are_windows_or_single_plans(small_set, blank):
     loaded, dataset = blank
-    sampler = SequenceSampler(Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0)
+    sampler = SequenceSampler(
+        Encoder(loaded), [small_set], dataset, window_tokens=600, words=Words.PUBLISHED, seed=0
+    )
     assert len(sampler.histories(2, 5, single_plan_share=0.0)) == 2
     plans = sampler.histories(2, 5, single_plan_share=1.0)
     assert len(plans) == 5

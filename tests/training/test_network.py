@@ -11,7 +11,7 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.network import PARTS, SequenceModel, freeze, parameters_by_part
-from model_adapters.hf.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 from .twins import FAMILIES, PAD, everywhere, loaded, sequence, write_frames
 
@@ -28,7 +28,10 @@ def qwen() -> LoadedCheckpoint:
 
 def _two(checkpoint: LoadedCheckpoint, folder: Path) -> list[TrainingSequence]:
     frames = write_frames(folder, 2)
-    return [sequence(checkpoint, frames[:1], "a mug"), everywhere(sequence(checkpoint, frames[1:], "two forks"))]
+    return [
+        sequence(checkpoint, frames[:1], "a mug"),
+        everywhere(sequence(checkpoint, frames[1:], "two forks")),
+    ]
 
 
 def _batch(checkpoint: LoadedCheckpoint, folder: Path) -> Batch:
@@ -38,7 +41,9 @@ def _batch(checkpoint: LoadedCheckpoint, folder: Path) -> Batch:
 def _gradients(model: SequenceModel, batch: Batch) -> dict[str, Tensor]:
     model.zero_grad()
     model(**batch)["loss"].backward()
-    return {name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None}
+    return {
+        name: one.grad.clone() for name, one in model.named_parameters() if one.grad is not None
+    }
 
 
 def _own_loss(checkpoint: LoadedCheckpoint, batch: Batch) -> Tensor:
@@ -49,7 +54,10 @@ def _own_loss(checkpoint: LoadedCheckpoint, batch: Batch) -> Tensor:
     if hasattr(checkpoint.model.model, "get_rope_index"):
         inputs["mm_token_type_ids"] = (batch["input_ids"] == family.slot_id).int()
     loss: Tensor = checkpoint.model(
-        input_ids=batch["input_ids"], attention_mask=batch["attention_mask"], labels=batch["labels"], **inputs
+        input_ids=batch["input_ids"],
+        attention_mask=batch["attention_mask"],
+        labels=batch["labels"],
+        **inputs,
     ).loss
     return loss
 
@@ -72,13 +80,17 @@ def test_gradients_are_transformers_own(qwen: LoadedCheckpoint, tmp_path: Path) 
         torch.testing.assert_close(result[name], one.grad, rtol=1e-4, atol=1e-5)
 
 
-def test_a_batch_has_the_loss_of_its_sequences_by_tokens(checkpoint: LoadedCheckpoint, tmp_path: Path) -> None:
+def test_a_batch_has_the_loss_of_its_sequences_by_tokens(
+    checkpoint: LoadedCheckpoint, tmp_path: Path
+) -> None:
     model, two = SequenceModel(checkpoint), _two(checkpoint, tmp_path)
     batches = [collate([one], checkpoint.family, PAD) for one in two]
     n_items = sum(map(n_labels, batches))
     with torch.no_grad():
         whole = model(**collate(two, checkpoint.family, PAD))["loss"]
-        parts = [model(**batch, num_items_in_batch=torch.tensor(n_items))["loss"] for batch in batches]
+        parts = [
+            model(**batch, num_items_in_batch=torch.tensor(n_items))["loss"] for batch in batches
+        ]
     torch.testing.assert_close(parts[0] + parts[1], whole, rtol=1e-5, atol=0)
 
 
@@ -92,15 +104,21 @@ def test_every_parameter_is_in_one_part(checkpoint: LoadedCheckpoint) -> None:
     assert all(by_part.values())
 
 
-@pytest.mark.parametrize("parts", [("vision",), ("vision", "embeddings"), ("decoder",), ("embeddings", "head")])
-def test_what_is_frozen_has_no_gradient(checkpoint: LoadedCheckpoint, parts: tuple[str, ...], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "parts", [("vision",), ("vision", "embeddings"), ("decoder",), ("embeddings", "head")]
+)
+def test_what_is_frozen_has_no_gradient(
+    checkpoint: LoadedCheckpoint, parts: tuple[str, ...], tmp_path: Path
+) -> None:
     model = SequenceModel(checkpoint)
     batch = _batch(checkpoint, tmp_path)
     before = _gradients(model, batch)
     freeze(model, parts)
     after = _gradients(model.train(), batch)
     frozen = {id(one) for part in parts for one in parameters_by_part(model)[part]}
-    expected = {name for name, one in model.named_parameters() if id(one) not in frozen and name in before}
+    expected = {
+        name for name, one in model.named_parameters() if id(one) not in frozen and name in before
+    }
     assert set(after) == expected
     for name in expected:
         torch.testing.assert_close(after[name], before[name], rtol=1e-4, atol=1e-5)
@@ -128,7 +146,9 @@ def test_activations_can_be_computed_again(
 def _n_kept(model: SequenceModel, batch: Batch) -> int:
     """How many tensors are kept for the gradient."""
     kept: list[object] = []
-    with torch.autograd.graph.saved_tensors_hooks(lambda one: kept.append(None) or one, lambda one: one):
+    with torch.autograd.graph.saved_tensors_hooks(
+        lambda one: kept.append(None) or one, lambda one: one
+    ):
         model(**batch)
     return len(kept)
 
@@ -140,7 +160,9 @@ def test_a_frame_that_stands_twice_is_computed_once(
     batch = collate([sequence(qwen, [first, second, first])], qwen.family, PAD)
     asked: list[int] = []
     compute = qwen.family.features
-    monkeypatch.setattr(qwen.family, "features", lambda images: asked.append(len(images)) or compute(images))
+    monkeypatch.setattr(
+        qwen.family, "features", lambda images: asked.append(len(images)) or compute(images)
+    )
     SequenceModel(qwen)(**batch)
     assert asked == [2]
 
@@ -155,7 +177,9 @@ def test_parts_of_two_checkpoints_are_told_apart(
 ) -> None:
     batch = _batch(qwen, tmp_path)
     compute = qwen.family.features
-    monkeypatch.setattr(qwen.family, "features", lambda images: [one[1:] for one in compute(images)])
+    monkeypatch.setattr(
+        qwen.family, "features", lambda images: [one[1:] for one in compute(images)]
+    )
     with pytest.raises(ModelError, match="9 image tokens of a frame and the model 8 features"):
         SequenceModel(qwen)(**batch)
 

@@ -59,14 +59,24 @@ def launcher(n_processes: int) -> list[str]:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     place = ["--master-addr", "127.0.0.1", "--master-port", str(port)]
-    return [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node", str(n_processes), *place, "--no-python"]
+    return [
+        sys.executable,
+        "-m",
+        "torch.distributed.run",
+        "--nproc-per-node",
+        str(n_processes),
+        *place,
+        "--no-python",
+    ]
 
 
 def weights_of(out: Path) -> dict[str, torch.Tensor]:
     return load_file(out / "checkpoint" / "model.safetensors")
 
 
-@pytest.mark.parametrize(("name", "n_processes"), [("infthor_32k", 1), ("infthor_64k", 2), ("infthor_130k", 4)])
+@pytest.mark.parametrize(
+    ("name", "n_processes"), [("infthor_32k", 1), ("infthor_64k", 2), ("infthor_130k", 4)]
+)
 def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: int) -> None:
     recipe = scaled(name, n_processes)
     training = started(recipe, n_processes, bundled_set, tmp_path / "out")
@@ -81,13 +91,18 @@ def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: in
 def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_others(
     bundled_set: Path, tmp_path: Path
 ) -> None:
-    recipe = msgspec.structs.replace(scaled("infthor_64k", 2), max_tokens=1024, max_steps=6, save_every=2)
+    recipe = msgspec.structs.replace(
+        scaled("infthor_64k", 2), max_tokens=1024, max_steps=6, save_every=2
+    )
     whole = started(recipe, 2, bundled_set, tmp_path / "whole")
     assert whole.communicate(timeout=PATIENCE_S)[0]
     killed = started(recipe, 2, bundled_set, tmp_path / "killed")
     wait_until(lambda: list((tmp_path / "killed" / "states").glob("step-00000?")), killed)
     launching = psutil.Process(killed.pid)
-    for process in (*launching.children(recursive=True), launching):  # each worker has a session of its own
+    for process in (
+        *launching.children(recursive=True),
+        launching,
+    ):  # each worker has a session of its own
         process.kill()
     killed.communicate()
     assert not (tmp_path / "killed" / "checkpoint").exists()

@@ -16,7 +16,9 @@ def tiny(seed):
 
 def saved(loaded, folder, prefix, *, without=(), more=None):
     state = {f"{prefix}{name}": tensor for name, tensor in loaded.model.state_dict().items()}
-    state = {name: tensor for name, tensor in state.items() if not any(part in name for part in without)}
+    state = {
+        name: tensor for name, tensor in state.items() if not any(part in name for part in without)
+    }
     dcp.save(state | (more or {}), checkpoint_id=folder, no_dist=True)
     return folder
 
@@ -24,8 +26,13 @@ def saved(loaded, folder, prefix, *, without=(), more=None):
 @pytest.mark.parametrize("prefix", ["", "model.", "app.model."])
 def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, prefix):
     trained, other = tiny(1), tiny(0)
-    moments = {f"optim.state.{name}.exp_avg": tensor for name, tensor in list(trained.model.state_dict().items())[:5]}
-    imported = import_weights(other, saved(trained, tmp_path / "dcp", prefix, without=("vision_tower",), more=moments))
+    moments = {
+        f"optim.state.{name}.exp_avg": tensor
+        for name, tensor in list(trained.model.state_dict().items())[:5]
+    }
+    imported = import_weights(
+        other, saved(trained, tmp_path / "dcp", prefix, without=("vision_tower",), more=moments)
+    )
     assert imported.n_ignored == 5
     assert imported.n_kept > 0
     begun = tiny(0).model.state_dict()
@@ -52,7 +59,9 @@ def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, pre
         ),
     ],
 )
-def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_published_trainer(tmp_path, model, renamed):
+def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_published_trainer(
+    tmp_path, model, renamed
+):
     """As the hub's files name them: `visual.`, `model.layers.`; `language_model.model.layers.`, `vision_tower.`."""
     trained, other = (load_starting_model(model, {}, "plain", seed) for seed in (1, 0))
 
@@ -71,23 +80,46 @@ def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_publishe
 def test_a_chat_keeps_the_chat_template(tmp_path, run):
     tiny_qwen = load_starting_model("qwen2.5-vl-tiny", {}, "chat", 0)
     folder = saved(tiny_qwen, tmp_path / "dcp", "model.")
-    words = ("import-checkpoint", folder, "--model", "qwen2.5-vl-tiny", "--prompt", "chat", "--out", tmp_path / "out")
+    words = (
+        "import-checkpoint",
+        folder,
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--prompt",
+        "chat",
+        "--out",
+        tmp_path / "out",
+    )
     code, _, err = run(*words)
     assert code == 0, err
-    loaded = load("qwen2.5-vl", {"pretrained": str(tmp_path / "out"), "dtype": "float32"}, seed=0).loaded
+    loaded = load(
+        "qwen2.5-vl", {"pretrained": str(tmp_path / "out"), "dtype": "float32"}, seed=0
+    ).loaded
     assert loaded.template == tiny_qwen.template
 
 
 def test_the_command_writes_what_the_adapter_loads(tmp_path, run):
     folder = saved(tiny(0), tmp_path / "dcp", "model.")
-    words = ["import-checkpoint", folder, "--model", "llava-onevision-tiny", "--out", tmp_path / "out"]
+    words = [
+        "import-checkpoint",
+        folder,
+        "--model",
+        "llava-onevision-tiny",
+        "--out",
+        tmp_path / "out",
+    ]
     code, said, err = run(*words)
     assert (code, "0 kept, 0 other tensors ignored" in said) == (0, True), err
     options = {"pretrained": str(tmp_path / "out"), "dtype": "float32", "max_tokens": "0"}
     model = load("llava-onevision", options, seed=0)
     ours, theirs = model.loaded.model.state_dict(), tiny(0).model.state_dict()
     assert all(torch.equal(ours[name], theirs[name]) for name in theirs)
-    assert len(model.loaded.tokenizer("<|act|>MoveAhead<|act|>", add_special_tokens=False)["input_ids"]) >= 3
+    assert (
+        len(
+            model.loaded.tokenizer("<|act|>MoveAhead<|act|>", add_special_tokens=False)["input_ids"]
+        )
+        >= 3
+    )
 
 
 def test_what_is_none_or_anothers_is_one_line(tmp_path):

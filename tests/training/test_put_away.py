@@ -17,14 +17,20 @@ def test_it_is_a_plan_with_its_goal(tmp_path, encoder):
     with Simulator(embedded_launch()) as simulator:
         replayed = replay_set(select([data]), simulator, tmp_path / "set")
     assert not replayed.failures
-    _, history = read_history(NiehSet(tmp_path / "set", needs_questions=False), PEN, Words.PUBLISHED)
+    _, history = read_history(
+        NiehSet(tmp_path / "set", needs_questions=False), PEN, Words.PUBLISHED
+    )
     assert [segment.goal for segment in history if segment.goal is not None] == [
         "look at a pen under the desk lamp",
         "put the Pen on the DiningTable",
         "look at a mug under the floor lamp",
     ]
     away = history[4]
-    assert (away.plan, away.in_task, len(away.steps)) == ("put the Pen in the DiningTable", True, 22)
+    assert (away.plan, away.in_task, len(away.steps)) == (
+        "put the Pen in the DiningTable",
+        True,
+        22,
+    )
     assert away.steps[-1][0] == "PutObject Pen DiningTable"
     alone = list(single_plans(encoder, PEN, history))[4]
     text = encoder._tokenizer.decode([piece for piece in alone.pieces if isinstance(piece, int)])

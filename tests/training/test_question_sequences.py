@@ -12,7 +12,11 @@ from model_adapters import Turn
 
 
 def build(encoder, root, context="clues", limit=100_000, **settings):
-    return list(question_sequences(encoder, find_samples({"data": str(root), "context": context, **settings}), limit))
+    return list(
+        question_sequences(
+            encoder, find_samples({"data": str(root), "context": context, **settings}), limit
+        )
+    )
 
 
 @pytest.fixture(scope="session")
@@ -30,19 +34,28 @@ def test_questions_are_asked_as_the_evaluation_asks_them(bundled_set, chat_tiny,
             context, text = samples.request(sample)
             asked = encoder._prompter.pieces([Turn("user", (*context, text))])
             assert list(sequence.pieces[: len(asked)]) == asked
-            assert sequence.has_loss == (False,) * len(asked) + (True,) * (len(sequence.pieces) - len(asked))
+            assert sequence.has_loss == (False,) * len(asked) + (True,) * (
+                len(sequence.pieces) - len(asked)
+            )
             reply = sequence.pieces[len(asked) :]
             assert reply[-1] == loaded.tokenizer.convert_tokens_to_ids("<|im_end|>")
-            assert loaded.tokenizer.decode(reply[:-1]) == ", ".join(map(str, sample.question.answers))
+            assert loaded.tokenizer.decode(reply[:-1]) == ", ".join(
+                map(str, sample.question.answers)
+            )
 
 
 def test_what_cannot_be_asked_is_told(make_nieh_set, encoder):
-    root = make_nieh_set([Question("traj_a", "Is it?", (1,), ("yes",)), Question("traj_a", "Is it?", (77,), ("no",))])
+    root = make_nieh_set(
+        [Question("traj_a", "Is it?", (1,), ("yes",)), Question("traj_a", "Is it?", (77,), ("no",))]
+    )
     sequence, left = sorted(build(encoder, root), key=lambda item: isinstance(item, SkippedItem))
     assert isinstance(sequence, TrainingSequence)
     assert "clue 77 is outside" in left.reason
     (short, *_) = build(encoder, root, "trajectory", limit=100)
-    assert "longer than 100 tokens" in {short.reason, *(item.reason for item in build(encoder, root, limit=100))}
+    assert "longer than 100 tokens" in {
+        short.reason,
+        *(item.reason for item in build(encoder, root, limit=100)),
+    }
 
 
 def test_a_memory_cannot_be_trained_on(make_nieh_set, encoder):

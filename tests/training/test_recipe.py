@@ -14,21 +14,32 @@ from infthor_eval.training.recipe import read_recipe, recipe_names
 def test_the_papers_recipes_are_table_5():
     (table,) = published_tables("training")
     final = {"final_goals", "final_text", "final_frames"}
-    assert {"infthor_32k", "infthor_64k", "infthor_130k", "questions", "tiny"} | final == set(recipe_names())
+    assert {"infthor_32k", "infthor_64k", "infthor_130k", "questions", "tiny"} | final == set(
+        recipe_names()
+    )
     for row in table.rows:
         recipe, settings = read_recipe(row.name), dict(zip(table.columns, row.values, strict=True))
         assert recipe.max_tokens == settings["context tokens"]
         assert recipe.parallel.context == settings["context parallel"]
         assert recipe.model_args["pretrained"] in row.checkpoints
-        assert (recipe.optimizer.lr, recipe.optimizer.warmup_ratio, recipe.epochs) == (1e-5, 0.03, 3)
+        assert (recipe.optimizer.lr, recipe.optimizer.warmup_ratio, recipe.epochs) == (
+            1e-5,
+            0.03,
+            3,
+        )
         assert set(recipe.freeze) == {"vision", "embeddings"}
         assert recipe.model == "llava-onevision"
 
 
 def test_settings_are_changed_by_their_dotted_names():
-    recipe = read_recipe("infthor_64k", {"optimizer.lr": "2e-5", "model_args.dtype": "float32", "max_steps": "3"})
+    recipe = read_recipe(
+        "infthor_64k", {"optimizer.lr": "2e-5", "model_args.dtype": "float32", "max_steps": "3"}
+    )
     assert (recipe.optimizer.lr, recipe.optimizer.warmup_ratio, recipe.max_steps) == (2e-5, 0.03, 3)
-    assert recipe.model_args == {"pretrained": "llava-hf/llava-onevision-qwen2-7b-ov-hf", "dtype": "float32"}
+    assert recipe.model_args == {
+        "pretrained": "llava-hf/llava-onevision-qwen2-7b-ov-hf",
+        "dtype": "float32",
+    }
 
 
 def test_an_unknown_recipe_is_told_with_the_nearest():
@@ -50,11 +61,23 @@ def test_model_options_of_a_recipe_apply_to_its_own_model_alone(name):
 def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path, run):
     data = tmp_path / "set"
     shutil.copytree(bundled_set / "metadata/bedroom-1-seed7", data / "metadata/bedroom-1-seed7")
-    questions = [item for item in NiehSet(bundled_set).questions if item.traj_id == "bedroom-1-seed7"]
+    questions = [
+        item for item in NiehSet(bundled_set).questions if item.traj_id == "bedroom-1-seed7"
+    ]
     if name == "questions":  # trajectories alone are enough for the others
         write_questions(data / "qa_set_small.csv", questions[:3])
     code, _, err = run(
-        *("train", "--recipe", name, "--data", data, "--out", tmp_path / "out", "--model", "qwen2.5-vl-tiny"),
+        *(
+            "train",
+            "--recipe",
+            name,
+            "--data",
+            data,
+            "--out",
+            tmp_path / "out",
+            "--model",
+            "qwen2.5-vl-tiny",
+        ),
         *("--model-args", "dtype=float32", "--set", "max_steps=1", "--set", "sequences_per_step=1"),
         *("--set", "max_tokens=4000"),
     )

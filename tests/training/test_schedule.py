@@ -18,7 +18,10 @@ def test_an_epoch_has_every_sequence_once_and_an_order_of_its_own() -> None:
 
 
 def test_another_seed_is_another_order() -> None:
-    orders = [LoopSettings(learning_rate=1, seed=seed, sequences_per_step=20).sequences_of(0, 20) for seed in (0, 1)]
+    orders = [
+        LoopSettings(learning_rate=1, seed=seed, sequences_per_step=20).sequences_of(0, 20)
+        for seed in (0, 1)
+    ]
     assert orders[0] != orders[1]
 
 

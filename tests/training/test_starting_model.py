@@ -9,7 +9,7 @@ import torch
 from infthor_eval.training.batches import collate
 from infthor_eval.training.network import SequenceModel
 from infthor_eval.training.starting_model import load_starting_model
-from model_adapters.hf.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 from .twins import PAD, sequence, write_frames
 
@@ -51,7 +51,9 @@ def test_longrope_divides_the_frequencies_where_the_recipes_length_is_beyond_the
 
 
 @pytest.mark.parametrize("rope", ["dynamic:4", "longrope:4"])
-def test_the_loss_is_that_under_these_frequencies_whatever_was_computed_before(rope: str, tmp_path: Path) -> None:
+def test_the_loss_is_that_under_these_frequencies_whatever_was_computed_before(
+    rope: str, tmp_path: Path
+) -> None:
     def loss(rope: str | None, max_tokens: int) -> float:
         loaded = _start(rope, max_tokens)
         item = sequence(loaded, write_frames(tmp_path, 1), "a mug on the desk")

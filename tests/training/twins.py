@@ -11,7 +11,7 @@ from PIL import Image
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.encoding import Encoder, TrainingSequence
 from model_adapters import load
-from model_adapters.hf.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 __all__ = ["FAMILIES", "PAD", "everywhere", "loaded", "sequence", "write_frames"]
 
@@ -33,7 +33,9 @@ def write_frames(folder: Path, count: int) -> list[FrameRef]:
     refs = []
     for index in range(count):
         path = folder / f"{index}.png"
-        Image.fromarray(draw.integers(0, 256, (4, 4, 3), dtype=np.uint8)).resize((84, 84)).save(path)
+        Image.fromarray(draw.integers(0, 256, (4, 4, 3), dtype=np.uint8)).resize((84, 84)).save(
+            path
+        )
         refs.append(FrameRef(path))
     return refs
 
@@ -42,7 +44,9 @@ def sequence(
     model: LoadedCheckpoint, frames: Sequence[FrameRef], answer: str = "a mug", name: str = "one"
 ) -> TrainingSequence:
     """Frames with a text behind each, a question, and the answer, on which loss is taken."""
-    parts = [part for number, frame in enumerate(frames) for part in (frame, f"\nRotateLeft {number}\n")]
+    parts = [
+        part for number, frame in enumerate(frames) for part in (frame, f"\nRotateLeft {number}\n")
+    ]
     return Encoder(model).answer(name, ["What happens?\n", *parts, "What do you see now?"], answer)
 
 

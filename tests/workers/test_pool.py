@@ -49,7 +49,9 @@ def pool(request):
 
 
 def counts(events, job):
-    return [event.result[1] for event in events if isinstance(event, JobResult) and event.job == job]
+    return [
+        event.result[1] for event in events if isinstance(event, JobResult) and event.job == job
+    ]
 
 
 def of(events, kind):
@@ -74,7 +76,11 @@ def test_a_job_whose_worker_dies_goes_to_another_and_loses_only_what_had_not_com
     events = list(shared.run(3, jobs.__getitem__))
     (lost,) = of(events, WorkerLost)
     assert (lost.job, "worker" in lost.reason) == (1, True)
-    assert counts(events, 1) in ([0, 1, 0, 1, 2, 3], [0, 0, 1, 2, 3], [0, 1, 2, 3])  # what was sent may die with it
+    assert counts(events, 1) in (
+        [0, 1, 0, 1, 2, 3],
+        [0, 0, 1, 2, 3],
+        [0, 1, 2, 3],
+    )  # what was sent may die with it
     assert (counts(events, 0), counts(events, 2)) == ([0, 1, 2], [0, 1])
 
 
@@ -94,7 +100,11 @@ def test_a_job_that_kills_one_worker_after_the_other_is_given_up_and_the_others_
         (broken(), DataError, "the abacus is broken; buy another"),
         (OSError(28, "No space left on device", "shard"), OSError, "No space left on device"),
         (MemoryError("all of it"), MemoryError, "all of it"),
-        (ZeroDivisionError("of its own"), InfthorError, r"ZeroDivisionError in toys.py:\d+ \(do\): of its own; fix"),
+        (
+            ZeroDivisionError("of its own"),
+            InfthorError,
+            r"ZeroDivisionError in toys.py:\d+ \(do\): of its own; fix",
+        ),
     ],
 )
 def test_what_a_worker_raises_is_raised(pool, error, kind, said):
@@ -162,7 +172,9 @@ def test_a_driver_that_is_killed_takes_its_workers_with_it(tmp_path):
     )
     (tmp_path / "drive.py").write_text(script)
     root = Path(__file__).parents[2]
-    driver = subprocess.Popen([sys.executable, tmp_path / "drive.py", root], stdout=subprocess.PIPE, text=True)
+    driver = subprocess.Popen(
+        [sys.executable, tmp_path / "drive.py", root], stdout=subprocess.PIPE, text=True
+    )
     worker = int(driver.stdout.readline())
     os.kill(driver.pid, signal.SIGKILL)
     driver.communicate()

@@ -57,7 +57,11 @@ class Counter:
     """Counts; see `infthor_eval.workers.Worker`."""
 
     def __init__(self, number: int) -> None:
-        self.greeting = {"pid": os.getpid(), "number": number, "threads": os.environ["OMP_NUM_THREADS"]}
+        self.greeting = {
+            "pid": os.getpid(),
+            "number": number,
+            "threads": os.environ["OMP_NUM_THREADS"],
+        }
 
     def do(self, job: Job) -> Iterator[tuple[int, int]]:
         if job.meets is not None:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from itertools import groupby
 
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.digests import fingerprint
 from infthor_eval.runs import (
     NOTHING,
     Group,
@@ -23,6 +22,7 @@ from infthor_eval.runs import (
 )
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.limiting import limit_items
+from infthor_eval.storage.digests import fingerprint
 from infthor_sums.suite import Calculator, Sum
 from model_adapters import Decoding, Reply, Subject, wrap_request_errors
 
@@ -43,7 +43,9 @@ class SumsEvaluation:
         self.units: list[Unit[Sum]] = []
         self.settings: dict[str, Mapping[str, object]] = {}
         for task in request.tasks:
-            self.decodings[task.name] = decoding_of(task.settings.get("generation_kwargs", {}), request.seed, task.name)
+            self.decodings[task.name] = decoding_of(
+                task.settings.get("generation_kwargs", {}), request.seed, task.name
+            )
             self.settings[task.name] = task.settings.get("dataset_kwargs", {})
             units = [_unit(task.name, payload) for payload in _draw_sums(task)]
             self.units += limit_items(units, lambda unit: unit.cluster, request.seed, request.limit)
@@ -72,7 +74,10 @@ class BoundSums:
         """Put the units into groups."""
         self._evaluation, self._subject = evaluation, subject
         # A group is done in one place and shares what is expensive: here nothing, in NIEH a trajectory's frames.
-        groups = [Group(list(units)) for _, units in groupby(evaluation.units, key=lambda unit: unit.cluster)]
+        groups = [
+            Group(list(units))
+            for _, units in groupby(evaluation.units, key=lambda unit: unit.cluster)
+        ]
         # What the numbers depend on besides the model: another config is another run.
         config = {
             "question": evaluation.question,
@@ -84,7 +89,9 @@ class BoundSums:
         """See `BoundEvaluation.run`."""
         for unit in group.units:
             decoding = self._evaluation.decodings[unit.key.task]
-            inputs = fingerprint({"prompt": self._prompt(unit.payload), "decoding": decoding.document()})
+            inputs = fingerprint(
+                {"prompt": self._prompt(unit.payload), "decoding": decoding.document()}
+            )
             done = session.find_record(unit, inputs)  # by an earlier run that was stopped
             yield done if done is not None else self._ask(unit, decoding, inputs)
 
@@ -130,5 +137,7 @@ def settings_of(task: TaskFile) -> Mapping[str, int]:
     """Return the settings of a task file; raises UsageError if one is missing."""
     settings = task.settings.get("dataset_kwargs", {})
     if not isinstance(settings, Mapping) or not settings.keys() >= {"below", "n"}:
-        raise UsageError(f"{task.path}: no below and n under dataset_kwargs; write {{below: 20, n: 24}}")
+        raise UsageError(
+            f"{task.path}: no below and n under dataset_kwargs; write {{below: 20, n: 24}}"
+        )
     return settings

@@ -42,7 +42,10 @@ class SumsPresenter(PlainPresenter):
     def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
         """See `Presenter.charts`: right sums by kind, a chart per task."""
         tasks = dict.fromkeys(task for run in runs for task in run.summary.summary.tasks)
-        return [_chart(task, [run for run in runs if task in run.summary.summary.tasks]) for task in tasks]
+        return [
+            _chart(task, [run for run in runs if task in run.summary.summary.tasks])
+            for task in tasks
+        ]
 
 
 def _chart(task: str, runs: Sequence[ReportRun]) -> Chart:
@@ -64,5 +67,7 @@ def _chart(task: str, runs: Sequence[ReportRun]) -> Chart:
         add_legend(axes, list(looks.items()))
         return figure
 
-    description = "; ".join(f"{label} {100 * rates['all'].mean:.1f} %" for label, rates in shares.items())
+    description = "; ".join(
+        f"{label} {100 * rates['all'].mean:.1f} %" for label, rates in shares.items()
+    )
     return Chart(f"{task}: right sums by kind", inline_svg(draw), description)

@@ -100,10 +100,17 @@ class SumsSuite:
         """See `Suite.summarise`."""
         tasks = {}
         for task in header.config["tasks"]:
-            chosen = [record for record in records if record.task == task and record.excluded is None]
-            groups = {"all": chosen, **{kind: [r for r in chosen if r.payload.kind == kind] for kind in KINDS}}
+            chosen = [
+                record for record in records if record.task == task and record.excluded is None
+            ]
+            groups = {
+                "all": chosen,
+                **{kind: [r for r in chosen if r.payload.kind == kind] for kind in KINDS},
+            }
             rates = {
-                name: clustered_rate([self.scores(r).get("right", 0.0) for r in group], [r.cluster for r in group])
+                name: clustered_rate(
+                    [self.scores(r).get("right", 0.0) for r in group], [r.cluster for r in group]
+                )
                 for name, group in groups.items()
             }
             tasks[task] = {name: rate for name, rate in rates.items() if rate is not None}
@@ -128,7 +135,14 @@ class SumsSuite:
 
 def _table(runs: Sequence[RunSummary], kinds: Sequence[str]) -> Table:
     rows = [
-        Row((run.header.name, task, *(format_percent(rates.get(kind)) for kind in kinds), str(rates["all"].n)))
+        Row(
+            (
+                run.header.name,
+                task,
+                *(format_percent(rates.get(kind)) for kind in kinds),
+                str(rates["all"].n),
+            )
+        )
         for run in runs
         for task, rates in run.summary.tasks.items()
         if "all" in rates

@@ -6,7 +6,15 @@ from typing import Any
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_thumbnails.rules import answer, thumbnail
-from model_adapters import Capabilities, Decoding, Reply, Transcript, check_decoding, check_turns, cut_at_stop
+from model_adapters import (
+    Capabilities,
+    Decoding,
+    Reply,
+    Transcript,
+    check_decoding,
+    check_turns,
+    cut_at_stop,
+)
 
 __all__ = ["Options", "Thumbnails"]
 
@@ -80,7 +88,9 @@ class Talk(Transcript):
         check_turns(self._model.name, _CAPABILITIES, self.turns)  # refuses to speak out of turn
         frames = [part for turn in self.turns for part in turn.parts if isinstance(part, FrameRef)]
         asked = "".join(part for part in self.turns[-1].parts if isinstance(part, str))
-        words = answer(asked, [thumbnail(frame.load(), self._model.side) for frame in frames]).split()
+        words = answer(
+            asked, [thumbnail(frame.load(), self._model.side) for frame in frames]
+        ).split()
         text = " ".join(words[: decoding.max_new_tokens])
         cut = cut_at_stop(text, decoding.stop)
         return Reply(

@@ -14,10 +14,17 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command("audit", cls=ExampleCommand, example="infthor-eval audit SET --balanced qa_set_balanced.csv")
+@click.command(
+    "audit", cls=ExampleCommand, example="infthor-eval audit SET --balanced qa_set_balanced.csv"
+)
 @click.argument("set_folder", metavar="SET", type=PATH)
 @click.argument("runs", metavar="[RUN]...", nargs=-1, type=PATH)
-@click.option("--balanced", metavar="OUT.csv", type=PATH, help="Write the part in which guessing does not help.")
+@click.option(
+    "--balanced",
+    metavar="OUT.csv",
+    type=PATH,
+    help="Write the part in which guessing does not help.",
+)
 def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> None:
     """Print what can be guessed of a set's answers without a frame, and what runs got beside that.
 
@@ -27,13 +34,18 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
     from infthor_eval.cli.progress.left_out import print_left_out
     from infthor_eval.cli.progress.notes import print_note
     from infthor_eval.errors import DataError, UsageError
-    from infthor_eval.formats.files import prepare_file, refuse_overwrite
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.formats.qa_csv import encode_questions, write_questions
     from infthor_eval.nieh.guessing.audit import audit, sentences
-    from infthor_eval.nieh.guessing.audit_tables import audit_tables, balanced_table, guessers_table, runs_table
+    from infthor_eval.nieh.guessing.audit_tables import (
+        audit_tables,
+        balanced_table,
+        guessers_table,
+        runs_table,
+    )
     from infthor_eval.nieh.guessing.balancing import balance
     from infthor_eval.report.terminal import print_table, table_console
+    from infthor_eval.storage.files import prepare_file, refuse_overwrite
 
     if balanced is not None:
         prepare_file(balanced, "--balanced")
@@ -53,7 +65,9 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
         part = balance(data.questions)
         print_table(balanced_table(part), console)
         if not part.questions:
-            raise UsageError(f"--balanced {balanced}: no form of this set has a balanced part; nothing is written")
+            raise UsageError(
+                f"--balanced {balanced}: no form of this set has a balanced part; nothing is written"
+            )
         refuse_overwrite(balanced, encode_questions(part.questions))
         write_questions(balanced, part.questions)
         print_note(f"{balanced}: {len(part.questions)} of {len(data.questions)} questions")
@@ -62,9 +76,11 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
 def _read_summary(folder: Path) -> "RunSummary":
     from infthor_eval.cli.results import read_run_results
     from infthor_eval.errors import UsageError
-    from infthor_eval.nieh.summary import NiehSummary
+    from infthor_eval.nieh.results.summary import NiehSummary
 
     run = read_run_results(folder).summary
     if not isinstance(run.summary, NiehSummary):
-        raise UsageError(f"{folder}: a run of {run.header.suite}; only runs of nieh can stand beside guesses")
+        raise UsageError(
+            f"{folder}: a run of {run.header.suite}; only runs of nieh can stand beside guesses"
+        )
     return run

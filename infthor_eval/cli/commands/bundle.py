@@ -24,8 +24,8 @@ def command(manifest: Path, out: Path) -> int:
     differs.
     """
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.generation.bundle import build_bundle, differing_files, read_manifest
+    from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import error_console, print_line, progress_bar
     from infthor_eval.thor.launch import embedded_launch
     from infthor_eval.thor.simulator import Simulator
@@ -42,7 +42,10 @@ def command(manifest: Path, out: Path) -> int:
     print_line(questions.summary_text())
     if not expected.files:
         return 0
-    n_files, differing = len(expected.files.keys() | built.files.keys()), differing_files(expected, built)
+    n_files, differing = (
+        len(expected.files.keys() | built.files.keys()),
+        differing_files(expected, built),
+    )
     print_line(f"{n_files - len(differing)} of {n_files} files as in the manifest")
     for name in differing[:10]:
         error_console().print(f"differs: {name}")

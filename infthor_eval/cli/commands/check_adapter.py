@@ -8,9 +8,15 @@ from infthor_eval.cli.options.values import parse_model_args
 __all__ = ["command"]
 
 
-@click.command("check-adapter", cls=ExampleCommand, example="infthor-eval check-adapter ./my_adapter.py:MyModel")
+@click.command(
+    "check-adapter",
+    cls=ExampleCommand,
+    example="infthor-eval check-adapter ./my_adapter.py:MyModel",
+)
 @click.argument("model")
-@click.option("--model-args", default="", metavar="K=V,...", help="Options of MODEL (see `ls models`).")
+@click.option(
+    "--model-args", default="", metavar="K=V,...", help="Options of MODEL (see `ls models`)."
+)
 def command(model: str, model_args: str) -> int:
     """Check MODEL, a name or your own FILE.py:CLASS, against the adapter contract.
 

@@ -7,9 +7,13 @@ from infthor_eval.cli.help import ExampleCommand
 __all__ = ["command"]
 
 
-@click.command("check-memory", cls=ExampleCommand, example="infthor-eval check-memory ./my_memory.py:MyMemory")
+@click.command(
+    "check-memory", cls=ExampleCommand, example="infthor-eval check-memory ./my_memory.py:MyMemory"
+)
 @click.argument("memory")
-@click.option("--memory-args", default="", metavar="K=V,...", help="Options of MEMORY (see `ls memories`).")
+@click.option(
+    "--memory-args", default="", metavar="K=V,...", help="Options of MEMORY (see `ls memories`)."
+)
 def command(memory: str, memory_args: str) -> int:
     """Check MEMORY, a name or your own FILE.py:CLASS, against the contract of memories.
 

@@ -12,22 +12,43 @@ __all__ = ["command"]
 
 
 @click.command(
-    "check-parity", cls=ExampleCommand, example="infthor-eval check-parity openvla --reference-url http://HOST:8000"
+    "check-parity",
+    cls=ExampleCommand,
+    example="infthor-eval check-parity openvla --reference-url http://HOST:8000",
 )
 @click.argument("model")
 @click.option(
-    "--reference-url", required=True, metavar="URL", help="Server with the reference policy (/act convention)."
+    "--reference-url",
+    required=True,
+    metavar="URL",
+    help="Server with the reference policy (/act convention).",
 )
 @click.option("--frames", type=PATH, help="Folder of images; default: black, white and noise.")
-@click.option("--instruction", multiple=True, help="Instruction to the policy; may be repeated. Default: a few.")
 @click.option(
-    "--model-args", default="", metavar="K=V,...", help="Options of MODEL; unnorm_key is sent to the server too."
+    "--instruction",
+    multiple=True,
+    help="Instruction to the policy; may be repeated. Default: a few.",
 )
 @click.option(
-    "--tolerance", type=FiniteFloat(min=0), default=1e-6, show_default=True, help="Largest difference of equal actions."
+    "--model-args",
+    default="",
+    metavar="K=V,...",
+    help="Options of MODEL; unnorm_key is sent to the server too.",
+)
+@click.option(
+    "--tolerance",
+    type=FiniteFloat(min=0),
+    default=1e-6,
+    show_default=True,
+    help="Largest difference of equal actions.",
 )
 def command(
-    model: str, reference_url: str, frames: Path | None, instruction: tuple[str, ...], model_args: str, tolerance: float
+    model: str,
+    reference_url: str,
+    frames: Path | None,
+    instruction: tuple[str, ...],
+    model_args: str,
+    tolerance: float,
 ) -> int:
     """Compare the actions of MODEL (openvla, spatialvla) with those of a reference server on the same frames.
 
@@ -48,7 +69,9 @@ def command(
     with nullcontext(frames_in_folder(frames)) if frames else synthetic_frames() as images:
         ours = load_policy(model, options)
         try:
-            comparison = compare_policies(ours, theirs, images, instruction or INSTRUCTIONS, tolerance)
+            comparison = compare_policies(
+                ours, theirs, images, instruction or INSTRUCTIONS, tolerance
+            )
         finally:
             ours.close()
     print_table(comparison.table(), table_console())

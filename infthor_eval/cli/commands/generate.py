@@ -20,7 +20,9 @@ __all__ = ["command"]
 
 
 @click.command(
-    "generate", cls=ExampleCommand, example="infthor-eval generate --scene kitchen-3 --seed 1 --out trajectories"
+    "generate",
+    cls=ExampleCommand,
+    example="infthor-eval generate --scene kitchen-3 --seed 1 --out trajectories",
 )
 @click.option(
     "--scene",
@@ -31,7 +33,11 @@ __all__ = ["command"]
     help="kitchen-3, FloorPlan10, ... (see `ls scenes`); may be repeated.",
 )
 @click.option(
-    "--min-steps", type=click.IntRange(1), default=300, show_default=True, help="Low-level actions, at least."
+    "--min-steps",
+    type=click.IntRange(1),
+    default=300,
+    show_default=True,
+    help="Low-level actions, at least.",
 )
 @click.option(
     "--min-subgoals",
@@ -54,13 +60,29 @@ __all__ = ["command"]
     show_default=True,
     help="Keep a trajectory that gives up as far as it got, if it has so many low-level actions; 0: never.",
 )
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of the first trajectory.")
-@click.option("--count", type=click.IntRange(1), default=1, show_default=True, help="Trajectories for each scene.")
 @click.option(
-    "--final-task", is_flag=True, help="Add a final task that needs objects seen early and late in the trajectory."
+    "--seed",
+    type=WholeNumber(0),
+    default=0,
+    show_default=True,
+    help="Seed of the first trajectory.",
 )
 @click.option(
-    "--test-set", is_flag=True, help="Generate a test set as published: with a final task, without bathrooms."
+    "--count",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    help="Trajectories for each scene.",
+)
+@click.option(
+    "--final-task",
+    is_flag=True,
+    help="Add a final task that needs objects seen early and late in the trajectory.",
+)
+@click.option(
+    "--test-set",
+    is_flag=True,
+    help="Generate a test set as published: with a final task, without bathrooms.",
 )
 @click.option("--out", required=True, type=PATH, help="Folder for the trajectory files.")
 @floor_plans_option
@@ -88,9 +110,9 @@ def command(
     Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
     """
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs, without_bathrooms
+    from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor.launch import embedded_launch
 
@@ -112,7 +134,9 @@ def command(
     prepare_folder(out)
     with progress_bar(notes) as progress:
         bar = PacedBar(progress, "generate", len(jobs))
-        result = generate_with_workers(jobs, embedded_launch(data), out, worker_settings, bar.advance, notes.print)
+        result = generate_with_workers(
+            jobs, embedded_launch(data), out, worker_settings, bar.advance, notes.print
+        )
     if as_json:
         import msgspec
 

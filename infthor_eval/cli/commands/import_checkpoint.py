@@ -11,11 +11,20 @@ __all__ = ["command"]
 
 
 @click.command(
-    "import-checkpoint", cls=ExampleCommand, example="infthor-eval import-checkpoint global_step_1000 --out checkpoint"
+    "import-checkpoint",
+    cls=ExampleCommand,
+    example="infthor-eval import-checkpoint global_step_1000 --out checkpoint",
 )
 @click.argument("folder", type=PATH)
-@click.option("--model", default="llava-onevision", show_default=True, help="Model that the training started from.")
-@click.option("--model-args", default="", metavar="K=V,...", help="Its options (pretrained, dtype, ...).")
+@click.option(
+    "--model",
+    default="llava-onevision",
+    show_default=True,
+    help="Model that the training started from.",
+)
+@click.option(
+    "--model-args", default="", metavar="K=V,...", help="Its options (pretrained, dtype, ...)."
+)
 @click.option(
     "--prompt",
     type=click.Choice(("plain", "chat")),
@@ -30,8 +39,8 @@ def command(folder: Path, model: str, model_args: str, prompt: str, out: Path) -
     The new checkpoint has safetensors, tokenizer and processor. Weights that FOLDER lacks, because they were frozen,
     come from the model that the training started from.
     """
-    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.formats.object_ids import Words
+    from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import print_line
     from infthor_eval.training.export import export
     from infthor_eval.training.published import import_weights

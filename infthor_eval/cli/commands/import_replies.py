@@ -16,12 +16,22 @@ __all__ = ["command"]
 
 
 @click.command(
-    "import-replies", cls=ExampleCommand, example="infthor-eval import-replies LOG --data SET --output results"
+    "import-replies",
+    cls=ExampleCommand,
+    example="infthor-eval import-replies LOG --data SET --output results",
 )
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
-@click.option("--data", type=PATH, metavar="SET", help="Folder of the NIEH set that the replies are about.")
-@click.option("--model", metavar="NAME", help="Name of the model. Default: the one in the names of published logs.")
-@click.option("--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs.")
+@click.option(
+    "--data", type=PATH, metavar="SET", help="Folder of the NIEH set that the replies are about."
+)
+@click.option(
+    "--model",
+    metavar="NAME",
+    help="Name of the model. Default: the one in the names of published logs.",
+)
+@click.option(
+    "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
+)
 def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path) -> int:
     """Score replies to NIEH questions that others made, and store them as runs; counts of plans too.
 
@@ -38,7 +48,9 @@ def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output
     of_plans = [log for log in logs if is_plan_log(log)]
     of_replies = [log for log in logs if log not in of_plans]
     if of_replies and data is None:
-        raise UsageError(f"{of_replies[0]}: has replies to questions; give their NIEH set with --data")
+        raise UsageError(
+            f"{of_replies[0]}: has replies to questions; give their NIEH set with --data"
+        )
     imported = [*_import_plans(of_plans, model, output)]
     if data is not None:
         imported += _import_replies(of_replies, data, model, output)
@@ -55,9 +67,9 @@ def _import_replies(
     from infthor_eval.cli.progress.refused_lines import print_refused
     from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.nieh_set import NiehSet
-    from infthor_eval.nieh.imported_replies import import_logs
+    from infthor_eval.nieh.published.imported_replies import import_logs
     from infthor_eval.nieh.suite import NiehSuite
-    from infthor_eval.runs.stored_run import store_run
+    from infthor_eval.runs.stored.writing import store_run
 
     questions, suite = NiehSet(data), NiehSuite()
     print_left_out(data, questions.malformed)
@@ -69,20 +81,28 @@ def _import_replies(
         if "prompt" in run.settings:
             unknown = "not told by its counts of tokens, which fit no published prompt as Qwen2.5-VL counts"
             print_note(f"{name}: the prompt it was asked with: {run.settings['prompt'] or unknown}")
-        for what, rows in (("not imported", run.refused), ("scored otherwise than logged", run.rescored)):
+        for what, rows in (
+            ("not imported", run.refused),
+            ("scored otherwise than logged", run.rescored),
+        ):
             print_refused(name, what, [(row.log, row.line, row.reason) for row in rows])
-        yield RunResults(stored.folder, suite, stored.summary, stored.usage, run.n_missing), len(run.refused)
+        yield (
+            RunResults(stored.folder, suite, stored.summary, stored.usage, run.n_missing),
+            len(run.refused),
+        )
 
 
-def _import_plans(logs: Sequence[Path], model: str | None, output: Path) -> Iterator[tuple["RunResults", int]]:
+def _import_plans(
+    logs: Sequence[Path], model: str | None, output: Path
+) -> Iterator[tuple["RunResults", int]]:
     """Yield the results of the runs of logs of plans, and the number of rows that are not imported."""
     from infthor_eval.cli.progress.notes import print_note
     from infthor_eval.cli.progress.refused_lines import print_refused
     from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.plan_logs import read_plan_log
-    from infthor_eval.plans.imported_counts import import_counts
+    from infthor_eval.plans.published.imported_counts import import_counts
     from infthor_eval.plans.suite import PlansSuite
-    from infthor_eval.runs.stored_run import store_run
+    from infthor_eval.runs.stored.writing import store_run
 
     suite = PlansSuite()
     for run in [import_counts(read_plan_log(log), model) for log in logs]:

@@ -7,7 +7,9 @@ import click
 __all__ = ["command"]
 
 
-@click.command("lm-eval", context_settings={"ignore_unknown_options": True, "help_option_names": []})
+@click.command(
+    "lm-eval", context_settings={"ignore_unknown_options": True, "help_option_names": []}
+)
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
 def command(arguments: tuple[str, ...]) -> None:
     """Run lm-eval's own command with ARGUMENTS, with `--model infthor` registered.

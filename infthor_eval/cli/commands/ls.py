@@ -15,8 +15,8 @@ from infthor_eval.errors import InfthorError, ModelError
 from infthor_eval.memory import MEMORIES, accepted_options, memory_class
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs.catalog import Catalog
-from infthor_eval.runs.run_labels import label_runs
-from infthor_eval.runs.run_search import BrokenRun, StoredRun, find_runs
+from infthor_eval.runs.stored.labels import label_runs
+from infthor_eval.runs.stored.search import BrokenRun, StoredRun, find_runs
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import console, print_line
@@ -48,7 +48,9 @@ def _models() -> None:
         try:
             note = model_description(name)
             table.add_row(name, f"{note}; {options(name)}" if note else options(name))
-        except ModelError as error:  # an installed package's model that does not import: say so, list the others
+        except (
+            ModelError
+        ) as error:  # an installed package's model that does not import: say so, list the others
             table.add_row(name, f"not usable: {error}", style="red")
     console().print(table, soft_wrap=False)
 
@@ -56,10 +58,14 @@ def _models() -> None:
 @command.command("memories", cls=ExampleCommand, example="infthor-eval ls memories")
 def _memories() -> None:
     """Memories for `--memory`, with their options and defaults."""
-    table = RichTable("memory", "what it recalls", "options and defaults (--memory-args)", box=box.SIMPLE_HEAD)
+    table = RichTable(
+        "memory", "what it recalls", "options and defaults (--memory-args)", box=box.SIMPLE_HEAD
+    )
     for name in MEMORIES.names:
         try:
-            shown = ", ".join(f"{key}={item.default}" for key, item in accepted_options(name).items())
+            shown = ", ".join(
+                f"{key}={item.default}" for key, item in accepted_options(name).items()
+            )
             about = (inspect.getdoc(memory_class(name)) or "").partition("\n")[0]
         except InfthorError as error:  # an installed package's memory that does not import
             table.add_row(name, f"not usable: {error}", "", style="red")
@@ -68,7 +74,9 @@ def _memories() -> None:
     console().print(table, soft_wrap=False)
 
 
-@command.command("tasks", cls=ExampleCommand, example="infthor-eval ls tasks --include-path my_tasks")
+@command.command(
+    "tasks", cls=ExampleCommand, example="infthor-eval ls tasks --include-path my_tasks"
+)
 @include_option
 def _tasks(include: tuple[Path, ...]) -> None:
     """Tasks and groups of tasks."""
@@ -82,7 +90,9 @@ def _tasks(include: tuple[Path, ...]) -> None:
             try:
                 if task.name not in packaged:  # which are good, and suites take long to import
                     find_suite(suite).check_task(task)
-            except InfthorError as error:  # a file of one's own, or another package's: say so, list the others
+            except (
+                InfthorError
+            ) as error:  # a file of one's own, or another package's: say so, list the others
                 table.add_row(task.name, f"not usable: {error}", "", style="red")
                 continue
             settings = dict(task.settings.get("dataset_kwargs", {}))
@@ -99,7 +109,9 @@ def _scenes(data: Path | None) -> None:
     table = RichTable("scene", "what it is", box=box.SIMPLE_HEAD)
     for kind in SCENE_KINDS:
         several = " of several rooms" if kind == "house" else ""
-        table.add_row(f"{kind}-<seed>", f"a {kind.replace('-', ' ')}{several}, generated from the seed")
+        table.add_row(
+            f"{kind}-<seed>", f"a {kind.replace('-', ' ')}{several}, generated from the seed"
+        )
     if data is not None:
         from infthor_eval.formats.floor_plans import floor_plan_names
 
@@ -131,7 +143,16 @@ def _row(label: str, run: StoredRun) -> Row:
     n_missing = "?" if run.n_missing is None else str(run.n_missing)
     age = _age(time.time() - run.changed)
     return Row(
-        (label, run.header.suite, str(run.n_done), n_missing, str(run.n_failed), _numbers(run), age, str(run.folder))
+        (
+            label,
+            run.header.suite,
+            str(run.n_done),
+            n_missing,
+            str(run.n_failed),
+            _numbers(run),
+            age,
+            str(run.folder),
+        )
     )
 
 
@@ -139,10 +160,14 @@ def _numbers(run: StoredRun) -> str:
     """The tasks with their primary metrics, as many as fit into a row."""
     tasks = list(run.header.config.get("tasks", {}))
     numbers = [
-        f"{task} {100 * run.primary_metrics[task].mean:.1f}" if task in run.primary_metrics else task
+        f"{task} {100 * run.primary_metrics[task].mean:.1f}"
+        if task in run.primary_metrics
+        else task
         for task in tasks[:_MAX_TASKS]
     ]
-    return ", ".join([*numbers, *([f"{len(tasks) - _MAX_TASKS} more"] if len(tasks) > _MAX_TASKS else [])])
+    return ", ".join(
+        [*numbers, *([f"{len(tasks) - _MAX_TASKS} more"] if len(tasks) > _MAX_TASKS else [])]
+    )
 
 
 def _age(seconds: float) -> str:

@@ -26,11 +26,22 @@ _COLUMNS = ("units", "measured", "frames", "requests", "tokens read", "encoded",
 
 
 @click.command(
-    "plan", cls=ExampleCommand, example="infthor-eval plan --model qwen2.5-vl --tasks nieh --price-per-hour 2.5"
+    "plan",
+    cls=ExampleCommand,
+    example="infthor-eval plan --model qwen2.5-vl --tasks nieh --price-per-hour 2.5",
 )
-@click.option("--measure", type=WholeNumber(1), default=6, show_default=True, help="Units of each task to measure.")
 @click.option(
-    "--price-per-hour", type=FiniteFloat(min=0), metavar="USD", help="Price of a worker's machine, for the cost."
+    "--measure",
+    type=WholeNumber(1),
+    default=6,
+    show_default=True,
+    help="Units of each task to measure.",
+)
+@click.option(
+    "--price-per-hour",
+    type=FiniteFloat(min=0),
+    metavar="USD",
+    help="Price of a worker's machine, for the cost.",
 )
 @run_options
 def command(measure: int, price_per_hour: float | None, **given: Any) -> int:
@@ -38,7 +49,12 @@ def command(measure: int, price_per_hour: float | None, **given: Any) -> int:
 
     Takes the options of `run`. A few units of each task are evaluated to measure, and not kept.
     """
-    return max([plan(*request, measure, price_per_hour) for request in RunOptions.from_click(given).requests()])
+    return max(
+        [
+            plan(*request, measure, price_per_hour)
+            for request in RunOptions.from_click(given).requests()
+        ]
+    )
 
 
 def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float | None) -> int:
@@ -76,11 +92,23 @@ def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
 
 def _row(item: TaskEstimate) -> Row:
     total = item.total
-    counts = (item.n_units, item.n_measured, item.frames, total.requests, total.read, total.encoded, total.written)
-    return Row((item.task, *(f"{round(count):,}" for count in counts), format_duration(total.seconds)))
+    counts = (
+        item.n_units,
+        item.n_measured,
+        item.frames,
+        total.requests,
+        total.read,
+        total.encoded,
+        total.written,
+    )
+    return Row(
+        (item.task, *(f"{round(count):,}" for count in counts), format_duration(total.seconds))
+    )
 
 
-def _totals(request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None) -> list[str]:
+def _totals(
+    request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None
+) -> list[str]:
     seconds, workers = sum(item.total.seconds for item in tasks), request.worker_settings.workers
     by_all = f", {format_duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
     lines = [f"time: {format_duration(seconds)} of one worker{by_all}, loading not counted"]

@@ -14,12 +14,20 @@ from infthor_eval.cli.options.workers import parse_worker_settings, worker_optio
 __all__ = ["command"]
 
 
-@click.command("questions", cls=ExampleCommand, example="infthor-eval questions SET --out SET/qa_set_mine.csv")
+@click.command(
+    "questions", cls=ExampleCommand, example="infthor-eval questions SET --out SET/qa_set_mine.csv"
+)
 @click.argument("folder", metavar="SET", type=PATH)
 @click.option("--out", required=True, type=PATH, help="CSV file to write.")
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice.")
 @click.option(
-    "--per-trajectory", type=click.IntRange(1), default=25, show_default=True, help="Questions per trajectory, at most."
+    "--seed", type=WholeNumber(0), default=0, show_default=True, help="Seed of every choice."
+)
+@click.option(
+    "--per-trajectory",
+    type=click.IntRange(1),
+    default=25,
+    show_default=True,
+    help="Questions per trajectory, at most.",
 )
 @click.option(
     "--min-share",
@@ -28,7 +36,11 @@ __all__ = ["command"]
     show_default=True,
     help="Share of a frame's pixels that an object must fill to count as visible.",
 )
-@click.option("--further", is_flag=True, help="Add question forms that are not in Table 3, with their own types.")
+@click.option(
+    "--further",
+    is_flag=True,
+    help="Add question forms that are not in Table 3, with their own types.",
+)
 @click.option(
     "--words",
     type=click.Choice(["plain", "published"]),
@@ -56,9 +68,9 @@ def command(
     Exit code 1 if a trajectory of the set cannot be read.
     """
     from infthor_eval.errors import wrap_errors
-    from infthor_eval.formats.files import prepare_file, refuse_overwrite, write_atomically
     from infthor_eval.formats.qa_csv import encode_questions
     from infthor_eval.generation.questions.generate import generate_questions
+    from infthor_eval.storage.files import prepare_file, refuse_overwrite, write_atomically
     from infthor_eval.terminal import error_console, print_line
 
     worker_settings = parse_worker_settings(**workers)
@@ -77,7 +89,10 @@ def command(
     content = encode_questions(result.questions)
     if not overwrite:
         refuse_overwrite(out, content)
-    with wrap_errors(f"{out}: cannot be written", "give another --out"), write_atomically(out) as partial:
+    with (
+        wrap_errors(f"{out}: cannot be written", "give another --out"),
+        write_atomically(out) as partial,
+    ):
         partial.write_bytes(content)
     print_line(f"{len(result.questions)} questions on {result.trajectories} trajectories: {out}")
     print_line(result.summary_text())

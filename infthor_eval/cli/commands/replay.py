@@ -26,9 +26,19 @@ _MAX_SHOWN = 20  # failures and divergences printed one by one; all are in the J
 @click.option("--out", required=True, type=PATH, help="Folder of the set, new or to be continued.")
 @floor_plans_option
 @click.option("--limit", type=click.IntRange(1), help="Trajectories, at most.")
-@click.option("--per-floor-plan", type=click.IntRange(1), help="Trajectories of one floor plan, at most.")
-@click.option("--frames", type=click.IntRange(1), default=1, show_default=True, help="Frames per move or turn.")
-@click.option("--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator.")
+@click.option(
+    "--per-floor-plan", type=click.IntRange(1), help="Trajectories of one floor plan, at most."
+)
+@click.option(
+    "--frames",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    help="Frames per move or turn.",
+)
+@click.option(
+    "--unity", is_flag=True, help="Use AI2-THOR's own Unity build, not the embedded simulator."
+)
 @worker_options
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as one JSON object.")
 @click.pass_context
@@ -51,9 +61,9 @@ def command(
     if a trajectory cannot be replayed at all.
     """
     from infthor_eval.cli.progress.bar import PacedBar
-    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.generation.replay_set import replay_with_workers, select
     from infthor_eval.generation.replay_summary import summarise
+    from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import console, error_console, progress_bar
     from infthor_eval.thor import launch
     from infthor_eval.thor.supplement import supplement_file
@@ -66,7 +76,9 @@ def command(
         start = launch.unity_launch() if unity else launch.embedded_launch(data, supplement)
         with progress_bar(notes) as progress:
             bar = PacedBar(progress, "replay", len(selection.items))
-            replayed = replay_with_workers(selection, start, out, worker_settings, frames, bar.advance, notes.print)
+            replayed = replay_with_workers(
+                selection, start, out, worker_settings, frames, bar.advance, notes.print
+            )
     if as_json:
         import msgspec
 

@@ -24,15 +24,25 @@ __all__ = ["command"]
 _PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
 
 
-@click.command("report", cls=ExampleCommand, example="infthor-eval report results/*/nieh_mini-* --out report.html")
+@click.command(
+    "report",
+    cls=ExampleCommand,
+    example="infthor-eval report results/*/nieh_mini-* --out report.html",
+)
 @click.argument("runs", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @click.option(
     "--out",
     type=PATH,
     help=f"The page, an .html file, or the folder of a figure's files.  [default: {_PAGE}, {_FOLDER}]",
 )
-@click.option("--data", type=PATH, help="Folder of the question set or the trajectories, if the runs do not name it.")
-@click.option("--scenes", type=PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
+@click.option(
+    "--data",
+    type=PATH,
+    help="Folder of the question set or the trajectories, if the runs do not name it.",
+)
+@click.option(
+    "--scenes", type=PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run."
+)
 @click.option(
     "--episodes",
     type=WholeNumber(0),
@@ -47,8 +57,15 @@ _PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
     help="Draw a figure instead: 6 (reward of arms along trajectories), 7 (reward of plans over steps and context "
     "tokens), radius (success of arms by the hand's radius).",
 )
-@click.option("--panels", type=PATH, metavar="FILE.yaml", help="Runs of each panel of a figure; else all in one.")
-@click.option("--task", help="The task to draw if the runs share several; for arms, one of each kind: A,B.")
+@click.option(
+    "--panels",
+    type=PATH,
+    metavar="FILE.yaml",
+    help="Runs of each panel of a figure; else all in one.",
+)
+@click.option(
+    "--task", help="The task to draw if the runs share several; for arms, one of each kind: A,B."
+)
 def command(
     runs: tuple[Path, ...],
     out: Path | None,
@@ -79,10 +96,10 @@ def command(
 
 def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> None:
     from infthor_eval.errors import UsageError
-    from infthor_eval.formats.files import prepare_file
     from infthor_eval.report.runs import read_report_runs
     from infthor_eval.report.web.build import build_page
     from infthor_eval.report.web.page import write_page
+    from infthor_eval.storage.files import prepare_file
     from infthor_eval.suites import find_presenter, find_suite
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
@@ -93,7 +110,9 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
     with progress_bar(error_console()) as progress:
         page = build_page(runs, request, _PageBars(progress))
     size = write_page(page, path)
-    print_line(f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: {path}")
+    print_line(
+        f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: {path}"
+    )
 
 
 class _PageBars:
@@ -114,16 +133,24 @@ class _PageBars:
 
 def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Path) -> None:
     from infthor_eval.errors import UsageError
-    from infthor_eval.formats.files import prepare_folder, require_writable
     from infthor_eval.report.runs import read_report_runs
     from infthor_eval.report.terminal import print_table, table_console
+    from infthor_eval.storage.files import prepare_folder, require_writable
     from infthor_eval.suites import find_presenter, find_suite, suite_names
     from infthor_eval.terminal import print_line
 
-    owners: dict[str, Mapping[str, Figure]] = {suite: find_presenter(suite).figures for suite in suite_names()}
+    owners: dict[str, Mapping[str, Figure]] = {
+        suite: find_presenter(suite).figures for suite in suite_names()
+    }
     if not any(name in figures for figures in owners.values()):
-        abouts = sorted(f"{key} ({figure.about})" for figures in owners.values() for key, figure in figures.items())
-        raise UsageError(f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}")
+        abouts = sorted(
+            f"{key} ({figure.about})"
+            for figures in owners.values()
+            for key, figure in figures.items()
+        )
+        raise UsageError(
+            f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}"
+        )
     runs = read_report_runs(folders, find_suite, find_presenter)
     figure = _require_figure(runs, name, owners)
     if request.panels is not None and not figure.has_panels:
@@ -136,12 +163,18 @@ def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Pat
         print_line(line)
 
 
-def _require_figure(runs: Sequence[ReportRun], name: str, owners: Mapping[str, Mapping[str, Figure]]) -> Figure:
+def _require_figure(
+    runs: Sequence[ReportRun], name: str, owners: Mapping[str, Mapping[str, Figure]]
+) -> Figure:
     """Return the figure of a name; two packages may offer different ones, so the first run decides."""
     from infthor_eval.errors import UsageError
 
     first = runs[0].suite.name
-    owner = first if name in owners[first] else next(suite for suite, figures in owners.items() if name in figures)
+    owner = (
+        first
+        if name in owners[first]
+        else next(suite for suite, figures in owners.items() if name in figures)
+    )
     for run in runs:
         if run.suite.name != owner:
             raise UsageError(

@@ -13,31 +13,39 @@ from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH, ModelArgs, ModelList, ModelSpec, WholeNumber
 
 if TYPE_CHECKING:
-    from infthor_eval.nieh.judging import Judge
     from infthor_eval.nieh.records import NiehAnswer
-    from infthor_eval.nieh.rescoring import Rescored, Rescoring
-    from infthor_eval.nieh.rescoring_report import Change, RescoringReport
+    from infthor_eval.nieh.rescoring.judging import Judge
+    from infthor_eval.nieh.rescoring.report import Change, RescoringReport
+    from infthor_eval.nieh.rescoring.rescore import Rescored, Rescoring
     from infthor_eval.runs import UnitRecord
 
 __all__ = ["command"]
 
-# Most tokens of a verdict by prompt. Those are the names of `infthor_eval.nieh.judge_prompts`, which is slow to import.
+# Most tokens of a verdict by prompt. Those are the names of `infthor_eval.nieh.rescoring.judge_prompts`, which is slow to import.
 _JUDGE_TOKENS = {"yes-no": 16, "published": 64}
 _JUDGE_PROMPT = "yes-no"
 
 
 @click.command(
-    "rescore", cls=ExampleCommand, example="infthor-eval rescore results/blind/RUN --scorer my_scorer.py:measure"
+    "rescore",
+    cls=ExampleCommand,
+    example="infthor-eval rescore results/blind/RUN --scorer my_scorer.py:measure",
 )
 @click.argument("folder", metavar="RUN", type=PATH)
-@click.option("--scorer", metavar="NAME", help="Your own scorer beside ours: FILE.py:NAME, or the name of a package's.")
+@click.option(
+    "--scorer",
+    metavar="NAME",
+    help="Your own scorer beside ours: FILE.py:NAME, or the name of a package's.",
+)
 @click.option(
     "--judge",
     type=ModelList(),
     metavar="MODEL",
     help="Ask this model where the rules are unsure (off by default; any model of `ls models`, usually openai).",
 )
-@click.option("--judge-args", type=ModelArgs(), default="", metavar="K=V,...", help="Options of the judge.")
+@click.option(
+    "--judge-args", type=ModelArgs(), default="", metavar="K=V,...", help="Options of the judge."
+)
 @click.option(
     "--judge-prompt",
     type=click.Choice(tuple(_JUDGE_TOKENS)),
@@ -50,9 +58,15 @@ _JUDGE_PROMPT = "yes-no"
     help="Most tokens of a verdict; default: 16, and 64 for a score. A model that reasons first needs more.",
 )
 @click.option(
-    "--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of the sample that measures the judge."
+    "--seed",
+    type=WholeNumber(),
+    default=0,
+    show_default=True,
+    help="Seed of the sample that measures the judge.",
 )
-@click.option("--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs.")
+@click.option(
+    "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
+)
 def command(
     folder: Path,
     scorer: str | None,
@@ -69,7 +83,7 @@ def command(
     fails on a reply, or the judge cannot be asked.
     """
     from infthor_eval.nieh.own_scorers import find_scorer
-    from infthor_eval.nieh.rescoring import read_source, score_again
+    from infthor_eval.nieh.rescoring.rescore import read_source, score_again
 
     if judge is None and judge_args:
         raise click.UsageError("--judge-args are options of a judge; give one with --judge")
@@ -91,7 +105,7 @@ def _load_judge(
     judge: ModelSpec, more: Mapping[str, str], max_new_tokens: int, seed: int, prompt: str
 ) -> AbstractContextManager[Judge]:
     from infthor_eval.cli.progress.notes import print_note
-    from infthor_eval.nieh.judging import Judge
+    from infthor_eval.nieh.rescoring.judging import Judge
     from model_adapters import model_note
 
     loaded = Judge.load(judge.name, {**more, **judge.options}, max_new_tokens, seed, prompt)
@@ -119,7 +133,7 @@ def _store(rescoring: Rescoring, output: Path) -> Rescored:
 def _print(rescoring: Rescoring, rescored: Rescored) -> None:
     from infthor_eval.cli.options.show import ShowOptions
     from infthor_eval.cli.results import RunResults, print_results
-    from infthor_eval.nieh.rescoring_report import agreement_table, change_table, sources_of
+    from infthor_eval.nieh.rescoring.report import agreement_table, change_table, sources_of
     from infthor_eval.nieh.suite import NiehSuite
     from infthor_eval.report.terminal import print_table, table_console
 
@@ -128,7 +142,10 @@ def _print(rescoring: Rescoring, rescored: Rescored) -> None:
     print_table(change_table(report, sources_of(rescoring.header.config)), console)
     if report.judge is not None and rescoring.judge is not None:
         print_table(agreement_table(report.judge, rescoring.judge.name), console)
-    print_results([RunResults(run.folder, NiehSuite(), run.summary, run.usage, report.n_missing)], ShowOptions())
+    print_results(
+        [RunResults(run.folder, NiehSuite(), run.summary, run.usage, report.n_missing)],
+        ShowOptions(),
+    )
 
 
 def _print_counts(report: RescoringReport) -> None:
@@ -139,9 +156,16 @@ def _print_counts(report: RescoringReport) -> None:
         (report.n_without_reply, "without a reply stay failed"),
         (report.n_missing, "were never asked"),
     )
-    print_note("; ".join([f"{report.n_scored} replies scored", *(f"{n} {what}" for n, what in counts if n)]))
+    print_note(
+        "; ".join(
+            [f"{report.n_scored} replies scored", *(f"{n} {what}" for n, what in counts if n)]
+        )
+    )
     for task, names in report.left_out.items():
-        print_note(f"{task}: {', '.join(names)}: left out, as the journal does not say how to compute it", "yellow")
+        print_note(
+            f"{task}: {', '.join(names)}: left out, as the journal does not say how to compute it",
+            "yellow",
+        )
     for task, changes in report.tasks.items():
         for name, change in changes.items():
             if change.n_differ:
@@ -151,7 +175,9 @@ def _print_counts(report: RescoringReport) -> None:
 def _print_change(name: str, change: Change) -> None:
     from infthor_eval.cli.progress.notes import print_note
 
-    print_note(f"{name}: {change.n_differ} of {change.n_before} scores differ from those in the journal")
+    print_note(
+        f"{name}: {change.n_differ} of {change.n_before} scores differ from those in the journal"
+    )
     for item in change.examples:
         print_note(f"  {item.question}: {item.before:g}, now {item.now:g}: {item.reply!r:.60}")
     if change.n_differ > len(change.examples):
@@ -163,7 +189,11 @@ def _print_failures(rescored: Rescored) -> int:
     from infthor_eval.cli.progress.notes import print_failure
     from infthor_eval.reasons import count_reasons
 
-    failed = [(r.task, r.failure) for r in rescored.records if r.failure is not None and r.payload.reply is not None]
+    failed = [
+        (r.task, r.failure)
+        for r in rescored.records
+        if r.failure is not None and r.payload.reply is not None
+    ]
     for task, reason, n in count_reasons(failed):
         print_failure(f"{task}: {n} sample(s) failed, counted as wrong: {reason}")
     unasked = rescored.judgement.failures if rescored.judgement else ()

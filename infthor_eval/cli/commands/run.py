@@ -26,7 +26,9 @@ __all__ = ["command", "evaluate"]
 
 
 @click.command(
-    "run", cls=ExampleCommand, example="infthor-eval run --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini_gt"
+    "run",
+    cls=ExampleCommand,
+    example="infthor-eval run --model oracle,blind,qwen2.5-vl-nano --tasks nieh_mini_gt",
 )
 @run_options
 @show_options
@@ -62,7 +64,9 @@ def evaluate(
 
     senders = Trackers(**(trackers or {}))
     with quiet_notes(show.quiet):
-        with NOTES.status("reading the tasks and their data"):  # retrieval embeds every frame: minutes
+        with NOTES.status(
+            "reading the tasks and their data"
+        ):  # retrieval embeds every frame: minutes
             runs = [prepare(request, suite) for request, suite in requests]
         for model in dict.fromkeys(request.model for request, _ in requests):
             if note := model_note(model):
@@ -73,7 +77,10 @@ def evaluate(
             export(outcomes[-1])
             if outcomes[-1].n_missing:
                 break
-    results = [RunResults(run.folder, run.run.suite, run.summary, run.usage, run.n_missing) for run in outcomes]
+    results = [
+        RunResults(run.folder, run.run.suite, run.summary, run.usage, run.n_missing)
+        for run in outcomes
+    ]
     print_results(results, show)
     n_failed = sum(map(_print_failures, outcomes))  # every run prints its failures
     n_void = sum(map(_print_if_void, outcomes))
@@ -82,7 +89,9 @@ def evaluate(
 
 
 def _print_if_void(outcome: RunOutcome) -> bool:
-    is_void = bool(outcome.records) and all(record.excluded is not None for record in outcome.records)
+    is_void = bool(outcome.records) and all(
+        record.excluded is not None for record in outcome.records
+    )
     if is_void:
         print_failure(f"{outcome.summary.header.name}: no result: every sample was excluded")
     return is_void
@@ -98,7 +107,9 @@ def _send(outcome: RunOutcome, trackers: Trackers) -> bool:
 
 
 def _print_failures(outcome: RunOutcome) -> int:
-    failed = [(record.task, record.failure) for record in outcome.records if record.failure is not None]
+    failed = [
+        (record.task, record.failure) for record in outcome.records if record.failure is not None
+    ]
     for task, reason, n in count_reasons(failed):
         print_failure(f"{task}: {n} sample(s) failed, counted as wrong: {reason}")
     return len(failed)

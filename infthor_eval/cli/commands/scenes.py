@@ -17,7 +17,9 @@ def command() -> None:
     """Draw a scene (show), or export scenes for machines without Unity (dump)."""
 
 
-@command.command("show", cls=ExampleCommand, example="infthor-eval scenes show kitchen-3 --out kitchen.png")
+@command.command(
+    "show", cls=ExampleCommand, example="infthor-eval scenes show kitchen-3 --out kitchen.png"
+)
 @click.argument("name", type=SceneName())
 @floor_plans_option
 @click.option("--out", type=PATH, help="Image to write; default: NAME.png.")
@@ -36,7 +38,7 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     from PIL import Image
 
     from infthor_eval.errors import wrap_errors
-    from infthor_eval.formats.files import prepare_file, refuse_overwrite, write_atomically
+    from infthor_eval.storage.files import prepare_file, refuse_overwrite, write_atomically
     from infthor_eval.terminal import print_line
     from infthor_eval.thor.launch import embedded_launch
     from infthor_eval.thor.scenes import scene_pictures
@@ -54,26 +56,47 @@ def show(name: str, data: Path | None, out: Path | None, size: int, overwrite: b
     sheet.save(picture, format=Image.registered_extensions()[path.suffix.lower()])
     if not overwrite:
         refuse_overwrite(path, picture.getvalue())
-    with wrap_errors(f"{path}: cannot be written", "give another place with --out"), write_atomically(path) as partial:
+    with (
+        wrap_errors(f"{path}: cannot be written", "give another place with --out"),
+        write_atomically(path) as partial,
+    ):
         partial.write_bytes(picture.getvalue())
     print_line(f"{name}: {path} (from above; from where most is seen)")
 
 
-@command.command("dump", cls=ExampleCommand, example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes")
+@command.command(
+    "dump",
+    cls=ExampleCommand,
+    example="infthor-eval scenes dump FloorPlan1 FloorPlan201 --out scenes",
+)
 @click.argument("names", nargs=-1, required=True)
 @click.option("--out", type=PATH, required=True, help="Folder of floor plans, new or existing.")
-@click.option("--unity", type=PATH, help="Unity executable to use instead of the build that ai2thor downloads.")
-@click.option("--embedded", "is_embedded", is_flag=True, help="Export scenes of the embedded simulator instead.")
+@click.option(
+    "--unity",
+    type=PATH,
+    help="Unity executable to use instead of the build that ai2thor downloads.",
+)
+@click.option(
+    "--embedded",
+    "is_embedded",
+    is_flag=True,
+    help="Export scenes of the embedded simulator instead.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace other recordings of these scenes.")
 @floor_plans_option
 def dump(
-    names: tuple[str, ...], out: Path, unity: Path | None, is_embedded: bool, overwrite: bool, data: Path | None
+    names: tuple[str, ...],
+    out: Path,
+    unity: Path | None,
+    is_embedded: bool,
+    overwrite: bool,
+    data: Path | None,
 ) -> None:
     """Export the metadata of the scenes NAMES from Unity into a folder.
 
     Other commands take that folder as --data, to run these scenes in the embedded simulator.
     """
-    from infthor_eval.formats.files import prepare_folder
+    from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import print_line
     from infthor_eval.thor import launch
     from infthor_eval.thor.scenes import dump_scene

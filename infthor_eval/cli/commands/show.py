@@ -14,7 +14,11 @@ from infthor_eval.cli.results import print_results, read_run_results
 __all__ = ["command"]
 
 
-@click.command("show", cls=ExampleCommand, example="infthor-eval show results/oracle/RUN results/blind/RUN --full")
+@click.command(
+    "show",
+    cls=ExampleCommand,
+    example="infthor-eval show results/oracle/RUN results/blind/RUN --full",
+)
 @click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @sample_options
 def command(folders: tuple[Path, ...], per_sample: bool, **given: Any) -> None:
@@ -37,8 +41,12 @@ def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
     from infthor_eval.suites import find_presenter, find_suite
 
     if options.form not in FORMS or options.full:
-        raise UsageError(f"--per-sample: is for --format {' and --format '.join(FORMS)}, and --full is for tables")
+        raise UsageError(
+            f"--per-sample: is for --format {' and --format '.join(FORMS)}, and --full is for tables"
+        )
     if options.form == "parquet" and sys.stdout.isatty():
-        raise UsageError("--format parquet: is not for a terminal; write it into a file, `> samples.parquet`")
+        raise UsageError(
+            "--format parquet: is not for a terminal; write it into a file, `> samples.parquet`"
+        )
     table = sample_table(read_report_runs(folders, find_suite, find_presenter))
     sys.stdout.buffer.write(encode_samples(table, options.form))

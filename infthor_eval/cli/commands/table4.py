@@ -19,7 +19,7 @@ def command(set_folder: Path) -> None:
     """
     from infthor_eval.cli.progress.left_out import print_left_out
     from infthor_eval.formats.nieh_set import NiehSet
-    from infthor_eval.nieh.table4 import table4
+    from infthor_eval.nieh.published.table4 import table4
     from infthor_eval.report.terminal import print_table, table_console
 
     data = NiehSet(set_folder)

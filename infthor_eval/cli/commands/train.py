@@ -30,11 +30,25 @@ __all__ = ["command"]
 
 _GPUS, _TFLOPS = 8, 400.0
 _PER_TRAJECTORY = 500  # more than there are questions on a trajectory
-_STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "answering and acting"}
+_STAGES = {
+    "vision": "recognising objects",
+    "text": "reading plans",
+    "joint": "answering and acting",
+}
 
 
-@click.command("train", cls=ExampleCommand, example="infthor-eval train --recipe questions --data SET --out runs/mine")
-@click.option("--recipe", "name", required=True, metavar="NAME|FILE", help="Recipe of the training; see above.")
+@click.command(
+    "train",
+    cls=ExampleCommand,
+    example="infthor-eval train --recipe questions --data SET --out runs/mine",
+)
+@click.option(
+    "--recipe",
+    "name",
+    required=True,
+    metavar="NAME|FILE",
+    help="Recipe of the training; see above.",
+)
 @click.option(
     "--data",
     "folders",
@@ -44,12 +58,20 @@ _STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "a
     help="Replayed set (`replay`) to train on, with a question file if the recipe needs questions; may be repeated. "
     "The recipe tiny generates its own by default.",
 )
-@click.option("--model", metavar="NAME", help="Model to use instead of the recipe's, without its options.")
 @click.option(
-    "--model-args", metavar="K=V,...", help="Options of the model (pretrained, dtype, ...), added to the recipe's."
+    "--model", metavar="NAME", help="Model to use instead of the recipe's, without its options."
 )
 @click.option(
-    "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Change a setting of the recipe; may be repeated."
+    "--model-args",
+    metavar="K=V,...",
+    help="Options of the model (pretrained, dtype, ...), added to the recipe's.",
+)
+@click.option(
+    "--set",
+    "changes",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Change a setting of the recipe; may be repeated.",
 )
 @click.option(
     "--words",
@@ -57,13 +79,21 @@ _STAGES = {"vision": "recognising objects", "text": "reading plans", "joint": "a
     help="Words of plans and actions, as in evaluation.  [default: the recipe's]",
 )
 @click.option(
-    "--out", required=True, type=PATH, help="Folder of the run; the checkpoint is written to checkpoint/ in it."
+    "--out",
+    required=True,
+    type=PATH,
+    help="Folder of the run; the checkpoint is written to checkpoint/ in it.",
 )
 @click.option(
-    "--dry-run", is_flag=True, help="Print the size of the data and an estimate of time and memory; do not train."
+    "--dry-run",
+    is_flag=True,
+    help="Print the size of the data and an estimate of time and memory; do not train.",
 )
 @click.option(
-    "--gpus", type=click.IntRange(1), metavar="N", help=f"GPUs of the machine, for --dry-run.  [default: {_GPUS}]"
+    "--gpus",
+    type=click.IntRange(1),
+    metavar="N",
+    help=f"GPUs of the machine, for --dry-run.  [default: {_GPUS}]",
 )
 @click.option(
     "--tflops",
@@ -99,7 +129,9 @@ def command(
     settings = parse_pairs(changes, "--set")
     settings |= {} if model is None else {"model": model}
     settings |= {} if words is None else {"words": words}
-    settings |= {f"model_args.{key}": value for key, value in parse_model_args(model_args or "").items()}
+    settings |= {
+        f"model_args.{key}": value for key, value in parse_model_args(model_args or "").items()
+    }
     recipe = read_recipe(name, settings)
     if not dry_run and (gpus is not None or tflops is not None):
         raise click.UsageError("--gpus and --tflops are for --dry-run; add it, or leave them out")
@@ -110,7 +142,9 @@ def command(
         )
     if isinstance(recipe, NanoRecipe):
         if model is not None or model_args is not None or dry_run:
-            raise click.UsageError("--model, --model-args and --dry-run are for recipes that start from a model")
+            raise click.UsageError(
+                "--model, --model-args and --dry-run are for recipes that start from a model"
+            )
         _train_small_model(recipe, folders, out, worker_settings)
     elif not folders:
         raise click.UsageError("give --data, a replayed set to train on")
@@ -118,7 +152,9 @@ def command(
         _fine_tune(recipe, folders, out, (gpus or _GPUS, tflops or _TFLOPS) if dry_run else None)
 
 
-def _fine_tune(recipe: Recipe, folders: Sequence[Path], out: Path, machine: tuple[int, float] | None) -> None:
+def _fine_tune(
+    recipe: Recipe, folders: Sequence[Path], out: Path, machine: tuple[int, float] | None
+) -> None:
     """Fine-tune a model and print its last loss; for a machine (GPUs, TFLOP/s of each), print an estimate instead."""
     from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 
@@ -173,14 +209,18 @@ def _print_estimate(run: TrainingRun, n_gpus: int, tflops: float) -> None:
     console().print(f"memory of a process: {cost.memory / 1e9:,.1f} GB ({sizes})")
 
 
-def _train_small_model(recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_settings: WorkerSettings) -> None:
+def _train_small_model(
+    recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_settings: WorkerSettings
+) -> None:
     """Train the small model on replayed sets with questions, or on sets generated in `out` if there are none."""
-    from infthor_eval.formats.files import prepare_folder
+    from infthor_eval.storage.files import prepare_folder
     from infthor_eval.training.export import export
     from infthor_eval.training.nano.stages import train_small_model
 
     prepare_folder(out)
-    sets = list(folders) or [_generate_data(recipe.scenes, recipe.seed, out / "data", worker_settings)]
+    sets = list(folders) or [
+        _generate_data(recipe.scenes, recipe.seed, out / "data", worker_settings)
+    ]
     with progress_bar(NOTES) as progress:
         bars = StepBars(progress)
 
@@ -192,7 +232,9 @@ def _train_small_model(recipe: NanoRecipe, folders: Sequence[Path], out: Path, w
     console().print(f"{out / 'checkpoint'}")
 
 
-def _generate_data(scenes: SceneSettings, seed: int, out: Path, worker_settings: WorkerSettings) -> Path:
+def _generate_data(
+    scenes: SceneSettings, seed: int, out: Path, worker_settings: WorkerSettings
+) -> Path:
     """Generate trajectories in procedural scenes, replay them, and write every question on them; return the set.
 
     What is in the folder already is not generated again.
@@ -200,17 +242,23 @@ def _generate_data(scenes: SceneSettings, seed: int, out: Path, worker_settings:
     Raises:
         DataError: a trajectory cannot be generated or replayed.
     """
-    from infthor_eval.formats.files import prepare_folder
     from infthor_eval.formats.qa_csv import write_questions
     from infthor_eval.generation.generate_set import generate_with_workers
     from infthor_eval.generation.jobs import trajectory_jobs
     from infthor_eval.generation.questions.generate import generate_questions
     from infthor_eval.generation.replay_set import replay_with_workers, select
+    from infthor_eval.storage.files import prepare_folder
     from infthor_eval.thor.launch import embedded_launch
 
     trajectories, replayed_set = prepare_folder(out / "trajectories"), prepare_folder(out / "set")
     jobs = trajectory_jobs(
-        scenes.names, seed=seed, count=1, min_steps=scenes.min_steps, min_subgoals=1, final_task=False, max_fail=20
+        scenes.names,
+        seed=seed,
+        count=1,
+        min_steps=scenes.min_steps,
+        min_subgoals=1,
+        final_task=False,
+        max_fail=20,
     )
     with progress_bar(NOTES) as progress:
         bar = PacedBar(progress, "trajectories", len(jobs))

@@ -13,20 +13,29 @@ from infthor_eval.cli.options.workers import parse_worker_settings, worker_optio
 from infthor_eval.cli.progress.notes import print_note
 from infthor_eval.cli.progress.runs import execute_with_progress
 from infthor_eval.errors import UsageError
+from infthor_eval.nieh.results.tables import clues_table
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.nieh.scoring import Scorer
-from infthor_eval.nieh.tables import clues_table
-from infthor_eval.nieh.validated_set import check_output, write_validated_set
-from infthor_eval.nieh.validation import Verdicts, check_decisions, judge_questions, read_decisions
+from infthor_eval.nieh.validation.cross_validation import (
+    Verdicts,
+    check_decisions,
+    judge_questions,
+    read_decisions,
+)
+from infthor_eval.nieh.validation.validated_set import check_output, write_validated_set
 from infthor_eval.report.inspection import write_inspection_page
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunOutcome, RunRequest, RunSummary, Suite, prepare
-from infthor_eval.runs.run_labels import label_runs
+from infthor_eval.runs.stored.labels import label_runs
 
 __all__ = ["command", "validate"]
 
 
-@click.command("validate", cls=ExampleCommand, example="infthor-eval validate SET --models A,B,C,D --out VALIDATED")
+@click.command(
+    "validate",
+    cls=ExampleCommand,
+    example="infthor-eval validate SET --models A,B,C,D --out VALIDATED",
+)
 @click.argument("set_folder", metavar="SET", type=PATH)
 @click.option(
     "--models",
@@ -43,7 +52,9 @@ __all__ = ["command", "validate"]
     is_flag=True,
     help="Keep what a model answers in part, by the reference scorer, as the published filter did.",
 )
-@click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random.")
+@click.option(
+    "--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random."
+)
 @worker_options
 def command(
     set_folder: Path,
@@ -107,12 +118,18 @@ def validate(
             return 130
     answered = {record.id for record in outcomes[0].records}
     questions = [question for question in data.questions if question.id in answered]
-    replies = [{record.id: record.payload.reply for record in outcome.records} for outcome in outcomes]
+    replies = [
+        {record.id: record.payload.reply for record in outcome.records} for outcome in outcomes
+    ]
     by_model = dict(zip(_model_names(outcomes), replies, strict=True))
-    verdicts = judge_questions(questions, by_model, decisions, scorer, partial_credit=partial_credit)
+    verdicts = judge_questions(
+        questions, by_model, decisions, scorer, partial_credit=partial_credit
+    )
     earlier = write_validated_set(out, data, verdicts)
     if earlier is not None:
-        print_note(f"{earlier}: the earlier list; it has decisions on questions that need no inspection now")
+        print_note(
+            f"{earlier}: the earlier list; it has decisions on questions that need no inspection now"
+        )
     write_inspection_page(out / "inspection.html", verdicts.to_inspect, data)
     console = table_console()
     print_table(clues_table([_summarise_kept(outcome, verdicts) for outcome in outcomes]), console)
@@ -120,14 +137,19 @@ def validate(
         f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} rejected, "
         f"{len(verdicts.to_inspect)} to inspect: {out}"
     )
-    return int(any(record.failure is not None for outcome in outcomes for record in outcome.records))
+    return int(
+        any(record.failure is not None for outcome in outcomes for record in outcome.records)
+    )
 
 
 def _model_names(outcomes: Sequence[RunOutcome]) -> list[str]:
     """The names of the models; labels where one is there with several options."""
     models = [outcome.run.request.model for outcome in outcomes]
     labels = label_runs([(outcome.folder, outcome.summary.header) for outcome in outcomes])
-    return [label if models.count(model) > 1 else model for model, label in zip(models, labels, strict=True)]
+    return [
+        label if models.count(model) > 1 else model
+        for model, label in zip(models, labels, strict=True)
+    ]
 
 
 def _summarise_kept(outcome: RunOutcome, verdicts: Verdicts) -> RunSummary:

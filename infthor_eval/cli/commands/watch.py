@@ -33,13 +33,37 @@ _FOLDER = Path("results/recordings")
 @click.option("--trajectory", metavar="NAME", help="A trajectory of the run, if it has several.")
 @click.option("--task", metavar="NAME", help="A task of the run, if it has several.")
 @click.option("--plans", metavar="N or N-M", help="Only these plans, counted from 1; else all.")
-@click.option("--episode", metavar="N,...", help="For arms: only the episodes of these expert actions; else all.")
-@click.option("--sheet", type=PATH, metavar="FILE.png", help="For arms: frames of a few episodes on one page instead.")
-@click.option("--out", type=PATH, metavar="FILE", help=f"The file to write, .mp4 or .gif.  [default: in {_FOLDER}]")
-@click.option("--data", type=PATH, help="File or folder of the trajectories, if they do not come with the package.")
-@click.option("--scenes", type=PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run.")
 @click.option(
-    "--fps", type=FiniteFloat(0, 30, min_open=True), default=2.0, show_default=True, help="Actions shown in a second."
+    "--episode",
+    metavar="N,...",
+    help="For arms: only the episodes of these expert actions; else all.",
+)
+@click.option(
+    "--sheet",
+    type=PATH,
+    metavar="FILE.png",
+    help="For arms: frames of a few episodes on one page instead.",
+)
+@click.option(
+    "--out",
+    type=PATH,
+    metavar="FILE",
+    help=f"The file to write, .mp4 or .gif.  [default: in {_FOLDER}]",
+)
+@click.option(
+    "--data",
+    type=PATH,
+    help="File or folder of the trajectories, if they do not come with the package.",
+)
+@click.option(
+    "--scenes", type=PATH, help="Folder with recorded floor plans (thor_scenes/), as for the run."
+)
+@click.option(
+    "--fps",
+    type=FiniteFloat(0, 30, min_open=True),
+    default=2.0,
+    show_default=True,
+    help="Actions shown in a second.",
 )
 def command(
     run: Path,
@@ -60,9 +84,9 @@ def command(
     """
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.animations import require_animation_name
-    from infthor_eval.formats.files import prepare_file
     from infthor_eval.report.presenter import EpisodeSelection
     from infthor_eval.report.runs import read_report_runs
+    from infthor_eval.storage.files import prepare_file
     from infthor_eval.suites import find_presenter, find_suite
 
     if out is not None:
@@ -79,7 +103,9 @@ def command(
     choice = [text.strip() for text in (plans, episode) if text is not None]
     parts = [recorded.header.name, *recording.tasks, recording.trajectory, *choice]
     path = prepare_file(sheet or out or _default_file(parts))
-    _write(recorded, recording, path, data=data, scenes=scenes, fps=None if sheet is not None else fps)
+    _write(
+        recorded, recording, path, data=data, scenes=scenes, fps=None if sheet is not None else fps
+    )
 
 
 def _require_replay(run: ReportRun) -> Replay:
@@ -87,7 +113,10 @@ def _require_replay(run: ReportRun) -> Replay:
     from infthor_eval.suites import find_presenter, suite_names
 
     if run.presenter.replay is None:
-        others = sorted((name for name in suite_names() if find_presenter(name).replay is not None), reverse=True)
+        others = sorted(
+            (name for name in suite_names() if find_presenter(name).replay is not None),
+            reverse=True,
+        )
         raise UsageError(
             f"{run.folder}: is a run of {run.suite.name}, and only runs of {' and '.join(others)} can be watched"
         )
@@ -100,7 +129,9 @@ def _refuse_options(run: ReportRun, replay: Replay, options: Mapping[str, object
 
     for option, value in options.items():
         if value is not None and option not in replay.options:
-            raise UsageError(f"{option}: is not for runs of {run.suite.name}, and {run.folder} is one; leave it out")
+            raise UsageError(
+                f"{option}: is not for runs of {run.suite.name}, and {run.folder} is one; leave it out"
+            )
 
 
 def _default_file(parts: Sequence[str]) -> Path:
@@ -110,7 +141,13 @@ def _default_file(parts: Sequence[str]) -> Path:
 
 
 def _write(
-    run: ReportRun, recording: Recording, path: Path, *, data: Path | None, scenes: Path | None, fps: float | None
+    run: ReportRun,
+    recording: Recording,
+    path: Path,
+    *,
+    data: Path | None,
+    scenes: Path | None,
+    fps: float | None,
 ) -> None:
     """Replay the episodes of a recording and write their pictures: a film, or a sheet if `fps` is None."""
     from infthor_eval.cli.progress.bar import PacedBar
@@ -134,7 +171,9 @@ def _write(
     print_line(f"{len(recording.records)} of {session.n_episodes} {replay.unit}{length}: {path}")
 
 
-def _watch_frames(frames: Iterable[Any], advance: Callable[[], None], notes: PlainConsole) -> Iterator[Any]:
+def _watch_frames(
+    frames: Iterable[Any], advance: Callable[[], None], notes: PlainConsole
+) -> Iterator[Any]:
     """Yield the same frames, and report progress and differences from the recorded episodes."""
     for frame in frames:
         if frame.note:
@@ -145,7 +184,10 @@ def _watch_frames(frames: Iterable[Any], advance: Callable[[], None], notes: Pla
 
 def _write_sheet(path: Path, sheet: Image.Image) -> None:
     from infthor_eval.errors import wrap_errors
-    from infthor_eval.formats.files import write_atomically
+    from infthor_eval.storage.files import write_atomically
 
-    with wrap_errors(f"{path}: cannot be written", "give another --sheet"), write_atomically(path) as partial:
+    with (
+        wrap_errors(f"{path}: cannot be written", "give another --sheet"),
+        write_atomically(path) as partial,
+    ):
         sheet.save(partial, format="png")

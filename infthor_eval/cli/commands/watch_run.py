@@ -11,10 +11,15 @@ from infthor_eval.cli.options.values import PATH
 __all__ = ["command"]
 
 
-@click.command("watch-run", cls=ExampleCommand, example="infthor-eval watch-run results/qwen2.5-vl-nano")
+@click.command(
+    "watch-run", cls=ExampleCommand, example="infthor-eval watch-run results/qwen2.5-vl-nano"
+)
 @click.argument("run", type=PATH)
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, help="Port on 127.0.0.1.  [default: one that is free]"
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Port on 127.0.0.1.  [default: one that is free]",
 )
 def command(run: Path, port: int) -> None:
     """Open a page on the run in the folder RUN: progress, accuracy so far, tokens and seconds, failures, new samples.

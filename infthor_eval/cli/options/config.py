@@ -16,7 +16,7 @@ __all__ = ["comes_from_file", "config_option"]
 def _read_file(context: click.Context, option: click.Parameter, path: Path | None) -> None:
     if path is None:
         return
-    from infthor_eval.runs.stored_command import read_options
+    from infthor_eval.runs.stored.command import read_options
 
     known = {_long_name(item): item for item in context.command.params if item is not option}
     context.default_map = {}
@@ -47,7 +47,11 @@ def comes_from_file(name: str) -> bool:
 
 def _long_name(option: click.Parameter) -> str:
     """The name of an option in files."""
-    return next(name for name in option.opts if name.startswith("--")).removeprefix("--").replace("-", "_")
+    return (
+        next(name for name in option.opts if name.startswith("--"))
+        .removeprefix("--")
+        .replace("-", "_")
+    )
 
 
 def _as_typed(path: Path, name: str, value: Any, option: click.Parameter) -> Any:
@@ -73,7 +77,9 @@ def _text(path: Path, name: str, value: Any) -> str:
     raise UsageError(f"{path}: {name} is {value!r:.60}; write one value, or a list of them")
 
 
-def _check(path: Path, name: str, value: Any, option: click.Parameter, context: click.Context) -> None:
+def _check(
+    path: Path, name: str, value: Any, option: click.Parameter, context: click.Context
+) -> None:
     """Refuse a wrong value here, where the message can name the file."""
     try:
         for one in value if option.multiple else (value,):

@@ -7,7 +7,9 @@ import click
 __all__ = ["refuse_repeated_options"]
 
 
-def refuse_repeated_options(context: click.Context, command: click.Command, arguments: Sequence[str]) -> None:
+def refuse_repeated_options(
+    context: click.Context, command: click.Command, arguments: Sequence[str]
+) -> None:
     """Refuse an option with one value that is given twice.
 
     Args:
@@ -23,7 +25,12 @@ def refuse_repeated_options(context: click.Context, command: click.Command, argu
         if inner is not None:
             refuse_repeated_options(context, inner, arguments[1:])
         return
-    with_one_value = {name: option for option in command.params if _takes_one_value(option) for name in option.opts}
+    with_one_value = {
+        name: option
+        for option in command.params
+        if _takes_one_value(option)
+        for name in option.opts
+    }
     seen: set[str] = set()
     rest = iter(arguments)
     for argument in rest:
@@ -40,4 +47,6 @@ def refuse_repeated_options(context: click.Context, command: click.Command, argu
 
 
 def _takes_one_value(option: click.Parameter) -> bool:
-    return isinstance(option, click.Option) and not (option.multiple or option.is_flag or option.count)
+    return isinstance(option, click.Option) and not (
+        option.multiple or option.is_flag or option.count
+    )

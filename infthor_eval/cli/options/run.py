@@ -9,7 +9,12 @@ from typing import Any
 import click
 
 from infthor_eval.cli.options.config import comes_from_file, config_option
-from infthor_eval.cli.options.suites import expand_suite_options, refuse_duplicate_options, suite_options, suite_values
+from infthor_eval.cli.options.suites import (
+    expand_suite_options,
+    refuse_duplicate_options,
+    suite_options,
+    suite_values,
+)
 from infthor_eval.cli.options.values import (
     PATH,
     FiniteFloat,
@@ -44,7 +49,9 @@ _OPTIONS = (
         type=click.Choice(["transformers", "vllm"]),
         help="Library that runs the model; default: transformers, unless its name says otherwise.",
     ),
-    click.option("--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."),
+    click.option(
+        "--tasks", required=True, help="Task or group names with commas (see `ls tasks`)."
+    ),
     include_option,
     click.option("--data", type=PATH, help="Folder of the data set."),
     click.option(
@@ -77,7 +84,10 @@ _OPTIONS = (
         metavar="USD",
         help="Stop sending them at this cost, by the prices in --model-args.",
     ),
-    click.option("--name", help="Name of the run in tables and folders; default: its checkpoint, or its model."),
+    click.option(
+        "--name",
+        help="Name of the run in tables and folders; default: its checkpoint, or its model.",
+    ),
     click.option(
         "--limit",
         type=WholeNumber(1),
@@ -85,12 +95,30 @@ _OPTIONS = (
         help="Evaluate only N of each task (questions, trajectories of plans, episodes of arms), evenly from all "
         "trajectories, drawn by --seed; a larger N includes these. lm-eval's own command takes the first N instead.",
     ),
-    click.option("--output", type=PATH, default=Path("results"), show_default=True, help="Results folder."),
-    click.option("--seed", type=WholeNumber(), default=0, show_default=True, help="Seed of everything random."),
-    click.option("--fresh", is_flag=True, help="Restart; the journal of an earlier run is kept under another name."),
-    click.option("--recover", is_flag=True, help="Resume without the bad lines of a damaged journal."),
+    click.option(
+        "--output", type=PATH, default=Path("results"), show_default=True, help="Results folder."
+    ),
+    click.option(
+        "--seed",
+        type=WholeNumber(),
+        default=0,
+        show_default=True,
+        help="Seed of everything random.",
+    ),
+    click.option(
+        "--fresh",
+        is_flag=True,
+        help="Restart; the journal of an earlier run is kept under another name.",
+    ),
+    click.option(
+        "--recover", is_flag=True, help="Resume without the bad lines of a damaged journal."
+    ),
 )
-_MODEL_OPTIONS = ("rope", "max_tokens_total", "max_cost")  # options of the command that are options of the model
+_MODEL_OPTIONS = (
+    "rope",
+    "max_tokens_total",
+    "max_cost",
+)  # options of the command that are options of the model
 _CAPS = ("max_tokens_total", "max_cost")
 _AS_GIVEN = ("data", "output", "limit", "seed", "name", "fresh", "recover", "include")
 
@@ -151,12 +179,18 @@ class RunOptions:
                 for name, options in given["models"]
             ],
         )
-        workers = parse_worker_settings(given["workers"], given["ray_address"], given["gpus_per_worker"])
+        workers = parse_worker_settings(
+            given["workers"], given["ray_address"], given["gpus_per_worker"]
+        )
         capped = next((cap for cap in _CAPS if any(cap in model.options for model in models)), None)
         if capped and not workers.is_local:
-            raise click.UsageError(f"{capped} counts the requests of one process; leave out --workers, or the cap")
+            raise click.UsageError(
+                f"{capped} counts the requests of one process; leave out --workers, or the cap"
+            )
         if given["name"] is not None and len(models) > 1:
-            raise click.UsageError(f"--name {given['name']}: names one run, but {len(models)} models are given")
+            raise click.UsageError(
+                f"--name {given['name']}: names one run, but {len(models)} models are given"
+            )
         return cls(
             models=models,
             tasks=split_names(given["tasks"], "--tasks"),
@@ -187,7 +221,9 @@ class RunOptions:
                         model=model.name,
                         tasks=TaskRequest(tasks, options, self.data, self.limit, self.seed),
                         # The folder of one suite's run has the tasks' names as typed; of several, each its own tasks.
-                        asked=self.tasks if len(by_suite) == 1 else tuple(task.name for task in tasks),
+                        asked=self.tasks
+                        if len(by_suite) == 1
+                        else tuple(task.name for task in tasks),
                         output=self.output,
                         model_options=model.options,
                         name=self.name,
@@ -217,12 +253,17 @@ def _with_threads(threads: int | None, models: Sequence[ModelSpec]) -> tuple[Mod
     """
     if threads is None:
         return tuple(models)
-    computing = {model.name for model in models if is_known(model.name) and has_option(model.name, "threads")}
+    computing = {
+        model.name for model in models if is_known(model.name) and has_option(model.name, "threads")
+    }
     if not computing:
-        raise UsageError(f"--threads {threads}: {models[0].name} takes no threads, as it computes nothing here")
+        raise UsageError(
+            f"--threads {threads}: {models[0].name} takes no threads, as it computes nothing here"
+        )
     own = {"threads": str(threads)}
     return tuple(
-        ModelSpec(model.name, {**own, **model.options}) if model.name in computing else model for model in models
+        ModelSpec(model.name, {**own, **model.options}) if model.name in computing else model
+        for model in models
     )
 
 
@@ -234,7 +275,9 @@ def _options_of_all_models(given: Mapping[str, Any]) -> dict[str, str]:
             continue
         if name in options and comes_from_file(name) == comes_from_file("model_args"):
             typed = f"--{name.replace('_', '-')}"
-            raise click.UsageError(f"{typed} and {name}= in --model-args are the same option; give one of them")
+            raise click.UsageError(
+                f"{typed} and {name}= in --model-args are the same option; give one of them"
+            )
         if name not in options or not comes_from_file(name):  # what is typed wins over the file
             options[name] = str(given[name])
     return options

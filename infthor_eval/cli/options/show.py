@@ -34,28 +34,44 @@ class ShowOptions:
         """
         if given["as_json"] and (given["form"] is not None or given["full"]):
             raise UsageError("--json holds everything; leave out --format and --full")
-        return cls(given["full"], "json" if given["as_json"] else given["form"], given.get("quiet", False))
+        return cls(
+            given["full"], "json" if given["as_json"] else given["form"], given.get("quiet", False)
+        )
 
 
 def show_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add --full, --format and --json to a command, which passes them to `ShowOptions.from_click`."""
-    return _with_options(command, click.Choice(["csv", "latex", "markdown"]), "Write the tables in this form.")
+    return _with_options(
+        command, click.Choice(["csv", "latex", "markdown"]), "Write the tables in this form."
+    )
 
 
 def sample_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add --per-sample and the options of `show_options`, among them a form for samples alone."""
     forms = click.Choice(["csv", "latex", "markdown", "parquet"])
-    command = _with_options(command, forms, "Write the tables in this form; parquet has a row per sample.")
+    command = _with_options(
+        command, forms, "Write the tables in this form; parquet has a row per sample."
+    )
     return click.option(
-        "--per-sample", is_flag=True, help="Write a row per sample, not tables: --format csv or --format parquet."
+        "--per-sample",
+        is_flag=True,
+        help="Write a row per sample, not tables: --format csv or --format parquet.",
     )(command)
 
 
-def _with_options(command: Callable[..., Any], forms: click.Choice[str], help_text: str) -> Callable[..., Any]:
+def _with_options(
+    command: Callable[..., Any], forms: click.Choice[str], help_text: str
+) -> Callable[..., Any]:
     for option in (
-        click.option("--json", "as_json", is_flag=True, help="Print the results as JSON, as in results.json."),
+        click.option(
+            "--json", "as_json", is_flag=True, help="Print the results as JSON, as in results.json."
+        ),
         click.option("--format", "form", type=forms, help=help_text),
-        click.option("--full", is_flag=True, help="Show every scorer, column and table, and the published numbers."),
+        click.option(
+            "--full",
+            is_flag=True,
+            help="Show every scorer, column and table, and the published numbers.",
+        ),
     ):
         command = option(command)
     return command

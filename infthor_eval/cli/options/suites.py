@@ -27,7 +27,13 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
         choices = item.metadata.get("choices")
         command = click.option(
             f"--{name.replace('_', '-')}",
-            type=None if kind is bool else click.Choice(choices) if choices else WholeNumber() if kind is int else kind,
+            type=None
+            if kind is bool
+            else click.Choice(choices)
+            if choices
+            else WholeNumber()
+            if kind is int
+            else kind,
             is_flag=kind is bool,
             default=None,
             metavar=item.metadata.get("metavar"),
@@ -60,9 +66,16 @@ def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[
     values: dict[str, list[Any]] = {}
     for item in fields(options_class(suite)):
         if given.get(item.name) is not None:
-            typed = split_names(given[item.name], f"--{item.name}") if item.metadata.get("each") else [given[item.name]]
+            typed = (
+                split_names(given[item.name], f"--{item.name}")
+                if item.metadata.get("each")
+                else [given[item.name]]
+            )
             values[item.name] = [_value_type(kinds[item.name])(value) for value in typed]
-    return [options_class(suite)(**dict(zip(values, chosen, strict=True))) for chosen in product(*values.values())]
+    return [
+        options_class(suite)(**dict(zip(values, chosen, strict=True)))
+        for chosen in product(*values.values())
+    ]
 
 
 def refuse_duplicate_options(command: Callable[..., Any]) -> None:
@@ -76,7 +89,9 @@ def refuse_duplicate_options(command: Callable[..., Any]) -> None:
     duplicates = sorted({str(name) for name in names if names.count(name) > 1})
     if duplicates:
         suite = next(iter(_options_by_name()[duplicates[0]]))
-        raise UsageError(f"the option {duplicates[0]} of the suite {suite} is one of every run; give it another name")
+        raise UsageError(
+            f"the option {duplicates[0]} of the suite {suite} is one of every run; give it another name"
+        )
 
 
 def _options_by_name() -> dict[str, dict[str, Field[Any]]]:

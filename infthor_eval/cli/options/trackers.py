@@ -25,7 +25,11 @@ def tracker_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def parse_trackers(given: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """Return the arguments of each tracker that is used, by option; `given` are the parameters of the command."""
-    return {name: parse_pairs(given[name].split(","), _option(name)) for name in _HELP if given[name] is not None}
+    return {
+        name: parse_pairs(given[name].split(","), _option(name))
+        for name in _HELP
+        if given[name] is not None
+    }
 
 
 def _option(name: str) -> str:

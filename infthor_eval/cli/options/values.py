@@ -28,7 +28,13 @@ __all__ = [
 ]
 
 PATH = click.Path(path_type=Path)
-SCENE_KINDS = ("kitchen", "living-room", "bedroom", "bathroom", "house")  # procedural scenes, KIND-SEED
+SCENE_KINDS = (
+    "kitchen",
+    "living-room",
+    "bedroom",
+    "bathroom",
+    "house",
+)  # procedural scenes, KIND-SEED
 _LARGEST = 2**63 - 1  # the largest integer of a run's JSON
 
 floor_plans_option = click.option(
@@ -83,7 +89,9 @@ class WholeNumber(click.ParamType):
 class FiniteFloat(click.FloatRange):
     """A number within a range. `FloatRange` lets "nan" through, which is neither below nor above a bound."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
         """See `click.FloatRange`."""
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
@@ -99,10 +107,16 @@ class SceneName(click.ParamType):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """See `click.ParamType`."""
         kind, _, seed = str(value).rpartition("-")
-        if (kind in SCENE_KINDS and re.fullmatch(r"[0-9]+", seed)) or str(value).startswith("FloorPlan"):
+        if (kind in SCENE_KINDS and re.fullmatch(r"[0-9]+", seed)) or str(value).startswith(
+            "FloorPlan"
+        ):
             return str(value)
         number = seed if re.fullmatch(r"[0-9]+", seed) else "<seed>"
-        raise unknown_name("scene", value, [*(f"{kind}-{number}" for kind in SCENE_KINDS), "FloorPlan<N> with --data"])
+        raise unknown_name(
+            "scene",
+            value,
+            [*(f"{kind}-{number}" for kind in SCENE_KINDS), "FloorPlan<N> with --data"],
+        )
 
 
 class ModelArgs(click.ParamType):
@@ -110,7 +124,9 @@ class ModelArgs(click.ParamType):
 
     name = "K=V,..."
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> dict[str, str]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> dict[str, str]:
         """See `click.ParamType`."""
         if isinstance(value, Mapping):
             return dict(value)
@@ -122,16 +138,24 @@ class ModelList(click.ParamType):
 
     name = "MODEL[:K=V,...],..."
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[ModelSpec, ...]:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[ModelSpec, ...]:
         """See `click.ParamType`."""
-        return value if isinstance(value, tuple) else _parse_models(value, param.opts[0] if param else "--model")
+        return (
+            value
+            if isinstance(value, tuple)
+            else _parse_models(value, param.opts[0] if param else "--model")
+        )
 
 
 def _parse_models(text: str, option: str) -> tuple[ModelSpec, ...]:
     models: list[tuple[str, list[str]]] = []
     for item in filter(None, (part.strip() for part in text.split(","))):
         before, equals, _ = item.partition("=")
-        name, colon, _ = before.rpartition(":")  # the last colon: a name may hold one (FILE.py:CLASS), a key may not
+        name, colon, _ = before.rpartition(
+            ":"
+        )  # the last colon: a name may hold one (FILE.py:CLASS), a key may not
         if not equals:
             models.append((item, []))
         elif colon:

@@ -21,7 +21,9 @@ def worker_options(command: Callable[..., Any]) -> Callable[..., Any]:
             help="GPUs that Ray reserves for each worker; default: one where the cluster has any.",
         ),
         click.option(
-            "--ray-address", metavar="ADDRESS", help='Run the workers on this Ray cluster ("auto": on this machine).'
+            "--ray-address",
+            metavar="ADDRESS",
+            help='Run the workers on this Ray cluster ("auto": on this machine).',
         ),
         click.option(
             "--workers",
@@ -35,12 +37,16 @@ def worker_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def parse_worker_settings(workers: int, ray_address: str | None, gpus_per_worker: float | None) -> WorkerSettings:
+def parse_worker_settings(
+    workers: int, ray_address: str | None, gpus_per_worker: float | None
+) -> WorkerSettings:
     """Return the settings that the three options give.
 
     Raises:
         click.UsageError: --gpus-per-worker without --ray-address.
     """
     if gpus_per_worker is not None and ray_address is None:
-        raise click.UsageError("--gpus-per-worker is for --ray-address; processes of one machine share its GPUs")
+        raise click.UsageError(
+            "--gpus-per-worker is for --ray-address; processes of one machine share its GPUs"
+        )
     return WorkerSettings(workers, ray_address, gpus_per_worker)

@@ -30,7 +30,9 @@ class PacedBar:
         self._progress = progress
         self._bar = progress.add_task(name, total=total, completed=n_resumed)
 
-    def advance(self, resumed: bool = False, *, context: int = 0, cached: int = 0, detail: str = "") -> None:
+    def advance(
+        self, resumed: bool = False, *, context: int = 0, cached: int = 0, detail: str = ""
+    ) -> None:
         """Count a unit.
 
         Args:
@@ -44,7 +46,9 @@ class PacedBar:
         name = f"{self._name}: {detail}" if detail else self._name
         self._progress.update(self._bar, advance=1, description=f"{name}  {self.pace.speed(now)}")
         if not self._progress.console.is_terminal and self.pace.is_due(now):
-            self._progress.console.print(f"{self._name}: {self.pace.line(now)}{f'; {detail}' if detail else ''}")
+            self._progress.console.print(
+                f"{self._name}: {self.pace.line(now)}{f'; {detail}' if detail else ''}"
+            )
 
 
 class StepBars:

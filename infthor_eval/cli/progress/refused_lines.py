@@ -23,4 +23,6 @@ def print_refused(name: str, what: str, lines: Sequence[tuple[Path, int, str]]) 
     for log, number, reason in lines[:_SHOWN]:
         print_note(f"  {log.name}, line {number}: {reason}")
     if len(lines) > _SHOWN:
-        print_note(f"  and {len(lines) - _SHOWN} more in {len({log for log, _, _ in lines})} log(s)")
+        print_note(
+            f"  and {len(lines) - _SHOWN} more in {len({log for log, _, _ in lines})} log(s)"
+        )

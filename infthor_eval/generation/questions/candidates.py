@@ -66,7 +66,9 @@ class Candidate:
 
     def question(self, traj_id: str) -> Question:
         """Return the question in the form of sets."""
-        return Question(traj_id, self.text, self.clues, self.answers, self.question_type, self.absence)
+        return Question(
+            traj_id, self.text, self.clues, self.answers, self.question_type, self.absence
+        )
 
 
 def further_type(question_type: str) -> str:
@@ -99,7 +101,10 @@ def are_distinguishable(object_types: Sequence[str]) -> bool:
         for other, object_type in zip(words[:index], object_types[:index], strict=True):
             if difflib.SequenceMatcher(None, word, other).ratio() >= _SIMILAR:
                 return False
-            if any({canonical_type(object_type), canonical_type(object_types[index])} <= group for group in _ALIKE):
+            if any(
+                {canonical_type(object_type), canonical_type(object_types[index])} <= group
+                for group in _ALIKE
+            ):
                 return False
     return True
 
@@ -114,10 +119,14 @@ def type_question(
 ) -> Iterator[Candidate]:
     """Yield a question with object types as answers, unless there are none, too many, or two that may be confused."""
     if 0 < len(types) <= MANY and are_distinguishable(types):
-        yield Candidate(question_type, form, names, clues, tuple(map(answer_of, types)), (*subjects, *types))
+        yield Candidate(
+            question_type, form, names, clues, tuple(map(answer_of, types)), (*subjects, *types)
+        )
 
 
-def listing_question(question_type: str, form: str, events: Iterable[tuple[str, int | None]]) -> Iterator[Candidate]:
+def listing_question(
+    question_type: str, form: str, events: Iterable[tuple[str, int | None]]
+) -> Iterator[Candidate]:
     """Yield a question on all object types of some events, with the first frame that shows each type's event.
 
     Args:

@@ -35,7 +35,9 @@ class Chooser:
         self._answers: dict[tuple[str, ...], Counter[str]] = {}
         self._subjects: Counter[tuple[str, str]] = Counter()
 
-    def choose(self, candidates: Iterable[Candidate], number: int, rng: random.Random, rooms: str) -> list[Candidate]:
+    def choose(
+        self, candidates: Iterable[Candidate], number: int, rng: random.Random, rooms: str
+    ) -> list[Candidate]:
         """Choose up to a number of questions on one trajectory in rooms of some kinds."""
         remaining = list(candidates)
         rng.shuffle(remaining)  # ties are broken by this order
@@ -43,7 +45,11 @@ class Chooser:
         # A limit per group: presence questions, which are always possible, must not fill up quiet trajectories.
         limits = Counter({_group(item): max(2, number // 5) for item in remaining})
         while len(chosen) < number:
-            eligible = [item for item in remaining if limits[_group(item)] and not self._is_unbalanced(item, rooms)]
+            eligible = [
+                item
+                for item in remaining
+                if limits[_group(item)] and not self._is_unbalanced(item, rooms)
+            ]
             if not eligible:
                 break
             best = min(eligible, key=self._use)
@@ -57,12 +63,16 @@ class Chooser:
         """Return True if the answer already leads the next ones, to the form or on a subject."""
         if not self._by_subject and not item.is_closed:
             return False
-        return any(self._leads(self._answers.get(key, Counter()), item) for key in self._keys(item, rooms))
+        return any(
+            self._leads(self._answers.get(key, Counter()), item) for key in self._keys(item, rooms)
+        )
 
     def _leads(self, answers: Counter[str], item: Candidate) -> bool:
         """Return True if the answer is more frequent than the mean of the next ones."""
         answer = _answer(item)
-        others = sorted((count for other, count in answers.items() if other != answer), reverse=True)
+        others = sorted(
+            (count for other, count in answers.items() if other != answer), reverse=True
+        )
         if not self._by_subject:
             return answers[answer] > sum(others)
         n_next = 1 if answer in _YES_NO else _NEXT_NUMBERS if item.is_closed else _NEXT_ANSWERS
@@ -88,7 +98,12 @@ class Chooser:
     def _use(self, item: Candidate) -> tuple[int, int, int, int]:
         group = _group(item)
         subjects = sum(self._subjects[group, subject] for subject in item.subjects)
-        return self._types[item.question_type], self._groups[group], self._clues[_clue_class(item)], subjects
+        return (
+            self._types[item.question_type],
+            self._groups[group],
+            self._clues[_clue_class(item)],
+            subjects,
+        )
 
 
 def _answer(item: Candidate) -> str:
@@ -97,7 +112,11 @@ def _answer(item: Candidate) -> str:
 
 def _group(item: Candidate) -> str:
     """Return the group that is balanced within a question type: yes, no, or other answers."""
-    return f"{item.question_type} {item.answers[0]}" if item.answers[0] in _YES_NO else item.question_type
+    return (
+        f"{item.question_type} {item.answers[0]}"
+        if item.answers[0] in _YES_NO
+        else item.question_type
+    )
 
 
 def _clue_class(item: Candidate) -> int:

@@ -7,19 +7,41 @@ gives the same answer (see `readings`). Our forms define it: objects that can be
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import Candidate, further_type, in_or_on, type_question, with_the
+from infthor_eval.generation.questions.candidates import (
+    Candidate,
+    further_type,
+    in_or_on,
+    type_question,
+    with_the,
+)
 from infthor_eval.generation.questions.evidence import minimal_cover
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory, is_same_object
 from infthor_eval.generation.questions.readings import can_be_picked_up, is_plain
 from infthor_eval.household.wording import canonical_type
 
-__all__ = ["CONTENT", "FURTHER", "SLICING", "at_opening", "at_pickup", "at_slicing", "contents", "slicings"]
+__all__ = [
+    "CONTENT",
+    "FURTHER",
+    "SLICING",
+    "at_opening",
+    "at_pickup",
+    "at_slicing",
+    "contents",
+    "slicings",
+]
 
 CONTENT = "container_content"
 FURTHER = further_type(CONTENT)
 SLICING = "slicing"
 # They take objects of one type alone (AI2-THOR's list of what fits where), so their contents need no look.
-_OF_ONE_TYPE = {"CoffeeMachine", "HandTowelHolder", "PaintingHanger", "Toaster", "ToiletPaperHanger", "TowelHolder"}
+_OF_ONE_TYPE = {
+    "CoffeeMachine",
+    "HandTowelHolder",
+    "PaintingHanger",
+    "Toaster",
+    "ToiletPaperHanger",
+    "TowelHolder",
+}
 FormAndNames = tuple[str, tuple[str, ...]]
 
 
@@ -27,7 +49,10 @@ def slicings(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Yield the question on what the agent sliced."""
     events = [event for event in history.events if event.action == "SliceObject"]
     if all(history.shows_slices(event.frame, event.target) for event in events):
-        clues, types = tuple(event.frame for event in events), [event.object_type for event in events]
+        clues, types = (
+            tuple(event.frame for event in events),
+            [event.object_type for event in events],
+        )
         yield from type_question(SLICING, "What did you slice?", (), clues, types)
 
 
@@ -38,17 +63,30 @@ def at_slicing(history: TrajectoryHistory) -> Iterator[Candidate]:
     for event in events:
         place = history.parent(event.frame - 1, event.target)
         # With two slicings of a type it would be ambiguous which one is meant.
-        if count[event.object_type] > 1 or place is None or not is_plain(history, event.frame, place):
+        if (
+            count[event.object_type] > 1
+            or place is None
+            or not is_plain(history, event.frame, place)
+        ):
             continue
         inside = history.contents(event.frame, place)
-        slices = sorted(key for key in inside if key.startswith(f"{event.target}|") and history.shows(event.frame, key))
+        slices = sorted(
+            key
+            for key in inside
+            if key.startswith(f"{event.target}|") and history.shows(event.frame, key)
+        )
         others = frozenset(key for key in inside if not key.startswith(f"{event.target}|"))
         if slices and others:
             place_type = history.states(event.frame)[place].type
-            asked = "What objects were {} when you slice {}?", (in_or_on(place_type), with_the(event.object_type))
+            asked = (
+                "What objects were {} when you slice {}?",
+                (in_or_on(place_type), with_the(event.object_type)),
+            )
             frames = _unchanged_frames(history, event.frame, place)
             # One slice stands for the sliced object: all of them together would need more clues.
-            yield from _contents_question(history, SLICING, asked, frames, place, others | {slices[0]})
+            yield from _contents_question(
+                history, SLICING, asked, frames, place, others | {slices[0]}
+            )
 
 
 def contents(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -57,14 +95,18 @@ def contents(history: TrajectoryHistory) -> Iterator[Candidate]:
     A receptacle that takes one type of object alone is left out: its contents can be told without a frame.
     """
     last = len(history) - 1
-    places = {parent for key in history.states(last) if (parent := history.parent(last, key)) is not None}
+    places = {
+        parent for key in history.states(last) if (parent := history.parent(last, key)) is not None
+    }
     for place in sorted(places):
         frames = _unchanged_frames(history, 0, place)
         place_type = history.states(last)[place].type
         is_constant = len(frames) == len(history) and place_type not in _OF_ONE_TYPE
         if is_constant and history.is_only_one(last, place) and is_plain(history, last, place):
             asked = "What objects were {}?", (in_or_on(place_type),)
-            yield from _contents_question(history, CONTENT, asked, frames, place, history.contents(last, place))
+            yield from _contents_question(
+                history, CONTENT, asked, frames, place, history.contents(last, place)
+            )
 
 
 def at_opening(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -85,7 +127,11 @@ def at_pickup(history: TrajectoryHistory) -> Iterator[Candidate]:
     count = Counter(event.object_type for event in events)
     for event in events:
         place = history.parent(event.frame - 1, event.target)
-        if count[event.object_type] == 1 and place is not None and place in history.states(event.frame):
+        if (
+            count[event.object_type] == 1
+            and place is not None
+            and place in history.states(event.frame)
+        ):
             place_type = history.states(event.frame)[place].type
             form = "Which other things that can be picked up were directly {} when you picked up {} from it?"
             asked = form, (in_or_on(place_type), with_the(event.object_type))
@@ -102,13 +148,17 @@ def _loose_contents_question(
     items = can_be_picked_up(history, event.frame, history.contents(event.frame, place))
     if items is not None and history.shows(event.frame, event.target):
         frames = _unchanged_frames(history, event.frame, place)
-        yield from _contents_question(history, FURTHER, asked, frames, place, items, shown_first=True)
+        yield from _contents_question(
+            history, FURTHER, asked, frames, place, items, shown_first=True
+        )
 
 
 def _unchanged_frames(history: TrajectoryHistory, first: int, place: str) -> range:
     """Return the frames from `first` on during which the contents of a receptacle do not change."""
     inside = history.contents(first, place)
-    changed = (frame for frame in range(first, len(history)) if history.contents(frame, place) != inside)
+    changed = (
+        frame for frame in range(first, len(history)) if history.contents(frame, place) != inside
+    )
     return range(first, next(changed, len(history)))
 
 
@@ -142,25 +192,42 @@ def _contents_question(
         return
     first = {frames[0]} if shown_first else set[int]()
     missing = items.difference(*(shown[frame] for frame in first))
-    clues = minimal_cover(missing, shown, lambda frame, keys: history.clarity(frame, *keys)) if items else None
+    clues = (
+        minimal_cover(missing, shown, lambda frame, keys: history.clarity(frame, *keys))
+        if items
+        else None
+    )
     if clues is not None:
         clues = tuple(sorted(first.union(clues)))
         types = sorted(_whole_types(history, frames[0], items))
-        yield from type_question(question_type, *asked, clues, types, (history.states(frames[0])[place].type,))
+        yield from type_question(
+            question_type, *asked, clues, types, (history.states(frames[0])[place].type,)
+        )
 
 
 def _whole_types(history: TrajectoryHistory, frame: int, keys: frozenset[str]) -> list[str]:
     """Return the types of objects; a slice that was cut at this frame has the type of the whole."""
     states = history.states(frame)
-    sliced = {event.target for event in history.events if event.action == "SliceObject" and event.frame == frame}
+    sliced = {
+        event.target
+        for event in history.events
+        if event.action == "SliceObject" and event.frame == frame
+    }
     fresh = {key for key in keys for whole in sliced if key.startswith(f"{whole}|")}
-    return [states[key].type.removesuffix("Sliced") if key in fresh else states[key].type for key in keys]
+    return [
+        states[key].type.removesuffix("Sliced") if key in fresh else states[key].type
+        for key in keys
+    ]
 
 
 def _shows_similar_contents(history: TrajectoryHistory, frame: int, place: str) -> bool:
     """Return True if a frame shows contents of another receptacle with the same name."""
     states = history.states(frame)
     object_type = canonical_type(states[place].type)
-    parents = {history.parent(frame, key) for key in history.objects_in_frame(frame) if key in states} - {None}
-    others = (parent for parent in parents if parent is not None and not is_same_object(parent, place))
+    parents = {
+        history.parent(frame, key) for key in history.objects_in_frame(frame) if key in states
+    } - {None}
+    others = (
+        parent for parent in parents if parent is not None and not is_same_object(parent, place)
+    )
     return any(canonical_type(states[parent].type) == object_type for parent in others)

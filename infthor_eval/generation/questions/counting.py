@@ -42,11 +42,17 @@ def further_counts(history: TrajectoryHistory, rng: random.Random) -> Iterator[C
     for candidate in (*_openings(history), *_puts(history), *_items(history)):
         n_added = _number_of_frames(len(candidate.clues)) - len(candidate.clues)
         if n_added <= len(idle):
-            yield replace(candidate, clues=tuple(sorted({*candidate.clues, *rng.sample(idle, n_added)})))
+            yield replace(
+                candidate, clues=tuple(sorted({*candidate.clues, *rng.sample(idle, n_added)}))
+            )
 
 
 def _number_of_frames(count: int) -> int:
-    return next(number for number in (_FRAMES << doublings for doublings in itertools.count()) if number > count)
+    return next(
+        number
+        for number in (_FRAMES << doublings for doublings in itertools.count())
+        if number > count
+    )
 
 
 def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -83,8 +89,12 @@ def _items(history: TrajectoryHistory) -> Iterator[Candidate]:
         if event.action == "PickupObject":
             first.setdefault(event.target, event.frame)
     if first and all(history.shows(frame, item) for item, frame in first.items()):
-        yield _count(FURTHER, "How many different objects did you pick up?", (), sorted(first.values()), "#")
+        yield _count(
+            FURTHER, "How many different objects did you pick up?", (), sorted(first.values()), "#"
+        )
 
 
-def _count(question_type: str, form: str, names: tuple[str, ...], frames: list[int], subject: str) -> Candidate:
+def _count(
+    question_type: str, form: str, names: tuple[str, ...], frames: list[int], subject: str
+) -> Candidate:
     return Candidate(question_type, form, names, tuple(frames), (str(len(frames)),), (subject,))

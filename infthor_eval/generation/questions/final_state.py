@@ -2,7 +2,13 @@
 
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import MANY, Candidate, in_or_on, type_question, with_the
+from infthor_eval.generation.questions.candidates import (
+    MANY,
+    Candidate,
+    in_or_on,
+    type_question,
+    with_the,
+)
 from infthor_eval.generation.questions.evidence import minimal_cover
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.readings import is_plain
@@ -16,7 +22,9 @@ def final_states(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Yield questions on receptacles that the agent put something into and that are the only ones of their types."""
     last = len(history) - 1
     targets = sorted({move.target for move in history.moves})
-    singles = [key for key in targets if key in history.states(last) and history.is_only_one(last, key)]
+    singles = [
+        key for key in targets if key in history.states(last) and history.is_only_one(last, key)
+    ]
     for key in singles:
         yield from _inside(history, key)
         yield from _what(history, key)
@@ -26,7 +34,9 @@ def _inside(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     """Yield questions on whether an object that was put in or taken out is in the receptacle in the end."""
     last = len(history) - 1
     states = history.states(last)
-    for item in sorted({move.item for move in history.moves if receptacle in {move.target, move.origin}}):
+    for item in sorted(
+        {move.item for move in history.moves if receptacle in {move.target, move.origin}}
+    ):
         move = history.moves_of(item)[-1]
         here = history.parent(last, item)
         alone = item in states and history.is_only_one(last, item)
@@ -34,7 +44,10 @@ def _inside(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
             continue  # ambiguous
         if here == move.target and history.shows_put(move):  # still where the last clue shows it
             place_type = states[receptacle].type
-            names, subjects = (with_the(states[item].type), in_or_on(place_type)), (states[item].type, place_type)
+            names, subjects = (
+                (with_the(states[item].type), in_or_on(place_type)),
+                (states[item].type, place_type),
+            )
             answer = "yes" if here == receptacle else "no"
             yield Candidate(QUESTION_TYPE, "Is {} {}?", names, (move.after,), (answer,), subjects)
 
@@ -53,14 +66,22 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
         is_final = held <= inside and all(frame >= since[key] for key in held)
         if history.shows(frame, receptacle) and is_final:
             shown[frame] = frozenset(key for key in held if history.shows_inside(frame, key))
-    clues = minimal_cover(inside, shown, lambda frame, keys: history.clarity(frame, *keys)) if inside else None
+    clues = (
+        minimal_cover(inside, shown, lambda frame, keys: history.clarity(frame, *keys))
+        if inside
+        else None
+    )
     if clues is None or len(inside) > MANY or not is_plain(history, last, receptacle):
         return
     place_type = states[receptacle].type
     types = sorted(states[key].type for key in inside)
     where, count = (in_or_on(place_type),), str(len(inside))
-    yield Candidate(QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (place_type, "#"))
-    yield from type_question(QUESTION_TYPE, "What objects are {}?", where, clues, types, (place_type,))
+    yield Candidate(
+        QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (place_type, "#")
+    )
+    yield from type_question(
+        QUESTION_TYPE, "What objects are {}?", where, clues, types, (place_type,)
+    )
 
 
 def _arrival(history: TrajectoryHistory, item: str, receptacle: str) -> int:

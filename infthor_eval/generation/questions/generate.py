@@ -105,7 +105,9 @@ def generate_questions(
         DataError: the set has no trajectory, or another format version.
     """
     if further and published_words:
-        raise UsageError("--further adds forms that have no published words; leave it out, or --words published")
+        raise UsageError(
+            "--further adds forms that have no published words; leave it out, or --words published"
+        )
     simulator_of(folder)  # raises for another format version
     result = GeneratedQuestions()
     types: dict[Path, frozenset[str]] = {}
@@ -128,11 +130,15 @@ def generate_questions(
     for path in [path for path in types if path in candidates_by_path]:
         candidates, rng = candidates_by_path[path]
         chosen = chosen_by_path[path] = chooser.choose(candidates, per_trajectory, rng, rooms[path])
-        check_jobs.append(_CheckJob(path, tuple(item.question(path.name) for item in chosen), share))
+        check_jobs.append(
+            _CheckJob(path, tuple(item.question(path.name) for item in chosen), share)
+        )
     soundness = _share_out(check_jobs, worker_settings, say, result)
     for job in check_jobs:
         # Checked in our words, which the checker reads.
-        for item, is_sound in zip(chosen_by_path[job.path], soundness.get(job.path, ()), strict=False):
+        for item, is_sound in zip(
+            chosen_by_path[job.path], soundness.get(job.path, ()), strict=False
+        ):
             name = job.path.name
             question = in_published_words(item, name) if published_words else item.question(name)
             (result.questions if is_sound else result.unconfirmed).append(question)
@@ -218,18 +224,26 @@ def _read_history(path: Path, share: float) -> TrajectoryHistory:
 
 
 def _telling_inconsistency(path: Path) -> AbstractContextManager[None]:
-    return wrap_errors(f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT)
+    return wrap_errors(
+        f"{path}: its log is inconsistent", "replay the trajectory again", catch=_INCONSISTENT
+    )
 
 
 def _trajectory_folders(folder: Path) -> list[Path]:
     metadata = folder / "metadata"
-    folders = sorted(path for path in metadata.glob("*/") if not path.name.startswith(".")) if metadata.is_dir() else []
+    folders = (
+        sorted(path for path in metadata.glob("*/") if not path.name.startswith("."))
+        if metadata.is_dir()
+        else []
+    )
     if not folders:
         raise DataError(f"{metadata}: has no trajectory; replay some into this set first")
     return folders
 
 
-def candidates_of(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> list[Candidate]:
+def candidates_of(
+    history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random
+) -> list[Candidate]:
     """Return all questions of Table 3's forms on one trajectory.
 
     Absence questions use the object types of the set's rooms of the same kind, `vocabulary`, and random frames.

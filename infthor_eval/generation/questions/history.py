@@ -73,7 +73,9 @@ class TrajectoryHistory:
             DataError: the log is empty, or lacks the fields that questions are generated from.
         """
         if not steps or any(step.seen is None for step in steps):
-            raise DataError(f"{traj_id}: the log does not say what the frames show; replay the trajectory again")
+            raise DataError(
+                f"{traj_id}: the log does not say what the frames show; replay the trajectory again"
+            )
         self.traj_id = traj_id
         self.steps = steps
         self.min_pixels = share * _SIDE**2
@@ -114,7 +116,11 @@ class TrajectoryHistory:
     def shows_slices(self, frame: int, whole: str) -> bool:
         """Return True if a frame shows a slice of an object."""
         states = self.states(frame)
-        slices = (key for key in states if key.startswith(f"{whole}|") and states[key].type.endswith("Sliced"))
+        slices = (
+            key
+            for key in states
+            if key.startswith(f"{whole}|") and states[key].type.endswith("Sliced")
+        )
         return any(self.shows(frame, key) for key in slices)
 
     def parent(self, frame: int, item: str) -> str | None:
@@ -125,12 +131,18 @@ class TrajectoryHistory:
     @cached_property
     def all_object_types(self) -> frozenset[str]:
         """Types of all objects that ever exist."""
-        return frozenset(canonical_type(state.type) for step in self.steps for state in step.changes.values())
+        return frozenset(
+            canonical_type(state.type) for step in self.steps for state in step.changes.values()
+        )
 
     @cached_property
     def types_in_frames(self) -> frozenset[str]:
         """Types of all objects that a frame shows, however small."""
-        shown = ((self.states(frame), key) for frame in range(len(self)) for key in self.objects_in_frame(frame))
+        shown = (
+            (self.states(frame), key)
+            for frame in range(len(self))
+            for key in self.objects_in_frame(frame)
+        )
         return frozenset(canonical_type(states[key].type) for states, key in shown if key in states)
 
     @cached_property
@@ -152,7 +164,13 @@ class TrajectoryHistory:
     def events(self) -> tuple[Event, ...]:
         """Successful actions on objects, in order."""
         return tuple(
-            Event(frame, step.action.partition(" ")[0], step.target, self._type_of(frame, step.target), step.receptacle)
+            Event(
+                frame,
+                step.action.partition(" ")[0],
+                step.target,
+                self._type_of(frame, step.target),
+                step.receptacle,
+            )
             for frame, step in enumerate(self.steps)
             if step.success and step.action is not None and step.target is not None
         )
@@ -165,10 +183,23 @@ class TrajectoryHistory:
         for event in self.events:
             if event.action == "PickupObject":
                 picked[event.target] = event.frame - 1
-            elif event.action == "PutObject" and event.receptacle is not None and event.target in picked:
+            elif (
+                event.action == "PutObject"
+                and event.receptacle is not None
+                and event.target in picked
+            ):
                 before = picked.pop(event.target)
                 origin = self.parent(before, event.target)
-                moves.append(ObjectMove(event.target, event.object_type, origin, before, event.receptacle, event.frame))
+                moves.append(
+                    ObjectMove(
+                        event.target,
+                        event.object_type,
+                        origin,
+                        before,
+                        event.receptacle,
+                        event.frame,
+                    )
+                )
         return tuple(moves)
 
     def moves_of(self, item: str) -> tuple[ObjectMove, ...]:
@@ -199,7 +230,8 @@ class TrajectoryHistory:
         states = self.states(frame)
         others = (key for key in self.objects_in_frame(frame) if key != item and key in states)
         return not any(
-            canonical_type(states[key].type) == object_type and not is_same_object(key, item) for key in others
+            canonical_type(states[key].type) == object_type and not is_same_object(key, item)
+            for key in others
         )
 
     def is_only_one(self, frame: int, item: str) -> bool:
@@ -207,12 +239,15 @@ class TrajectoryHistory:
         states = self.states(frame)
         object_type = canonical_type(states[item].type)
         return not any(
-            canonical_type(state.type) == object_type and not is_same_object(key, item) for key, state in states.items()
+            canonical_type(state.type) == object_type and not is_same_object(key, item)
+            for key, state in states.items()
         )
 
     def contents(self, frame: int, receptacle: str) -> frozenset[str]:
         """Return the ids of the objects directly in or on a receptacle."""
-        return frozenset(key for key in self.states(frame) if self.is_inside(frame, key, receptacle))
+        return frozenset(
+            key for key in self.states(frame) if self.is_inside(frame, key, receptacle)
+        )
 
     def is_inside(self, frame: int, item: str, receptacle: str) -> bool:
         """Return True if an object is directly in or on a receptacle; a sink and its basin count as one."""

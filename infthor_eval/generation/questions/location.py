@@ -39,29 +39,48 @@ def _moves_by_type(history: TrajectoryHistory) -> Iterator[tuple[str, tuple[Obje
             yield object_type, moves
 
 
-def _before_put(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
+def _before_put(
+    history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
+) -> Iterator[Candidate]:
     # Only for the first move, and only if no other leads to such a container: then there is one place before it.
     move = moves[0]
     to = history.target_type(move)
     once = [history.target_type(other) for other in moves].count(to) == 1
-    if once and _changes(history, move) and _shows_origin(history, move) and history.shows_put(move):
+    if (
+        once
+        and _changes(history, move)
+        and _shows_origin(history, move)
+        and history.shows_put(move)
+    ):
         form = "Where was {} before you put it to {}?"
-        yield _candidate(QUESTION_TYPE, form, (move.before, move.after), [_start(history, move)], object_type, to)
+        yield _candidate(
+            QUESTION_TYPE, form, (move.before, move.after), [_start(history, move)], object_type, to
+        )
 
 
-def _moved_from(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
+def _moved_from(
+    history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
+) -> Iterator[Candidate]:
     # Only for the last move, and only if no other starts at such a container: then there is one place after it.
     move = moves[-1]
-    if not _shows_origin(history, move) or not history.shows_put(move) or not _is_down(history, move):
+    if (
+        not _shows_origin(history, move)
+        or not history.shows_put(move)
+        or not _is_down(history, move)
+    ):
         return
     origin = _start(history, move)
     others = [_start(history, other) for other in moves[:-1]]
     if _changes(history, move) and origin not in others and None not in others:
         form, clues = "Where did you move {} from {}?", (move.before, move.after)
-        yield _candidate(QUESTION_TYPE, form, clues, [history.target_type(move)], object_type, origin)
+        yield _candidate(
+            QUESTION_TYPE, form, clues, [history.target_type(move)], object_type, origin
+        )
 
 
-def _now(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
+def _now(
+    history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
+) -> Iterator[Candidate]:
     move, last = moves[-1], len(history) - 1
     alone = move.item in history.states(last) and history.is_only_one(last, move.item)
     if alone and history.shows_put(move) and _is_down(history, move):
@@ -69,7 +88,9 @@ def _now(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, 
         yield _candidate(QUESTION_TYPE, "Where is {} now?", (move.after,), [place], object_type)
 
 
-def _origin(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
+def _origin(
+    history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
+) -> Iterator[Candidate]:
     move = moves[0]
     if _shows_origin(history, move):
         when = "first picked it up" if history.pickups[move.item] > 1 else "picked it up"
@@ -77,20 +98,32 @@ def _origin(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMov
         yield _candidate(FURTHER, form, (move.before,), [_start(history, move)], object_type)
 
 
-def _destination(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
+def _destination(
+    history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
+) -> Iterator[Candidate]:
     move = moves[0]
     if history.pickups[move.item] == 1 and history.shows_put(move):
-        yield _candidate(FURTHER, "Where did you move {} to?", (move.after,), [history.target_type(move)], object_type)
+        yield _candidate(
+            FURTHER,
+            "Where did you move {} to?",
+            (move.after,),
+            [history.target_type(move)],
+            object_type,
+        )
 
 
-def _journey(history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]) -> Iterator[Candidate]:
+def _journey(
+    history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
+) -> Iterator[Candidate]:
     first = moves[0]
     if not _shows_origin(history, first) or not all(history.shows_put(move) for move in moves):
         return
     places = [_start(history, first), *(history.target_type(move) for move in moves)]
     if candidates.are_distinguishable([place or "" for place in places]):
         clues = (first.before, *(move.after for move in moves))
-        yield _candidate(FURTHER, "In which places was {}, from first to last?", clues, places, object_type)
+        yield _candidate(
+            FURTHER, "In which places was {}, from first to last?", clues, places, object_type
+        )
 
 
 def _start(history: TrajectoryHistory, move: ObjectMove) -> str | None:
@@ -127,4 +160,6 @@ def _candidate(
     types = [place for place in places if place is not None]
     names = [object_type] if named is None else [object_type, named]
     answers = tuple(map(candidates.answer_of, types))
-    return Candidate(question_type, form, tuple(map(with_the, names)), clues, answers, (object_type, *types))
+    return Candidate(
+        question_type, form, tuple(map(with_the, names)), clues, answers, (object_type, *types)
+    )

@@ -3,7 +3,13 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from infthor_eval.generation.questions.candidates import Candidate, further_type, in_or_on, listing_question, with_the
+from infthor_eval.generation.questions.candidates import (
+    Candidate,
+    further_type,
+    in_or_on,
+    listing_question,
+    with_the,
+)
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory
 
 __all__ = ["FURTHER", "QUESTION_TYPE", "further_open_states", "open_states"]
@@ -11,7 +17,9 @@ __all__ = ["FURTHER", "QUESTION_TYPE", "further_open_states", "open_states"]
 QUESTION_TYPE = "open_state"
 FURTHER = further_type(QUESTION_TYPE)
 _CONTAINERS = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Microwave", "Safe"})
-_UNASKED = frozenset({"Blinds", "Curtains", "Book", "Kettle", "ShowerCurtain", "ShowerDoor", "Window"})
+_UNASKED = frozenset(
+    {"Blinds", "Curtains", "Book", "Kettle", "ShowerCurtain", "ShowerDoor", "Window"}
+)
 _ASKED_AT = {"PickupObject", "PutObject", "SliceObject", "ToggleObjectOn"}
 
 
@@ -19,12 +27,18 @@ def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Yield questions on whether a container that is the only one of its type was ever open."""
     frames = range(len(history))
     for key in _singles(history):
-        open_at = [frame for frame in frames if key in history.states(frame) and history.states(frame)[key].is_open]
+        open_at = [
+            frame
+            for frame in frames
+            if key in history.states(frame) and history.states(frame)[key].is_open
+        ]
         object_type = history.states(len(history) - 1)[key].type
         frame = history.clearest(open_at or frames, key)
         if object_type in _CONTAINERS and frame is not None:
             names, answer = (with_the(object_type),), "yes" if open_at else "no"
-            yield Candidate(QUESTION_TYPE, "Was {} open?", names, (frame,), (answer,), (object_type,))
+            yield Candidate(
+                QUESTION_TYPE, "Was {} open?", names, (frame,), (answer,), (object_type,)
+            )
 
 
 def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -34,11 +48,17 @@ def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
         yield from _now(history, key)
         for event in history.events:
             phrase = _phrase(history, event)
-            involved = key in {event.target, event.receptacle}  # then the action itself tells whether it was open
+            involved = key in {
+                event.target,
+                event.receptacle,
+            }  # then the action itself tells whether it was open
             if event.action in _ASKED_AT and phrases[phrase] == 1 and not involved:
                 yield from _then(history, key, event, phrase)
     opened = (event for event in history.events if event.action == "OpenObject")
-    shown = ((event.object_type, event.frame if history.shows(event.frame, event.target) else None) for event in opened)
+    shown = (
+        (event.object_type, event.frame if history.shows(event.frame, event.target) else None)
+        for event in opened
+    )
     yield from listing_question(FURTHER, "What did you open?", shown)
 
 
@@ -48,7 +68,9 @@ def _singles(history: TrajectoryHistory) -> list[str]:
     return sorted(
         key
         for key, state in history.states(last).items()
-        if state.is_open is not None and state.type not in _UNASKED and history.is_only_one(last, key)
+        if state.is_open is not None
+        and state.type not in _UNASKED
+        and history.is_only_one(last, key)
     )
 
 
@@ -65,8 +87,13 @@ def _then(history: TrajectoryHistory, key: str, event: Event, phrase: str) -> It
     states = history.states(event.frame)
     if key in states and history.shows(event.frame, key) and _shows_event(history, event):
         answer = "yes" if states[key].is_open else "no"
-        names, subjects = (with_the(states[key].type), phrase), (states[key].type, event.object_type)
-        yield Candidate(FURTHER, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects)
+        names, subjects = (
+            (with_the(states[key].type), phrase),
+            (states[key].type, event.object_type),
+        )
+        yield Candidate(
+            FURTHER, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects
+        )
 
 
 def _shows_event(history: TrajectoryHistory, event: Event) -> bool:
@@ -82,11 +109,16 @@ def _shows_event(history: TrajectoryHistory, event: Event) -> bool:
 def _now(history: TrajectoryHistory, key: str) -> Iterator[Candidate]:
     last = len(history) - 1
     state = history.states(last)[key]
-    changed = next((frame for frame in range(last, -1, -1) if _is_open(history, frame, key) != state.is_open), -1)
+    changed = next(
+        (frame for frame in range(last, -1, -1) if _is_open(history, frame, key) != state.is_open),
+        -1,
+    )
     frame = history.clearest(range(changed + 1, last + 1), key)
     if frame is not None:
         answer = "yes" if state.is_open else "no"
-        yield Candidate(FURTHER, "Is {} open now?", (with_the(state.type),), (frame,), (answer,), (state.type,))
+        yield Candidate(
+            FURTHER, "Is {} open now?", (with_the(state.type),), (frame,), (answer,), (state.type,)
+        )
 
 
 def _is_open(history: TrajectoryHistory, frame: int, key: str) -> bool | None:

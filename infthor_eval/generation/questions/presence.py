@@ -27,35 +27,210 @@ _BUSY = 3  # minimum number of objects in a sampled frame, if the trajectory has
 
 # Never in questions: structures, parts, and types that people would not call by these names.
 _UNASKED = frozenset(
-    {"Floor", "Wall", "Ceiling", "Window", "Door", "Doorway", "DoorFrame", "StoveBurner", "StoveKnob", "LightSwitch"}
-    | {"Faucet", "ShowerHead", "ShowerGlass", "ShowerDoor", "Undefined", "Shelf", "ShelvingUnit", "Stool", "Curtains"}
-    | {"Blinds", "ToiletPaperHanger", "TowelHolder", "HandTowelHolder", "TargetCircle", "Cart", "Desktop", "RoomDecor"}
+    {
+        "Floor",
+        "Wall",
+        "Ceiling",
+        "Window",
+        "Door",
+        "Doorway",
+        "DoorFrame",
+        "StoveBurner",
+        "StoveKnob",
+        "LightSwitch",
+    }
+    | {
+        "Faucet",
+        "ShowerHead",
+        "ShowerGlass",
+        "ShowerDoor",
+        "Undefined",
+        "Shelf",
+        "ShelvingUnit",
+        "Stool",
+        "Curtains",
+    }
+    | {
+        "Blinds",
+        "ToiletPaperHanger",
+        "TowelHolder",
+        "HandTowelHolder",
+        "TargetCircle",
+        "Cart",
+        "Desktop",
+        "RoomDecor",
+    }
 )
 # Types in the rooms of each kind in AI2-THOR.
 _COMMON = {
     "Kitchen": frozenset(
-        {"Apple", "Book", "Bottle", "Bowl", "Bread", "Cabinet", "CellPhone", "Chair", "CoffeeMachine", "CounterTop"}
-        | {"CreditCard", "Cup", "DiningTable", "DishSponge", "Drawer", "Egg", "Fork", "Fridge", "GarbageCan"}
-        | {"HousePlant", "Kettle", "Knife", "Ladle", "Lettuce", "Microwave", "Mug", "Pan", "Pencil", "PepperShaker"}
-        | {"Plate", "Pot", "Potato", "SaltShaker", "SideTable", "Sink", "SoapBottle", "Spatula", "Statue", "Toaster"}
+        {
+            "Apple",
+            "Book",
+            "Bottle",
+            "Bowl",
+            "Bread",
+            "Cabinet",
+            "CellPhone",
+            "Chair",
+            "CoffeeMachine",
+            "CounterTop",
+        }
+        | {
+            "CreditCard",
+            "Cup",
+            "DiningTable",
+            "DishSponge",
+            "Drawer",
+            "Egg",
+            "Fork",
+            "Fridge",
+            "GarbageCan",
+        }
+        | {
+            "HousePlant",
+            "Kettle",
+            "Knife",
+            "Ladle",
+            "Lettuce",
+            "Microwave",
+            "Mug",
+            "Pan",
+            "Pencil",
+            "PepperShaker",
+        }
+        | {
+            "Plate",
+            "Pot",
+            "Potato",
+            "SaltShaker",
+            "SideTable",
+            "Sink",
+            "SoapBottle",
+            "Spatula",
+            "Statue",
+            "Toaster",
+        }
         | {"Tomato", "Vase", "WineBottle"}
     ),
     "LivingRoom": frozenset(
-        {"ArmChair", "Book", "Boots", "Bowl", "Box", "Candle", "CellPhone", "Chair", "CoffeeTable", "CreditCard"}
-        | {"Desk", "DeskLamp", "DiningTable", "DogBed", "Drawer", "Dresser", "FloorLamp", "GarbageCan", "HousePlant"}
-        | {"KeyChain", "Laptop", "Newspaper", "Ottoman", "Painting", "Pencil", "Pillow", "Plate", "RemoteControl"}
-        | {"Safe", "SideTable", "Sofa", "Statue", "Television", "TissueBox", "TVStand", "Vase", "Watch", "WateringCan"}
+        {
+            "ArmChair",
+            "Book",
+            "Boots",
+            "Bowl",
+            "Box",
+            "Candle",
+            "CellPhone",
+            "Chair",
+            "CoffeeTable",
+            "CreditCard",
+        }
+        | {
+            "Desk",
+            "DeskLamp",
+            "DiningTable",
+            "DogBed",
+            "Drawer",
+            "Dresser",
+            "FloorLamp",
+            "GarbageCan",
+            "HousePlant",
+        }
+        | {
+            "KeyChain",
+            "Laptop",
+            "Newspaper",
+            "Ottoman",
+            "Painting",
+            "Pencil",
+            "Pillow",
+            "Plate",
+            "RemoteControl",
+        }
+        | {
+            "Safe",
+            "SideTable",
+            "Sofa",
+            "Statue",
+            "Television",
+            "TissueBox",
+            "TVStand",
+            "Vase",
+            "Watch",
+            "WateringCan",
+        }
     ),
     "Bedroom": frozenset(
-        {"AlarmClock", "ArmChair", "BaseballBat", "BasketBall", "Bed", "Book", "Boots", "Bowl", "Box", "CD"}
-        | {"CellPhone", "Chair", "Cloth", "CreditCard", "Desk", "DeskLamp", "Drawer", "Dresser", "Dumbbell"}
-        | {"FloorLamp", "GarbageCan", "HousePlant", "KeyChain", "Laptop", "Mirror", "Mug", "Painting", "Pencil"}
-        | {"Pillow", "RemoteControl", "Safe", "SideTable", "Sofa", "Statue", "TeddyBear", "Television"}
+        {
+            "AlarmClock",
+            "ArmChair",
+            "BaseballBat",
+            "BasketBall",
+            "Bed",
+            "Book",
+            "Boots",
+            "Bowl",
+            "Box",
+            "CD",
+        }
+        | {
+            "CellPhone",
+            "Chair",
+            "Cloth",
+            "CreditCard",
+            "Desk",
+            "DeskLamp",
+            "Drawer",
+            "Dresser",
+            "Dumbbell",
+        }
+        | {
+            "FloorLamp",
+            "GarbageCan",
+            "HousePlant",
+            "KeyChain",
+            "Laptop",
+            "Mirror",
+            "Mug",
+            "Painting",
+            "Pencil",
+        }
+        | {
+            "Pillow",
+            "RemoteControl",
+            "Safe",
+            "SideTable",
+            "Sofa",
+            "Statue",
+            "TeddyBear",
+            "Television",
+        }
         | {"TennisRacket", "TissueBox", "VacuumCleaner", "Vase", "Watch"}
     ),
     "Bathroom": frozenset(
-        {"Cabinet", "Candle", "Cloth", "CounterTop", "DishSponge", "Drawer", "GarbageCan", "HousePlant", "Mirror"}
-        | {"Painting", "Plunger", "SideTable", "Sink", "SoapBar", "SoapBottle", "SprayBottle", "TissueBox", "Toilet"}
+        {
+            "Cabinet",
+            "Candle",
+            "Cloth",
+            "CounterTop",
+            "DishSponge",
+            "Drawer",
+            "GarbageCan",
+            "HousePlant",
+            "Mirror",
+        }
+        | {
+            "Painting",
+            "Plunger",
+            "SideTable",
+            "Sink",
+            "SoapBar",
+            "SoapBottle",
+            "SprayBottle",
+            "TissueBox",
+            "Toilet",
+        }
         | {"ToiletPaper", "Towel"}
     ),
 }
@@ -106,7 +281,9 @@ def yes_questions(history: TrajectoryHistory) -> Iterator[Candidate]:
             yield from _questions(_forms(history), object_type, frame, "yes")
 
 
-def no_questions(history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random) -> Iterator[Candidate]:
+def no_questions(
+    history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random
+) -> Iterator[Candidate]:
     """Yield no-questions with random frames on types of `vocabulary` that the scene does not have."""
     frames = [frame for frame in range(len(history)) if _is_busy(history, frame)] or [0]
     absent = _other_types(history, vocabulary, history.all_object_types)
@@ -120,14 +297,26 @@ def _forms(history: TrajectoryHistory) -> tuple[str, ...]:
     return (_SEEN,) if history.has_rooms else (_IN_ROOM, _SEEN)
 
 
-def _questions(forms: Iterable[str], object_type: str, frame: int, answer: str) -> Iterator[Candidate]:
+def _questions(
+    forms: Iterable[str], object_type: str, frame: int, answer: str
+) -> Iterator[Candidate]:
     words = noun(object_type)
     for form in forms:
         name = with_article(words) if form == _SEEN else words
-        yield Candidate(QUESTION_TYPE, form, (name,), (frame,), (answer,), (object_type,), absence=answer == "no")
+        yield Candidate(
+            QUESTION_TYPE,
+            form,
+            (name,),
+            (frame,),
+            (answer,),
+            (object_type,),
+            absence=answer == "no",
+        )
 
 
-def _other_types(history: TrajectoryHistory, vocabulary: frozenset[str], there: frozenset[str]) -> set[str]:
+def _other_types(
+    history: TrajectoryHistory, vocabulary: frozenset[str], there: frozenset[str]
+) -> set[str]:
     """Return the types of the vocabulary that are not there, nor like one that is; more if these are few."""
     similar = {name for group in _SIMILAR_TYPES if group & there for name in group}
     rooms = rooms_of(history.all_object_types).split(", ")

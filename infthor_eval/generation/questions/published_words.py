@@ -45,7 +45,9 @@ def in_published_words(candidate: Candidate, traj_id: str) -> Question:
         raise ValueError(f"{candidate.form!r} has no published words")
     types = [object_type(_BEFORE_NOUN.sub("", name)) for name in candidate.names]
     last = types[-1] if types else ""
-    text = form.format(*types, a="an" if last.startswith(tuple("AEIOU")) else "a", preposition=preposition(last))
+    text = form.format(
+        *types, a="an" if last.startswith(tuple("AEIOU")) else "a", preposition=preposition(last)
+    )
     by_answer = {answer_of(subject): canonical_type(subject) for subject in candidate.subjects}
     return Question(
         traj_id,

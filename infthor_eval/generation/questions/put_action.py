@@ -21,8 +21,14 @@ def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
         (move, *others) = moves
         before = move.after - 1
         if not others and history.shows(before, move.item) and history.shows_put(move):
-            form, names, clues = "What object did you put {}?", (in_or_on(place_type),), (before, move.after)
-            yield from type_question(QUESTION_TYPE, form, names, clues, [move.object_type], (place_type,))
+            form, names, clues = (
+                "What object did you put {}?",
+                (in_or_on(place_type),),
+                (before, move.after),
+            )
+            yield from type_question(
+                QUESTION_TYPE, form, names, clues, [move.object_type], (place_type,)
+            )
 
 
 def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -31,7 +37,10 @@ def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
         if len(moves) > 1 and len({move.target for move in moves}) == 1:
             yield from _what(history, "What did you put {}?", (place_type,), moves)
     yield from _what(history, "What did you put down?", (), history.moves)
-    shown = ((history.target_type(move), move.after if history.shows_put(move) else None) for move in history.moves)
+    shown = (
+        (history.target_type(move), move.after if history.shows_put(move) else None)
+        for move in history.moves
+    )
     yield from candidates.listing_question(FURTHER, "Where did you put things?", shown)
 
 
@@ -49,5 +58,8 @@ def _what(
     """Yield a question on the moved objects, with the frame after the first put of each."""
     first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
     if all(history.shows_put(move) for move in first_puts):
-        clues, types = tuple(move.after for move in first_puts), [move.object_type for move in first_puts]
+        clues, types = (
+            tuple(move.after for move in first_puts),
+            [move.object_type for move in first_puts],
+        )
         yield from type_question(FURTHER, form, tuple(map(in_or_on, places)), clues, types, places)

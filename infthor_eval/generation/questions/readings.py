@@ -12,22 +12,47 @@ from infthor_eval.generation.questions.history import TrajectoryHistory
 
 __all__ = ["can_be_picked_up", "is_plain"]
 
-_TOPS = frozenset({"CoffeeTable", "Desk", "DiningTable", "Dresser", "Shelf", "ShelvingUnit", "SideTable", "TVStand"})
+_TOPS = frozenset(
+    {
+        "CoffeeTable",
+        "Desk",
+        "DiningTable",
+        "Dresser",
+        "Shelf",
+        "ShelvingUnit",
+        "SideTable",
+        "TVStand",
+    }
+)
 _COUNTER = "CounterTop"  # so long that the distance from its middle means little
 _FIXTURES = frozenset(
-    {"CoffeeMachine", "DeskLamp", "Desktop", "Faucet", "HousePlant", "Microwave", "RoomDecor", "Sink", "StoveBurner"}
+    {
+        "CoffeeMachine",
+        "DeskLamp",
+        "Desktop",
+        "Faucet",
+        "HousePlant",
+        "Microwave",
+        "RoomDecor",
+        "Sink",
+        "StoveBurner",
+    }
     | {"TableTopDecor", "Television", "Toaster"}
 )
 _SPAN = 1.5  # maximum distance from the middle of a table to an object on it, metres
 
 
-def can_be_picked_up(history: TrajectoryHistory, frame: int, keys: Iterable[str]) -> frozenset[str] | None:
+def can_be_picked_up(
+    history: TrajectoryHistory, frame: int, keys: Iterable[str]
+) -> frozenset[str] | None:
     """Return the objects that can be picked up, or None if the log does not report this for one of them."""
     states = history.states(frame)
     types = {key: states[key].type for key in keys}
     if not history.reported_types.issuperset(types.values()):
         return None
-    return frozenset(key for key, object_type in types.items() if object_type in history.pickupable_types)
+    return frozenset(
+        key for key, object_type in types.items() if object_type in history.pickupable_types
+    )
 
 
 def is_plain(history: TrajectoryHistory, frame: int, place: str) -> bool:

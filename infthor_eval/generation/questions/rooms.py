@@ -5,7 +5,12 @@ from collections.abc import Set
 __all__ = ["rooms_of"]
 
 # In AI2-THOR's rooms and in ours each of these stands in one kind of room alone.
-_MARKS = {"Kitchen": {"Fridge", "StoveBurner"}, "Bedroom": {"Bed"}, "Bathroom": {"Toilet"}, "LivingRoom": {"Sofa"}}
+_MARKS = {
+    "Kitchen": {"Fridge", "StoveBurner"},
+    "Bedroom": {"Bed"},
+    "Bathroom": {"Toilet"},
+    "LivingRoom": {"Sofa"},
+}
 
 
 def rooms_of(types: Set[str]) -> str:

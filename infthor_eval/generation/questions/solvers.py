@@ -39,7 +39,9 @@ class FrameFacts:
     loose: frozenset[str]
 
 
-def frame_facts(steps: Sequence[Step], share: float, frames: Container[int] | None = None) -> list[FrameFacts]:
+def frame_facts(
+    steps: Sequence[Step], share: float, frames: Container[int] | None = None
+) -> list[FrameFacts]:
     """Return the facts of the whole log, or what clue frames show: objects that fill a share of the frame's pixels."""
     facts = []
     loose = frozenset(name for step in steps for name in step.object_log.pickupable)
@@ -48,11 +50,23 @@ def frame_facts(steps: Sequence[Step], share: float, frames: Container[int] | No
         if frames is not None:
             if step.img_idx not in frames:
                 continue
-            large = {key for key, seen in (step.seen or {}).items() if seen.pixels >= share * _FRAME_PIXELS}
+            large = {
+                key
+                for key, seen in (step.seen or {}).items()
+                if seen.pixels >= share * _FRAME_PIXELS
+            }
             objects = {key: state for key, state in objects.items() if key in large}
         action = (step.action or "").split(" ")[0] if step.success else ""
         facts.append(
-            FrameFacts(step.img_idx, action, step.target, objects, frozenset(step.seen or {}), frames is None, loose)
+            FrameFacts(
+                step.img_idx,
+                action,
+                step.target,
+                objects,
+                frozenset(step.seen or {}),
+                frames is None,
+                loose,
+            )
         )
     return facts
 
@@ -137,7 +151,11 @@ def _target_is(item: FrameFacts, words: str) -> bool:
 
 def _handled_object(facts: Sequence[FrameFacts], words: str) -> str | None:
     """Return the object of a type that is acted on, or else the only known one."""
-    acted = {item.target for item in facts if item.target in item.objects and _is(item.objects[item.target], words)}
+    acted = {
+        item.target
+        for item in facts
+        if item.target in item.objects and _is(item.objects[item.target], words)
+    }
     known = {key for item in facts for key, state in item.objects.items() if _is(state, words)}
     candidates = acted or known
     return next(iter(candidates)) if len(candidates) == 1 else None
@@ -153,7 +171,11 @@ def _track(facts: Sequence[FrameFacts], words: str) -> list[tuple[FrameFacts, st
 
 
 def _presence(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    return ["yes" if any(_is(state, words) for item in facts for state in item.objects.values()) else "no"]
+    return [
+        "yes"
+        if any(_is(state, words) for item in facts for state in item.objects.values())
+        else "no"
+    ]
 
 
 def _seen(facts: Sequence[FrameFacts], words: str) -> list[str]:
@@ -182,7 +204,11 @@ def _before_put(facts: Sequence[FrameFacts], words: str, place: str) -> list[str
 def _moved_from(facts: Sequence[FrameFacts], words: str, place: str) -> list[str]:
     """Return where it went from a place, if it left that place once and then stayed."""
     places = _journey(facts, words)
-    return places[-1:] if places[-2:-1] == [_type_name(place)] and places.count(_type_name(place)) == 1 else []
+    return (
+        places[-1:]
+        if places[-2:-1] == [_type_name(place)] and places.count(_type_name(place)) == 1
+        else []
+    )
 
 
 def _moved_to(facts: Sequence[FrameFacts], words: str) -> list[str]:
@@ -215,13 +241,20 @@ def _put_object(facts: Sequence[FrameFacts], _preposition: str, words: str) -> l
     for previous, item in pairwise(facts):
         target = item.target or ""
         held = target in previous.objects and previous.objects[target].held
-        if item.action == "PutObject" and held and target in item.objects and _place(item, target) == _type_name(words):
+        if (
+            item.action == "PutObject"
+            and held
+            and target in item.objects
+            and _place(item, target) == _type_name(words)
+        ):
             names.append(_target_name(item))
     return names
 
 
 def _put_down(facts: Sequence[FrameFacts]) -> list[str]:
-    puts = [item for item in _events(facts, "PutObject") if _place(item, item.target or "") is not None]
+    puts = [
+        item for item in _events(facts, "PutObject") if _place(item, item.target or "") is not None
+    ]
     return list({item.target: _target_name(item) for item in puts}.values())
 
 
@@ -235,7 +268,9 @@ def _opened_types(facts: Sequence[FrameFacts]) -> list[str]:
 
 
 def _open(item: FrameFacts, words: str) -> list[str]:
-    states = [state for state in item.objects.values() if _is(state, words) and state.is_open is not None]
+    states = [
+        state for state in item.objects.values() if _is(state, words) and state.is_open is not None
+    ]
     return ["yes" if states[0].is_open else "no"] if len(states) == 1 else []
 
 
@@ -255,7 +290,9 @@ def _open_then(facts: Sequence[FrameFacts], words: str, verb: str, item: str) ->
     return _open(events[0], words) if len(events) == 1 else []
 
 
-def _open_at_put(facts: Sequence[FrameFacts], words: str, item: str, _preposition: str, place: str) -> list[str]:
+def _open_at_put(
+    facts: Sequence[FrameFacts], words: str, item: str, _preposition: str, place: str
+) -> list[str]:
     events = _puts_at(facts, place, item)
     return _open(events[0], words) if len(events) == 1 else []
 
@@ -266,22 +303,32 @@ def _sliced_types(facts: Sequence[FrameFacts]) -> list[str]:
 
 def _at_slicing(facts: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
     names = _left_at(facts, "SliceObject", place, item)
-    return sorted({_type_name(item) if name == f"{_type_name(item)}sliced" else name for name in names})
+    return sorted(
+        {_type_name(item) if name == f"{_type_name(item)}sliced" else name for name in names}
+    )
 
 
 def _at_opening(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
     events = _events(facts, "OpenObject", place)
     if not events:
         return []  # nothing shows when that was
-    since = events[:1] if facts[0].everything else [item for item in facts if item.frame >= events[0].frame]
+    since = (
+        events[:1]
+        if facts[0].everything
+        else [item for item in facts if item.frame >= events[0].frame]
+    )
     return _all_contents([_only_loose(item) for item in since], "", place)
 
 
-def _left_at_pickup(facts: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
+def _left_at_pickup(
+    facts: Sequence[FrameFacts], _preposition: str, place: str, item: str
+) -> list[str]:
     events = _events(facts, "PickupObject", item)
     if len(events) != 1:
         return []  # nothing shows when that was, or it was not once
-    since = [glimpse for glimpse in facts if facts[0].everything or glimpse.frame >= events[0].frame]
+    since = [
+        glimpse for glimpse in facts if facts[0].everything or glimpse.frame >= events[0].frame
+    ]
     return _left_at([_only_loose(glimpse) for glimpse in since], "PickupObject", place, item)
 
 
@@ -292,20 +339,32 @@ def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) ->
     for previous, event in pairwise(facts):
         if event.action == action and event.target is not None and _target_is(event, item):
             holder = _whole(_holder(previous, event.target))
-            inside = [state.type for key, state in event.objects.items() if _whole(_holder(event, key)) == holder]
+            inside = [
+                state.type
+                for key, state in event.objects.items()
+                if _whole(_holder(event, key)) == holder
+            ]
             return sorted(map(_name, inside))
     return []
 
 
 def _only_loose(item: FrameFacts) -> FrameFacts:
     """Return the facts without the fixtures in or on others; objects without a parent remain, as possible holders."""
-    remaining = {key: state for key, state in item.objects.items() if state.type in item.loose or not state.parents}
+    remaining = {
+        key: state
+        for key, state in item.objects.items()
+        if state.type in item.loose or not state.parents
+    }
     return replace(item, objects=remaining)
 
 
 def _all_contents(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
     """Return what is in a receptacle in any of the frames."""
-    return sorted({key: _name(item.objects[key].type) for item in facts for key in _inside(item, place)}.values())
+    return sorted(
+        {
+            key: _name(item.objects[key].type) for item in facts for key in _inside(item, place)
+        }.values()
+    )
 
 
 def _is_in(facts: Sequence[FrameFacts], item: str, _preposition: str, place: str) -> list[str]:
@@ -385,7 +444,10 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Is the (.+) open now\?", _open_now),
     (r"Was the (.+) open when you (picked up|sliced|turned on) the (.+)\?", _open_then),
     (r"Was the (.+) open when you put the (.+) (in|on) the (.+)\?", _open_at_put),
-    (r"Which things that can be picked up were directly (in|on) the (.+) when you first opened it\?", _at_opening),
+    (
+        r"Which things that can be picked up were directly (in|on) the (.+) when you first opened it\?",
+        _at_opening,
+    ),
     (
         r"Which other things that can be picked up were directly (in|on) the (.+)"
         r" when you picked up the (.+) from it\?",

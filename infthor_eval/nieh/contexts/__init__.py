@@ -1,8 +1,22 @@
 """Contexts by the names that task files use."""
 
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.contexts import interleaved, memory, plans, retrieval, text_state, video, views
-from infthor_eval.nieh.contexts.base import Context, ContextPart, ContextSettings, Sample, trajectories_identity
+from infthor_eval.nieh.contexts import (
+    interleaved,
+    memory,
+    plans,
+    retrieval,
+    text_state,
+    video,
+    views,
+)
+from infthor_eval.nieh.contexts.base import (
+    Context,
+    ContextPart,
+    ContextSettings,
+    Sample,
+    trajectories_identity,
+)
 from infthor_eval.nieh.contexts.haystack import haystack
 from infthor_eval.nieh.prompts import PROMPTS
 
@@ -26,16 +40,23 @@ CONTEXTS = {
     "truncate_head": Context(views.truncate_head, needs_model=True, prompts=PROMPTS),
     "haystack": Context(haystack, needs_model=True, prompts=PROMPTS),
     "interleaved": Context(
-        interleaved.interleaved, intro=_INTERLEAVED, parts=interleaved.interleaved_parts, sources=trajectories_identity
+        interleaved.interleaved,
+        intro=_INTERLEAVED,
+        parts=interleaved.interleaved_parts,
+        sources=trajectories_identity,
     ),
-    "interleaved_plans": Context(plans.interleaved_plans, intro=_INTERLEAVED, parts=plans.plans_parts),
+    "interleaved_plans": Context(
+        plans.interleaved_plans, intro=_INTERLEAVED, parts=plans.plans_parts
+    ),
     "text_state": Context(
         text_state.text_state,
         intro="Answer the question given the description of the environment and the agent's state (the last image).",
         parts=text_state.state_parts,
         sources=trajectories_identity,
     ),
-    "clip_retrieval": Context(retrieval.clip_retrieval, prompts=PROMPTS, sources=retrieval.retriever_identity),
+    "clip_retrieval": Context(
+        retrieval.clip_retrieval, prompts=PROMPTS, sources=retrieval.retriever_identity
+    ),
     "video": Context(
         video.video,
         intro="Answer the question given the video showing the agent's trajectory over time.",
@@ -55,7 +76,9 @@ def context_named(name: str) -> Context:
         UsageError: there is none.
     """
     if name not in CONTEXTS:
-        raise UsageError(f"unknown context {name!r}; a task's dataset_kwargs takes {', '.join(CONTEXTS)}")
+        raise UsageError(
+            f"unknown context {name!r}; a task's dataset_kwargs takes {', '.join(CONTEXTS)}"
+        )
     return CONTEXTS[name]
 
 
@@ -66,5 +89,9 @@ def check_prompt(name: str, prompt: str) -> None:
         UsageError: it has words of its own.
     """
     if prompt not in context_named(name).prompts:
-        takers = ", ".join(other for other, context in CONTEXTS.items() if prompt in context.prompts)
-        raise UsageError(f"prompt {prompt}: the context {name} is asked in words of its own; it is for {takers}")
+        takers = ", ".join(
+            other for other, context in CONTEXTS.items() if prompt in context.prompts
+        )
+        raise UsageError(
+            f"prompt {prompt}: the context {name} is asked in words of its own; it is for {takers}"
+        )

@@ -7,16 +7,23 @@ from typing import Any, get_type_hints
 import msgspec
 
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.digests import digest_of_file, fingerprint
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.video import FILM_FPS, Video
+from infthor_eval.nieh.asking.recall_settings import RecallSettings
 from infthor_eval.nieh.options import FRAMES
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN, question_text
-from infthor_eval.nieh.recall_settings import RecallSettings
+from infthor_eval.storage.digests import digest_of_file, fingerprint
 
-__all__ = ["Context", "ContextPart", "ContextSettings", "Sample", "clue_positions", "trajectories_identity"]
+__all__ = [
+    "Context",
+    "ContextPart",
+    "ContextSettings",
+    "Sample",
+    "clue_positions",
+    "trajectories_identity",
+]
 
 _LARGEST = 1e9  # kilo-tokens; more is a typing error
 _COUNT = "a whole number from 1"
@@ -35,13 +42,22 @@ def _is_plain(value: Any) -> bool:
 _VALUES: dict[str, tuple[Callable[[Any], bool] | None, str]] = {
     "ctx_size": (lambda value: 0 < value < _LARGEST, "a number of kilo-tokens above 0"),
     "k_tokens": (lambda value: value in (1000, 1024), "1000 or 1024"),
-    "depths": (lambda value: value and all(0 <= depth <= 1 for depth in value), "a list of numbers from 0 to 1"),
+    "depths": (
+        lambda value: value and all(0 <= depth <= 1 for depth in value),
+        "a list of numbers from 0 to 1",
+    ),
     "tokens_per_frame": (_is_positive, _COUNT),
     "top_k": (_is_positive, _COUNT),
     "memory": (None, "the name of a memory"),
-    "memory_args": (lambda value: all(map(_is_plain, value.values())), "a mapping of options to texts and numbers"),
+    "memory_args": (
+        lambda value: all(map(_is_plain, value.values())),
+        "a mapping of options to texts and numbers",
+    ),
     "budget": (_is_positive, f"{_COUNT}, in tokens"),
-    "fps": (lambda value: 0 < value <= FILM_FPS, f"a number of frames per second above 0, at most {FILM_FPS}"),
+    "fps": (
+        lambda value: 0 < value <= FILM_FPS,
+        f"a number of frames per second above 0, at most {FILM_FPS}",
+    ),
     "seed": (None, "a whole number"),
     "retriever": (None, "a text"),
     "retriever_revision": (None, "a text"),
@@ -142,9 +158,13 @@ class ContextSettings:
             UsageError: the size, or the tokens of a frame, are not given.
         """
         if self.ctx_size is None:
-            raise UsageError("this context needs its size: ctx_size under dataset_kwargs of the task file")
+            raise UsageError(
+                "this context needs its size: ctx_size under dataset_kwargs of the task file"
+            )
         if not self.tokens_per_frame:
-            raise UsageError("this context needs tokens_per_frame, the model's tokens of one frame, in the metadata")
+            raise UsageError(
+                "this context needs tokens_per_frame, the model's tokens of one frame, in the metadata"
+            )
         return int(self.ctx_size * (self.k_tokens or k_tokens)) // self.tokens_per_frame
 
 
@@ -189,7 +209,9 @@ class Context:
         "image)."
     )
     prompts: tuple[str, ...] = (PUBLISHED_MAIN,)
-    parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(default=_only_frames)
+    parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(
+        default=_only_frames
+    )
     frames: Callable[[NiehSet, str, float | None], Sequence[FrameRef]] = field(default=_all_frames)
     positions: Callable[[NiehSet, Sample], Sequence[int]] = field(default=_frames_of)
     sources: Callable[[NiehSet, ContextSettings], dict[str, Any]] = field(default=_no_sources)
@@ -201,11 +223,15 @@ class Context:
         frames = self.frames(data, sample.question.traj_id, sample.fps)
         return [frames[position] for position in sample.frames]
 
-    def request(self, data: NiehSet, sample: Sample, prompt: str = PUBLISHED_MAIN) -> tuple[list[ContextPart], str]:
+    def request(
+        self, data: NiehSet, sample: Sample, prompt: str = PUBLISHED_MAIN
+    ) -> tuple[list[ContextPart], str]:
         """Return the request of a sample: the context, and the text with the question that follows it."""
         parts = self.parts(data, sample, self.select_frames(data, sample))
         has_texts = any(isinstance(item, str) for item in sample.recalled or ())
-        return parts, question_text(self.text_intro if has_texts else self.intro, sample.question, prompt)
+        return parts, question_text(
+            self.text_intro if has_texts else self.intro, sample.question, prompt
+        )
 
 
 def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:
@@ -218,4 +244,8 @@ def trajectories_identity(data: NiehSet, _settings: ContextSettings) -> dict[str
     """Return the hash of the trajectories' own files, which the set's fingerprint does not cover."""
     ids = sorted({question.traj_id for question in data.questions})
     files = {traj_id: path for traj_id in ids if (path := data.outline_file(traj_id)) is not None}
-    return {"trajectories": fingerprint({traj_id: digest_of_file(path) for traj_id, path in files.items()})}
+    return {
+        "trajectories": fingerprint(
+            {traj_id: digest_of_file(path) for traj_id, path in files.items()}
+        )
+    }

@@ -24,7 +24,9 @@ _STEPS = 5  # depths of the published grid
 _OUTSIDE = "the window reaches outside the trajectory"
 
 
-def haystack(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def haystack(
+    data: NiehSet, question: Question, settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """Return a question on one window per depth."""
     n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
     if question.absence:
@@ -36,12 +38,16 @@ def haystack(data: NiehSet, question: Question, settings: ContextSettings) -> li
         window = _window(clues, n_all, n, round(depth * _STEPS), draw)
         variant = f"depth={depth:g}"
         samples.append(
-            SkippedQuestion(question, window, variant) if isinstance(window, str) else Sample(question, window, variant)
+            SkippedQuestion(question, window, variant)
+            if isinstance(window, str)
+            else Sample(question, window, variant)
         )
     return samples
 
 
-def _window(clues: tuple[int, ...], n_all: int, n: int, d_index: int, draw: random.Random) -> tuple[int, ...] | str:
+def _window(
+    clues: tuple[int, ...], n_all: int, n: int, d_index: int, draw: random.Random
+) -> tuple[int, ...] | str:
     """Return the positions of the frames, ascending, or the reason why there is no window."""
     if n < 1:
         return "no frame fits the window"

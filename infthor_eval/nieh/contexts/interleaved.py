@@ -13,7 +13,9 @@ __all__ = ["interleaved", "interleaved_parts"]
 _STATE = " State: "  # text before frames
 
 
-def interleaved(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def interleaved(
+    data: NiehSet, question: Question, _settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """Ask on each task's goal and the frame before it, then every action with its frames."""
     outline = data.outline(question.traj_id)
     if outline is None:
@@ -22,7 +24,9 @@ def interleaved(data: NiehSet, question: Question, _settings: ContextSettings) -
     return [Sample(question, tuple(item for item in layout if isinstance(item, int)))]
 
 
-def interleaved_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
+def interleaved_parts(
+    data: NiehSet, sample: Sample, frames: Sequence[FrameRef]
+) -> list[ContextPart]:
     """Return the texts with the frames in their places."""
     outline = data.outline(sample.question.traj_id)
     assert outline is not None  # or there were no sample
@@ -38,7 +42,14 @@ def _layout(outline: Outline, frames_of: Mapping[int, tuple[int, ...]]) -> Itera
         yield f"Your task goal: {goal}. "
         yield _STATE
         # The frame from which the first action starts: the last one of those before it, or the first of all.
-        yield next((frames_of[number][-1] for number in range(span.start - 1, -1, -1) if number in frames_of), 0)
+        yield next(
+            (
+                frames_of[number][-1]
+                for number in range(span.start - 1, -1, -1)
+                if number in frames_of
+            ),
+            0,
+        )
         for number in span:
             yield f" Action: {actions[number]}"
             if number in frames_of:

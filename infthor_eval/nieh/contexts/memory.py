@@ -1,7 +1,7 @@
 """What a memory recalls of the trajectory, and the agent's current view.
 
 A memory is opened for a task's identity, but it recalls only when a question is asked: that can take long, and some ask
-the model under test (`infthor_eval.nieh.recalling`).
+the model under test (`infthor_eval.nieh.asking.recalling`).
 """
 
 from collections.abc import Sequence
@@ -12,18 +12,24 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.memory import accepted_options, memory_identity
+from infthor_eval.nieh.asking.recall_settings import RecallSettings
 from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
-from infthor_eval.nieh.recall_settings import RecallSettings
 
 __all__ = ["memory", "memory_sources", "recalled_parts"]
 
-_UNRECALLED = "<memory>"  # the place of what will be recalled, in prompts of samples that no model was asked
+_UNRECALLED = (
+    "<memory>"  # the place of what will be recalled, in prompts of samples that no model was asked
+)
 _OF_RETRIEVER = ("retriever", "retriever_revision")
 
 
-def memory(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def memory(
+    data: NiehSet, question: Question, settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """Ask on what a memory recalls of the frames before the last, and on that one, the agent's current view."""
-    return [Sample(question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings))]
+    return [
+        Sample(question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings))
+    ]
 
 
 def memory_sources(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
@@ -42,7 +48,9 @@ def recalled_parts(_data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -
 
 def _recall(settings: ContextSettings) -> RecallSettings:
     if settings.memory is None:
-        raise UsageError("this task needs a memory: give --memory NAME; `infthor-eval ls memories` lists them")
+        raise UsageError(
+            "this task needs a memory: give --memory NAME; `infthor-eval ls memories` lists them"
+        )
     options = dict(settings.memory_args)
     for name in _OF_RETRIEVER:
         value = getattr(settings, name)
@@ -50,4 +58,6 @@ def _recall(settings: ContextSettings) -> RecallSettings:
             options.setdefault(name, value)
     # Without a budget the size of a frame decides nothing, and recalls are the same for every model.
     size = settings.tokens_per_frame if settings.budget is not None else None
-    return RecallSettings(settings.memory, tuple(sorted(options.items())), settings.budget, size, settings.seed)
+    return RecallSettings(
+        settings.memory, tuple(sorted(options.items())), settings.budget, size, settings.seed
+    )

@@ -16,7 +16,9 @@ _MARK = "<image>"  # the place of a frame in traj.txt
 _ACT = "<|act|>"  # the end of an action there
 
 
-def interleaved_plans(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def interleaved_plans(
+    data: NiehSet, question: Question, _settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """Ask on goals, plans, frames and actions in time order; of several frames of an action, the last is shown."""
     n_frames = len(data.frames(question.traj_id))
     done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
@@ -25,7 +27,9 @@ def interleaved_plans(data: NiehSet, question: Question, _settings: ContextSetti
         return [Sample(question, tuple(done))]
     after_actions = [0, *(frames[-1] for frames in data.action_frames(question.traj_id).values())]
     if n_actions + 1 != len(after_actions):
-        reason = f"traj.txt has {n_actions} actions, which fit neither the frames nor expert_log.json"
+        reason = (
+            f"traj.txt has {n_actions} actions, which fit neither the frames nor expert_log.json"
+        )
         return [SkippedQuestion(question, reason)]
     return [Sample(question, tuple(after_actions[number] for number in done))]
 

@@ -10,10 +10,16 @@ from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 __all__ = ["state_parts", "text_state"]
 
 
-def text_state(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def text_state(
+    data: NiehSet, question: Question, _settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """Ask on the last frame, beside the text of the last state."""
     if not data.states(question.traj_id):
-        reason = "the trajectory has no state_summary" if data.outline(question.traj_id) else data.missing_outline
+        reason = (
+            "the trajectory has no state_summary"
+            if data.outline(question.traj_id)
+            else data.missing_outline
+        )
         return [SkippedQuestion(question, reason)]
     return [Sample(question, (len(data.frames(question.traj_id)) - 1,))]
 

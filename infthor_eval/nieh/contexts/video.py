@@ -14,7 +14,9 @@ from infthor_eval.nieh.contexts.base import ContextPart, ContextSettings, Sample
 __all__ = ["as_images", "video", "video_frames", "video_identity", "video_parts", "video_positions"]
 
 
-def video(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def video(
+    data: NiehSet, question: Question, settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """Ask on the trajectory's film, its mp4, sampled at `fps` frames per second (published: `video`, 1 and 2).
 
     Where there is no mp4, the frames themselves are the film. The variant names the source, so that the two are not
@@ -40,7 +42,11 @@ def video_frames(data: NiehSet, traj_id: str, fps: float | None) -> Sequence[Fra
     """
     if fps is None:
         raise ValueError("a sample of video lacks the rate of its frames")
-    return data.frames(traj_id) if data.video(traj_id) is None else data.sampled_video(traj_id, fps).frames
+    return (
+        data.frames(traj_id)
+        if data.video(traj_id) is None
+        else data.sampled_video(traj_id, fps).frames
+    )
 
 
 def video_positions(data: NiehSet, sample: Sample) -> Sequence[int]:
@@ -61,7 +67,9 @@ def video_parts(data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> li
 
 def as_images(parts: Iterable[ContextPart]) -> list[ContextPart]:
     """Return parts with the frames of each video in its place, for a model without a video input."""
-    return [item for part in parts for item in (part.frames if isinstance(part, Video) else (part,))]
+    return [
+        item for part in parts for item in (part.frames if isinstance(part, Video) else (part,))
+    ]
 
 
 def video_identity(data: NiehSet, settings: ContextSettings) -> dict[str, Any]:

@@ -9,7 +9,9 @@ __all__ = ["clues", "trajectory", "truncate_head"]
 _K_TOKENS = 1024  # truncate_head's published kilo-token
 
 
-def clues(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def clues(
+    data: NiehSet, question: Question, _settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """Ask on the frames that are evidence alone, in time order whatever the file's (the paper's Table 4)."""
     if not data.has_frames:  # baselines need no more than their number
         return [Sample(question, tuple(sorted(question.clues)))]
@@ -17,12 +19,16 @@ def clues(data: NiehSet, question: Question, _settings: ContextSettings) -> list
     return [Sample(question, tuple(sorted(order[frame] for frame in data.clue_frames(question))))]
 
 
-def trajectory(data: NiehSet, question: Question, _settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def trajectory(
+    data: NiehSet, question: Question, _settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """Ask on every frame of the trajectory (published: `full_traj`)."""
     return [Sample(question, tuple(range(len(data.frames(question.traj_id)))))]
 
 
-def truncate_head(data: NiehSet, question: Question, settings: ContextSettings) -> list[Sample | SkippedQuestion]:
+def truncate_head(
+    data: NiehSet, question: Question, settings: ContextSettings
+) -> list[Sample | SkippedQuestion]:
     """The last frames that fit the context (published under the same name); clues before them are lost."""
     n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
     if n < 1:

@@ -65,7 +65,9 @@ class Group:
         answers: dict[str, set[str]] = {}
         for item in self.questions:
             answers.setdefault(form_of(item.question), set()).add(doc_target(item.question).lower())
-        return sum(1 / len(answers[form_of(item.question)]) for item in self.questions) / len(self.questions)
+        return sum(1 / len(answers[form_of(item.question)]) for item in self.questions) / len(
+            self.questions
+        )
 
     def means(self) -> tuple[float, ...]:
         """Return the mean score of each guesser."""

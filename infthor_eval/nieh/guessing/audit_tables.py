@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from infthor_eval.nieh.above_guessing import FormScore
-from infthor_eval.nieh.gains import name_of
 from infthor_eval.nieh.guessing.audit import AuditedQuestion, groups
 from infthor_eval.nieh.guessing.balancing import MARGIN, Balanced
 from infthor_eval.nieh.guessing.guessers import GUESSERS
-from infthor_eval.nieh.summary import NiehSummary, main_metric
+from infthor_eval.nieh.results.above_guessing import FormScore
+from infthor_eval.nieh.results.gains import name_of
+from infthor_eval.nieh.results.summary import NiehSummary, main_metric
 from infthor_eval.runs import RunSummary
 from infthor_eval.tables import Column, Row, Table
 
@@ -31,7 +31,9 @@ def guessers_table(questions: Sequence[AuditedQuestion]) -> Table:
     ]
     columns = (Column("guesser", False), *(Column(group.name) for group in files))
     note = "Each question is guessed from questions on other trajectories in its file; nobody sees a frame."
-    return Table("What can be guessed, % by guesser and file (strict scorer)", columns, tuple(rows), (note,))
+    return Table(
+        "What can be guessed, % by guesser and file (strict scorer)", columns, tuple(rows), (note,)
+    )
 
 
 def audit_tables(questions: Sequence[AuditedQuestion]) -> list[Table]:
@@ -72,7 +74,10 @@ def runs_table(runs: Sequence[RunSummary]) -> Table:
                 cells = (f"{100 * score.score:.1f}", f"{100 * score.guess:.1f}{mark}")
                 points = f"{100 * (score.score - score.guess):+.1f}"
                 rows.append(
-                    Row((name_of(run), name, form, str(score.n), *cells, points), ends_section=number == len(forms))
+                    Row(
+                        (name_of(run), name, form, str(score.n), *cells, points),
+                        ends_section=number == len(forms),
+                    )
                 )
     heads = [Column(name, False) for name in ("model", "task", "form of question")]
     note = "solved: guessing gets nearly all of it, so it is not in the score above guessing."
@@ -83,7 +88,9 @@ def runs_table(runs: Sequence[RunSummary]) -> Table:
 def balanced_table(balanced: Balanced) -> Table:
     """Return what a balanced part kept of each form."""
     rows = [Row((name, str(kept), str(n))) for name, (kept, n) in balanced.kept.items()]
-    rows.append(Row(("all", str(len(balanced.questions)), str(sum(n for _, n in balanced.kept.values())))))
+    rows.append(
+        Row(("all", str(len(balanced.questions)), str(sum(n for _, n in balanced.kept.values()))))
+    )
     note = (
         f"Best guesser on the part: {balanced.best}, {100 * balanced.best_score:.1f} %; chance "
         f"{100 * balanced.chance:.1f} %. In no form is a guesser more than {100 * MARGIN:.0f} points above chance."

@@ -61,7 +61,10 @@ def balance(questions: Sequence[Question]) -> Balanced:
     kept = {name: (after[name], n) for name, n in sorted(before.items())}
     if not left:
         return Balanced((), 0.0, "none", 0.0, kept)
-    means = [sum(right[question.id][place] for question in left) / len(left) for place in range(len(GUESSERS))]
+    means = [
+        sum(right[question.id][place] for question in left) / len(left)
+        for place in range(len(GUESSERS))
+    ]
     best = max(range(len(means)), key=means.__getitem__)
     by_form = _by_form(left)
     chance = sum(_chance(group) * len(group) for group in by_form.values()) / len(left)
@@ -92,7 +95,9 @@ def _cut_answers(questions: Sequence[Question]) -> list[Question]:
             by_answer.setdefault(doc_target(question), []).append(question)
         commonest = sorted(by_answer.values(), key=len, reverse=True)
         n_answers, most = _best_cut([len(of_answer) for of_answer in commonest])
-        chosen |= {question.id for of_answer in commonest[:n_answers] for question in of_answer[:most]}
+        chosen |= {
+            question.id for of_answer in commonest[:n_answers] for question in of_answer[:most]
+        }
     return [question for question in questions if question.id in chosen]
 
 
@@ -118,23 +123,31 @@ def _guess(questions: Sequence[Question]) -> dict[str, tuple[float, ...]]:
     return dict(zip(ids, score_guesses(questions) if questions else [], strict=True))
 
 
-def _surplus(questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]) -> dict[str, int]:
+def _surplus(
+    questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]
+) -> dict[str, int]:
     """Return half of what the best guesser of a form gets right beyond chance, if it is beyond the margin too."""
     surplus = {}
     for form, group in _by_form(questions).items():
         chance = _chance(group)
-        best = max(sum(right[question.id][place] for question in group) for place in range(len(GUESSERS)))
+        best = max(
+            sum(right[question.id][place] for question in group) for place in range(len(GUESSERS))
+        )
         if best > (chance + MARGIN) * len(group):
             surplus[form] = max(1, round((best - chance * len(group)) / 2))
     return surplus
 
 
 def _prune(
-    questions: Sequence[Question], right: Mapping[str, tuple[float, ...]], surplus: Mapping[str, int]
+    questions: Sequence[Question],
+    right: Mapping[str, tuple[float, ...]],
+    surplus: Mapping[str, int],
 ) -> list[Question]:
     """Return the questions without those, in forms with a surplus, that most guessers get right."""
     gone: set[str] = set()
     for form, group in _by_form(questions).items():
-        easiest = sorted(group, key=lambda question: -sum(right[question.id]))  # stable: the first of equals
+        easiest = sorted(
+            group, key=lambda question: -sum(right[question.id])
+        )  # stable: the first of equals
         gone |= {question.id for question in easiest[: surplus.get(form, 0)]}
     return [question for question in questions if question.id not in gone]

@@ -86,7 +86,9 @@ class Guesser:
             return ""
         with np.errstate(divide="ignore"):
             prior = np.log(counts / counts.sum())
-            evidence = [np.log(self._probability(chain, counts, group)) for chain in self._chains(sample)]
+            evidence = [
+                np.log(self._probability(chain, counts, group)) for chain in self._chains(sample)
+            ]
         known = np.flatnonzero(counts)
         total = prior[known] + sum(item[known] - prior[known] for item in evidence)
         return self._answers[known[np.argmax(np.round(total, _DIGITS))]]
@@ -106,7 +108,11 @@ class Guesser:
         for context in chain:
             seen = self._others(context, group)
             n_different = len(seen)
-            mixed = (self._vector(seen) + n_different * mixed) / (seen.total() + n_different) if seen else mixed
+            mixed = (
+                (self._vector(seen) + n_different * mixed) / (seen.total() + n_different)
+                if seen
+                else mixed
+            )
         return mixed
 
     def _vector(self, counts: Counter[int]) -> np.ndarray:

@@ -63,16 +63,22 @@ def _guess_constant(samples: Sequence[Sample], group_of: Callable[[Sample], str]
     return guesses
 
 
-def _guess_by_chains(samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]) -> list[str]:
+def _guess_by_chains(
+    samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]
+) -> list[str]:
     guesser = Guesser(samples, chains)
     return [guesser.guess(sample) for sample in samples]
 
 
 _WORDS, _NUMBER, _PLACE = Knowledge.WORDS, Knowledge.NUMBER, Knowledge.PLACE
 GUESSERS = (
-    NamedGuesser("one answer a file", Knowledge.FILE, partial(_guess_constant, group_of=lambda _: "")),
     NamedGuesser(
-        "one answer a form", _WORDS, partial(_guess_constant, group_of=lambda sample: form_of(sample.question))
+        "one answer a file", Knowledge.FILE, partial(_guess_constant, group_of=lambda _: "")
+    ),
+    NamedGuesser(
+        "one answer a form",
+        _WORDS,
+        partial(_guess_constant, group_of=lambda sample: form_of(sample.question)),
     ),
     NamedGuesser("words (blind)", _WORDS, partial(_guess_by_chains, chains=chains_of_words)),
     NamedGuesser(
@@ -81,13 +87,19 @@ GUESSERS = (
         partial(_guess_by_chains, chains=chains_of_words_and_count),
     ),
     NamedGuesser(
-        "words, place of the clues", _WORDS | _PLACE, partial(_guess_by_chains, chains=chains_of_words_and_place)
+        "words, place of the clues",
+        _WORDS | _PLACE,
+        partial(_guess_by_chains, chains=chains_of_words_and_place),
     ),
     NamedGuesser("learner: words", _WORDS, partial(guess_by_learning, number=False, place=False)),
     NamedGuesser(
-        "learner: words, number of frames", _WORDS | _NUMBER, partial(guess_by_learning, number=True, place=False)
+        "learner: words, number of frames",
+        _WORDS | _NUMBER,
+        partial(guess_by_learning, number=True, place=False),
     ),
     NamedGuesser(
-        "learner: words, number, place", _WORDS | _NUMBER | _PLACE, partial(guess_by_learning, number=True, place=True)
+        "learner: words, number, place",
+        _WORDS | _NUMBER | _PLACE,
+        partial(guess_by_learning, number=True, place=True),
     ),
 )

@@ -10,19 +10,25 @@ from threading import Lock
 import msgspec
 
 import infthor_eval.nieh
-from infthor_eval.formats.digests import digest_of_files, fingerprint
-from infthor_eval.formats.files import write_atomically
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
-from infthor_eval.formats.user_cache import user_cache
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.forms import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
 from infthor_eval.nieh.records import Guess
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score, scores
+from infthor_eval.storage.digests import digest_of_files, fingerprint
+from infthor_eval.storage.files import write_atomically
+from infthor_eval.storage.user_cache import user_cache
 
-__all__ = ["find_guesses", "questions_by_file", "sample_on_clues", "score_guesses", "visible_knowledge"]
+__all__ = [
+    "find_guesses",
+    "questions_by_file",
+    "sample_on_clues",
+    "score_guesses",
+    "visible_knowledge",
+]
 
 _Scores = Sequence[Mapping[str, float]]  # by scorer, of each question
 
@@ -35,7 +41,9 @@ def visible_knowledge(context: str) -> Knowledge:
     return Knowledge.WORDS | Knowledge.NUMBER if context == "clues" else Knowledge.WORDS
 
 
-_LEARNING = Lock()  # questions that are asked at once need the same guesses: one learns them, the others wait
+_LEARNING = (
+    Lock()
+)  # questions that are asked at once need the same guesses: one learns them, the others wait
 
 
 def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
@@ -74,7 +82,10 @@ def _learn_guesses(data: NiehSet, knowledge: Knowledge) -> dict[str, Guess]:
     for questions in questions_by_file(data).values():
         samples = [sample_on_clues(question) for question in questions]
         by_guesser = [
-            [scores(reply, question.answers) for reply, question in zip(guesser.guess(samples), questions, strict=True)]
+            [
+                scores(reply, question.answers)
+                for reply, question in zip(guesser.guess(samples), questions, strict=True)
+            ]
             for guesser in GUESSERS
             if guesser.knows in knowledge
         ]
@@ -90,7 +101,9 @@ def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
     return by_file
 
 
-def score_guesses(questions: Sequence[Question], scorer: Scorer = "strict") -> list[tuple[float, ...]]:
+def score_guesses(
+    questions: Sequence[Question], scorer: Scorer = "strict"
+) -> list[tuple[float, ...]]:
     """Return for each question of a file the scores of all guessers, in their order."""
     samples = [sample_on_clues(question) for question in questions]
     by_guesser = [guesser.guess(samples) for guesser in GUESSERS]
@@ -111,7 +124,9 @@ def _best_by_form(questions: Sequence[Question], by_guesser: Sequence[_Scores]) 
         places.setdefault(form_of(question), []).append(place)
     guesses = {}
     for form, of_form in places.items():
-        best: dict[str, _Scores] = {scorer: _best(by_guesser, of_form, scorer) for scorer in SCORERS}
+        best: dict[str, _Scores] = {
+            scorer: _best(by_guesser, of_form, scorer) for scorer in SCORERS
+        }
         means = {scorer: _mean(scored, of_form, scorer) for scorer, scored in best.items()}
         for place in of_form:
             own = {scorer: scored[place][scorer] for scorer, scored in best.items()}

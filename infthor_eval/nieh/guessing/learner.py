@@ -40,7 +40,9 @@ def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -
     n_groups = len(set(groups))
     if n_groups < 2:
         return [""] * len(samples)
-    features = DictVectorizer().fit_transform([_features(sample, number, place) for sample in samples])
+    features = DictVectorizer().fit_transform(
+        [_features(sample, number, place) for sample in samples]
+    )
     answers = np.array([doc_target(sample.question) for sample in samples], dtype=object)
     guesses = np.empty(len(samples), dtype=object)
     # These products are small: on a busy machine threads that wait for each other take ten times as long as one.
@@ -62,5 +64,13 @@ def _features(sample: Sample, number: bool, place: bool) -> dict[str, float]:
         names.append(f"#number {len(sample.frames)}")
     if place:
         first, last = sample.frames[0], sample.frames[-1]
-        names += [f"#first {first // _PLACE}", f"#last {last // _PLACE}", f"#span {(last - first).bit_length()}"]
-    return {f"#form {form}": 1.0, **dict.fromkeys(names, 1.0), **{f"{form}: {name}": 1.0 for name in names}}
+        names += [
+            f"#first {first // _PLACE}",
+            f"#last {last // _PLACE}",
+            f"#span {(last - first).bit_length()}",
+        ]
+    return {
+        f"#form {form}": 1.0,
+        **dict.fromkeys(names, 1.0),
+        **{f"{form}: {name}": 1.0 for name in names},
+    }

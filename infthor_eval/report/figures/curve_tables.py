@@ -9,7 +9,15 @@ from infthor_eval.errors import DataError
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
-__all__ = ["Panel", "curves_table", "embedded_label", "embedded_note", "one_panel", "read_panels", "trajectories_text"]
+__all__ = [
+    "Panel",
+    "curves_table",
+    "embedded_label",
+    "embedded_note",
+    "one_panel",
+    "read_panels",
+    "trajectories_text",
+]
 
 _MOST_PANELS = 12  # a figure with more cannot be read
 _COLUMNS = ("reward", "95 % interval", "of the bound, %")
@@ -44,7 +52,9 @@ def read_panels(path: Path, curves: RewardCurves) -> list[Panel]:
     if not isinstance(panels, dict) or not panels:
         raise DataError(f"{path}: not a mapping; {fix}")
     if len(panels) > _MOST_PANELS:
-        raise DataError(f"{path}: {len(panels)} panels, and a figure takes {_MOST_PANELS}; write several files")
+        raise DataError(
+            f"{path}: {len(panels)} panels, and a figure takes {_MOST_PANELS}; write several files"
+        )
     return [_panel(path, str(title), named, curves) for title, named in panels.items()]
 
 
@@ -54,13 +64,17 @@ def _panel(path: Path, title: str, named: object, curves: RewardCurves) -> Panel
     labels = [run.label for run in curves.runs]
     for name in map(str, named):
         if name not in labels:
-            raise DataError(f"{path}: {title!r:.60}: {name!r:.60} is none of the runs; there are {', '.join(labels)}")
+            raise DataError(
+                f"{path}: {title!r:.60}: {name!r:.60} is none of the runs; there are {', '.join(labels)}"
+            )
     return Panel(title, tuple(dict.fromkeys(map(str, named))))
 
 
 def embedded_label(curves: RewardCurves) -> str | None:
     """Return the note on runs in the embedded simulator; None if there are none."""
-    return embedded_note([run.label for run in curves.runs if run.is_embedded], len(curves.runs), "curves")
+    return embedded_note(
+        [run.label for run in curves.runs if run.is_embedded], len(curves.runs), "curves"
+    )
 
 
 def embedded_note(labels: Sequence[str], n_labels: int, what: str) -> str | None:
@@ -83,10 +97,15 @@ def curves_table(curves: RewardCurves) -> Table:
     facets = curves.facets.values()
     earned = [facet.earned for facet in facets if facet.earned is not None]
     end_at = [facet.end_at for facet in facets if facet.end_at is not None]
-    columns = (Column("run", False), *map(Column, (*_COLUMNS, *earned, *end_at, *curves.runs[0].counts)))
+    columns = (
+        Column("run", False),
+        *map(Column, (*_COLUMNS, *earned, *end_at, *curves.runs[0].counts)),
+    )
     label = embedded_label(curves)
     notes = ((label,) if label else ()) + curves.notes
-    title = f"{curves.task}: reward at the end, mean over {trajectories_text(curves.n_trajectories)}"
+    title = (
+        f"{curves.task}: reward at the end, mean over {trajectories_text(curves.n_trajectories)}"
+    )
     return Table(title, columns, tuple(_row(run, bound, curves) for run in curves.runs), notes)
 
 
@@ -100,6 +119,24 @@ def _row(run: RunCurves, bound: float, curves: RewardCurves) -> Row:
     interval = interval_cell(end.low, end.high, ".2f")
     share = f"{100 * end.mean / bound:.1f}" if bound > 0 else "-"
     curves_of_run = [(facet, run.curves.get(name)) for name, facet in curves.facets.items()]
-    earned = ("-" if curve is None else f"{curve.end.mean:.2f}" for facet, curve in curves_of_run if facet.earned)
-    places = ("-" if curve is None else f"{curve.places[-1]:.0f}" for facet, curve in curves_of_run if facet.end_at)
-    return Row((run.label, f"{end.mean:.2f}", interval, share, *earned, *places, *map(str, run.counts.values())))
+    earned = (
+        "-" if curve is None else f"{curve.end.mean:.2f}"
+        for facet, curve in curves_of_run
+        if facet.earned
+    )
+    places = (
+        "-" if curve is None else f"{curve.places[-1]:.0f}"
+        for facet, curve in curves_of_run
+        if facet.end_at
+    )
+    return Row(
+        (
+            run.label,
+            f"{end.mean:.2f}",
+            interval,
+            share,
+            *earned,
+            *places,
+            *map(str, run.counts.values()),
+        )
+    )

@@ -10,7 +10,15 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from infthor_eval.episodes.curves import Curve, Facet, RewardCurves, RunCurves
 from infthor_eval.report.figures.curve_tables import Panel, embedded_label, trajectories_text
-from infthor_eval.report.figures.style import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
+from infthor_eval.report.figures.style import (
+    BOUND,
+    LEGEND,
+    Look,
+    add_legend,
+    add_words,
+    looks_of,
+    save_figure,
+)
 from infthor_eval.terminal import printable
 
 __all__ = ["curves_figure", "draw_curves"]
@@ -21,14 +29,20 @@ _IN_THOUSANDS = 10_000  # end of an x axis from which its ticks are in thousands
 _LINE = 0.2  # inches of a line of the legend
 
 
-def draw_curves(curves: RewardCurves, panels: Sequence[Panel], folder: Path, name: str) -> list[Path]:
+def draw_curves(
+    curves: RewardCurves, panels: Sequence[Panel], folder: Path, name: str
+) -> list[Path]:
     """Write `curves_figure` into files; see `save_figure`."""
     return save_figure(lambda: curves_figure(curves, panels), folder, name)
 
 
 def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
     """Return a figure with a row per panel, with the bound in each, and a column for each facet that some run has."""
-    facets = {name: facet for name, facet in curves.facets.items() if any(name in run.curves for run in curves.runs)}
+    facets = {
+        name: facet
+        for name, facet in curves.facets.items()
+        if any(name in run.curves for run in curves.runs)
+    }
     width = len(facets) * (_PANEL[0] if len(facets) < 3 else _NARROW) + LEGEND
     height = max(_PANEL[1], _LINE * (len(curves.runs) + 1))
     figure = Figure(figsize=(width, len(panels) * height + _MARGIN), layout="constrained")
@@ -54,7 +68,9 @@ def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], looks: Mapping[str, Look]) -> None:
+def _draw_panel(
+    axes: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], looks: Mapping[str, Look]
+) -> None:
     for order, run in enumerate(runs, 3):  # above the grid; the bound, the last, on top
         if name in run.curves:
             _draw_curve(axes, run.curves[name], looks[run.label], order)
@@ -67,19 +83,35 @@ def _draw_panel(axes: Axes, name: str, facet: Facet, runs: Sequence[RunCurves], 
 
 def _place_text(axes: Axes, value: float, _: object) -> str:
     """Return the text of a tick: in thousands where the axis is that long, as the paper's are."""
-    return f"{value / 1_000:,g}K" if value and axes.get_xlim()[1] >= _IN_THOUSANDS else f"{value:,.0f}"
+    return (
+        f"{value / 1_000:,g}K" if value and axes.get_xlim()[1] >= _IN_THOUSANDS else f"{value:,.0f}"
+    )
 
 
 def _draw_curve(axes: Axes, curve: Curve, look: Look, order: int) -> None:
     means = [estimate.mean for estimate in curve.means]
     axes.plot(
-        curve.places, means, drawstyle="steps-post", color=look.colour, ls=look.style, lw=look.width, zorder=order
+        curve.places,
+        means,
+        drawstyle="steps-post",
+        color=look.colour,
+        ls=look.style,
+        lw=look.width,
+        zorder=order,
     )
     # A dot marks the end: where contexts were cut, many plans end at the last place and the line rises there.
     axes.plot(curve.places[-1:], means[-1:], marker="o", ms=3.5, color=look.colour, zorder=order)
-    low = [mean if estimate.low is None else estimate.low for mean, estimate in zip(means, curve.means, strict=True)]
-    high = [mean if estimate.high is None else estimate.high for mean, estimate in zip(means, curve.means, strict=True)]
-    axes.fill_between(curve.places, low, high, step="post", color=look.colour, alpha=0.13, linewidth=0, zorder=2)
+    low = [
+        mean if estimate.low is None else estimate.low
+        for mean, estimate in zip(means, curve.means, strict=True)
+    ]
+    high = [
+        mean if estimate.high is None else estimate.high
+        for mean, estimate in zip(means, curve.means, strict=True)
+    ]
+    axes.fill_between(
+        curve.places, low, high, step="post", color=look.colour, alpha=0.13, linewidth=0, zorder=2
+    )
 
 
 def _heading(curves: RewardCurves) -> list[str]:

@@ -7,10 +7,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
-from infthor_eval.manipulation.radii import RadiusLine, SuccessByRadius
+from infthor_eval.manipulation.recorded.radii import RadiusLine, SuccessByRadius
 from infthor_eval.rates import Rate, format_percent
 from infthor_eval.report.figures.curve_tables import embedded_note, trajectories_text
-from infthor_eval.report.figures.style import BOUND, LEGEND, Look, add_legend, add_words, looks_of, save_figure
+from infthor_eval.report.figures.style import (
+    BOUND,
+    LEGEND,
+    Look,
+    add_legend,
+    add_words,
+    looks_of,
+    save_figure,
+)
 from infthor_eval.tables import Column, Row, Table
 
 __all__ = ["draw_radii", "radii_figure", "radii_table"]
@@ -30,7 +38,10 @@ def radii_table(success: SuccessByRadius) -> Table:
     """Return a table with a row per model and kind and a column per radius."""
     all_points = (success.floor, *(line.points for line in success.lines))
     radii = sorted({radius for points in all_points for radius, _ in points})
-    rows = [_row(line.label, line.kind, line.points, radii, str(line.n_failed)) for line in success.lines]
+    rows = [
+        _row(line.label, line.kind, line.points, radii, str(line.n_failed))
+        for line in success.lines
+    ]
     if success.floor:
         rows.append(_row(f"({_FLOOR})", ManipulationKind.PICKUP, success.floor, radii, "-"))
     names = (*(f"{radius:g} m" for radius in radii), "episodes", "failed")
@@ -40,7 +51,11 @@ def radii_table(success: SuccessByRadius) -> Table:
 
 
 def _row(
-    label: str, kind: ManipulationKind, points: Sequence[tuple[float, Rate]], radii: Sequence[float], end: str
+    label: str,
+    kind: ManipulationKind,
+    points: Sequence[tuple[float, Rate]],
+    radii: Sequence[float],
+    end: str,
 ) -> Row:
     rates = dict(points)
     cells = (format_percent(rates.get(radius)) for radius in radii)
@@ -75,7 +90,9 @@ def _draw_floor(axes: Axes, points: Sequence[tuple[float, Rate]]) -> None:
     """Draw the success of an arm that only closes its hand, below all lines."""
     radii, means = [radius for radius, _ in points], [100 * rate.mean for _, rate in points]
     axes.fill_between(radii, means, color=_FLOOR_LOOK.colour, alpha=0.15, linewidth=0, zorder=1)
-    axes.plot(radii, means, color=_FLOOR_LOOK.colour, lw=_FLOOR_LOOK.width, zorder=2.5, marker="o", ms=5)
+    axes.plot(
+        radii, means, color=_FLOOR_LOOK.colour, lw=_FLOOR_LOOK.width, zorder=2.5, marker="o", ms=5
+    )
 
 
 def _draw_panel(axes: Axes, lines: Sequence[RadiusLine], looks: Mapping[str, Look]) -> None:
@@ -85,7 +102,16 @@ def _draw_panel(axes: Axes, lines: Sequence[RadiusLine], looks: Mapping[str, Loo
         means = [100 * rate.mean for _, rate in line.points]
         low = [100 * (rate.mean if rate.low is None else rate.low) for _, rate in line.points]
         high = [100 * (rate.mean if rate.high is None else rate.high) for _, rate in line.points]
-        axes.plot(radii, means, color=look.colour, ls=look.style, lw=look.width, marker="o", ms=3.5, zorder=order)
+        axes.plot(
+            radii,
+            means,
+            color=look.colour,
+            ls=look.style,
+            lw=look.width,
+            marker="o",
+            ms=3.5,
+            zorder=order,
+        )
         # Beside the points: intervals of several lines would hide each other.
         offset = [radius + _OFFSET * (order - 2 - len(lines) / 2) for radius in radii]
         axes.vlines(offset, low, high, color=look.colour, lw=1.2, alpha=0.55, zorder=2.8)
@@ -100,5 +126,7 @@ def _heading(success: SuccessByRadius) -> list[str]:
 def _label(success: SuccessByRadius) -> tuple[str, ...]:
     """Return the note on numbers of the embedded simulator."""
     by_label = {line.label: line.is_embedded for line in success.lines}
-    label = embedded_note([name for name, is_embedded in by_label.items() if is_embedded], len(by_label), "results")
+    label = embedded_note(
+        [name for name, is_embedded in by_label.items() if is_embedded], len(by_label), "results"
+    )
     return () if label is None else (label,)

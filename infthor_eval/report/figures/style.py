@@ -15,10 +15,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.formats.files import write_atomically
+from infthor_eval.storage.files import write_atomically
 from infthor_eval.terminal import printable
 
-__all__ = ["BOUND", "LEGEND", "Look", "add_legend", "add_words", "inline_svg", "looks_of", "save_figure"]
+__all__ = [
+    "BOUND",
+    "LEGEND",
+    "Look",
+    "add_legend",
+    "add_words",
+    "inline_svg",
+    "looks_of",
+    "save_figure",
+]
 
 # Okabe and Ito's colours, which colour-blind readers can tell apart, without yellow (too faint for a line) and black
 # (the bound's). Runs beyond their number take them again with another style of line; dashes are the bound's.
@@ -40,10 +49,17 @@ _SVG_METADATA: dict[str, Any] = {"Date": None}  # a date would make equal figure
 # On a page, ink takes the page's colours, which matplotlib cannot write: these placeholders are replaced afterwards.
 _INK, _GRID = "#010203", "#040506"
 _PAGE_SETTINGS: dict[Any, Any] = {
-    **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK),
+    **dict.fromkeys(
+        ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK
+    ),
     "grid.color": _GRID,
 }
-_PAGE_COLOURS = {_INK: "currentColor", _GRID: "var(--grid)", "#000000": "currentColor", "#444444": "currentColor"}
+_PAGE_COLOURS = {
+    _INK: "currentColor",
+    _GRID: "var(--grid)",
+    "#000000": "currentColor",
+    "#444444": "currentColor",
+}
 _PER_INCH = 108  # pixels; letters are then as large as the page's
 # The size of the svg element, which has a viewBox too.
 _SIZE = re.compile(r' (?:width|height)="[^"]*"(?: (?:width|height)="[^"]*")?')
@@ -125,23 +141,34 @@ def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
 
 def _save(figure: Figure, path: Path, form: str) -> Path:
     metadata = _SVG_METADATA if form == "svg" else {}
-    with wrap_errors(f"{path}: cannot be written", "give another --out"), write_atomically(path) as partial:
+    with (
+        wrap_errors(f"{path}: cannot be written", "give another --out"),
+        write_atomically(path) as partial,
+    ):
         figure.savefig(partial, format=form, dpi=160, metadata=metadata)
     return path
 
 
 def add_legend(axes: Axes, entries: Sequence[tuple[str, Look]]) -> None:
     """Add a legend beside a panel: names with their lines."""
-    handles = [Line2D([], [], color=look.colour, ls=look.style, lw=look.width) for _, look in entries]
+    handles = [
+        Line2D([], [], color=look.colour, ls=look.style, lw=look.width) for _, look in entries
+    ]
     names = ["\n".join(textwrap.wrap(printable(label), _NAME)) for label, _ in entries]
-    axes.legend(handles, names, loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, borderaxespad=0)
+    axes.legend(
+        handles, names, loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, borderaxespad=0
+    )
 
 
 def add_words(figure: Figure, heading: Sequence[str], notes: Sequence[str], width: float) -> None:
     """Write the lines of the heading above the panels, and the notes below them; `width` is the figure's, in inches."""
     settings: dict[str, Any] = {"x": 0.01, "ha": "left"}
-    wrapped = [part for line in heading for part in textwrap.wrap(printable(line), round(width * 12))]
+    wrapped = [
+        part for line in heading for part in textwrap.wrap(printable(line), round(width * 12))
+    ]
     figure.suptitle("\n".join(wrapped), fontsize=10, **settings)
-    remarks = [part for note in notes for part in textwrap.wrap(printable(note), round(width * _LETTERS))]
+    remarks = [
+        part for note in notes for part in textwrap.wrap(printable(note), round(width * _LETTERS))
+    ]
     if remarks:
         figure.supxlabel("\n".join(remarks), fontsize=8, color="#444444", **settings)

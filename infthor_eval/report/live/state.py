@@ -14,9 +14,9 @@ from infthor_eval.rates import Rate
 from infthor_eval.report.presenter import Presenter
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.runs import NOTHING, Suite, UnitRecord, Usage
-from infthor_eval.runs.following import FollowedJournal, is_written
-from infthor_eval.runs.run_search import Results, read_results, run_folders
-from infthor_eval.runs.shards import FOLDER
+from infthor_eval.runs.journals.following import FollowedJournal, is_written
+from infthor_eval.runs.journals.shards import FOLDER
+from infthor_eval.runs.stored.search import Results, read_results, run_folders
 
 __all__ = ["LiveRun", "LiveSample", "LiveState", "Totals"]
 
@@ -118,7 +118,11 @@ class LiveRun:
         self._asking = Lock()
         self._run: Path | None = None
         self._journal: FollowedJournal | None = None
-        self._totals, self._metrics, self._failures = Totals(), dict[str, Rate](), tuple[LiveSample, ...]()
+        self._totals, self._metrics, self._failures = (
+            Totals(),
+            dict[str, Rate](),
+            tuple[LiveSample, ...](),
+        )
         self._has_new_metrics, self._metrics_due = False, 0.0
 
     def state(self) -> LiveState:
@@ -126,7 +130,9 @@ class LiveRun:
         with self._asking:
             folder = str(self._run or self._folder)
             try:
-                with wrap_errors(f"{folder}: cannot be read", "restore it"):  # also what is set aside just now
+                with wrap_errors(
+                    f"{folder}: cannot be read", "restore it"
+                ):  # also what is set aside just now
                     return self._read()
             except InfthorError as error:
                 return LiveState(status="unknown", folder=folder, problem=str(error))
@@ -165,7 +171,9 @@ class LiveRun:
             tasks=tuple(run.tasks),
             simulator=run.simulator,
             age=_age(self._run),
-            n_units=header.n_units if header.n_units is not None else _n_units(results, self._totals.n_done),
+            n_units=header.n_units
+            if header.n_units is not None
+            else _n_units(results, self._totals.n_done),
             totals=self._totals,
             measure=presenter.measure,
             target_label=presenter.target_label,

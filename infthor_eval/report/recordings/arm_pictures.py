@@ -5,7 +5,7 @@ from functools import partial
 
 from PIL import Image
 
-from infthor_eval.manipulation.replay_frames import ArmFrame
+from infthor_eval.manipulation.recorded.replay_frames import ArmFrame
 from infthor_eval.report.recordings.canvas import (
     BAD,
     FAINT,
@@ -27,7 +27,9 @@ __all__ = ["arm_pictures", "draw_arm_frame", "draw_arm_title"]
 
 def arm_pictures(frames: Iterable[ArmFrame], heading: str) -> Iterator[Image.Image]:
     """Draw frames with a heading, the run and the trajectory; see `film_pictures`."""
-    return film_pictures(frames, partial(draw_arm_title, heading=heading), partial(draw_arm_frame, heading=heading))
+    return film_pictures(
+        frames, partial(draw_arm_title, heading=heading), partial(draw_arm_frame, heading=heading)
+    )
 
 
 def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
@@ -39,7 +41,14 @@ def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
         Line("", place, 26, colour=FAINT),
         Line("", one_line(title.instruction), 46, "-Bold", most=2),
         Line("", settings, 20, colour=FAINT),
-        Line("", one_line(frame.ending) if frame.observation is None else "", 24, "-Bold", BAD, most=3),
+        Line(
+            "",
+            one_line(frame.ending) if frame.observation is None else "",
+            24,
+            "-Bold",
+            BAD,
+            most=3,
+        ),
     ]
     return title_card(heading, lines)
 
@@ -68,13 +77,22 @@ def draw_arm_frame(frame: ArmFrame, heading: str) -> Image.Image:
 
 def _lines(frame: ArmFrame) -> list[Line]:
     title = frame.title
-    lines = [Line(f"{title.kind} {title.number} of {title.n_episodes}", title.instruction, 22, "-Bold")]
+    lines = [
+        Line(f"{title.kind} {title.number} of {title.n_episodes}", title.instruction, 22, "-Bold")
+    ]
     label = f"step {frame.number} of {title.n_steps}"
     if frame.number:
-        lines += [Line(label if not n else "", text, 16, "Mono", most=2) for n, text in enumerate(frame.requests)]
+        lines += [
+            Line(label if not n else "", text, 16, "Mono", most=2)
+            for n, text in enumerate(frame.requests)
+        ]
     else:
         lines.append(Line("", "the episode begins", 18, colour=FAINT))
-    lines += [Line("refused", "; ".join(frame.refusals), 16, colour=BAD, most=2)] if frame.refusals else []
+    lines += (
+        [Line("refused", "; ".join(frame.refusals), 16, colour=BAD, most=2)]
+        if frame.refusals
+        else []
+    )
     lines += [Line("differs", frame.note, 15, colour=WARN, most=2)] if frame.note else []
     return lines
 

@@ -67,7 +67,9 @@ class Line(NamedTuple):
 
 
 def film_pictures(
-    frames: Iterable[Any], draw_title: Callable[[Any], Image.Image], draw: Callable[[Any], Image.Image]
+    frames: Iterable[Any],
+    draw_title: Callable[[Any], Image.Image],
+    draw: Callable[[Any], Image.Image],
 ) -> Iterator[Image.Image]:
     """Draw the frames of episodes in time order: before each episode its title, and its end several times."""
     for frame in frames:
@@ -90,7 +92,9 @@ def title_card(heading: str, lines: Iterable[Line]) -> Image.Image:
     return picture
 
 
-def draw_panes(heading: str, left: Image.Image, right: Image.Image) -> tuple[Image.Image, ImageDraw.ImageDraw]:
+def draw_panes(
+    heading: str, left: Image.Image, right: Image.Image
+) -> tuple[Image.Image, ImageDraw.ImageDraw]:
     """Return a picture with its two panes, and a pen for the text below them."""
     picture, pen = _blank(heading)
     picture.paste(left.resize((PANE, PANE), Image.Resampling.BICUBIC), (_EDGE, _TOP))
@@ -137,13 +141,17 @@ def write_bar(pen: ImageDraw.ImageDraw, share: float) -> None:
         pen.rectangle((left, y, left + share * (right - left), y + 10), fill=_BAR)
 
 
-def write_in_hand(pen: ImageDraw.ImageDraw, objects: Sequence[str], ending: str, *, is_good: bool) -> None:
+def write_in_hand(
+    pen: ImageDraw.ImageDraw, objects: Sequence[str], ending: str, *, is_good: bool
+) -> None:
     """Write the objects in the hand, and how the episode ended; `ending` is empty while it goes on."""
     y = _BELOW + 112.0
     names = ", ".join(objects)
     pen.text((_RIGHT, y + 16), "in hand", font=font(14), fill=FAINT, anchor="ls")
     text = fit_line(one_line(names) or "nothing", font(16), SIZE[0] - _EDGE - _RIGHT - 90)
-    pen.text((SIZE[0] - _EDGE, y + 16), text, font=font(16), fill=INK if names else FAINT, anchor="rs")
+    pen.text(
+        (SIZE[0] - _EDGE, y + 16), text, font=font(16), fill=INK if names else FAINT, anchor="rs"
+    )
     if not ending:
         return
     box = (_RIGHT, y + 34, SIZE[0] - _EDGE, y + 76)

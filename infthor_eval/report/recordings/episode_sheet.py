@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from PIL import Image, ImageDraw
 
-from infthor_eval.manipulation.replay_frames import ArmFrame
+from infthor_eval.manipulation.recorded.replay_frames import ArmFrame
 from infthor_eval.report.recordings.canvas import BAD, FAINT, GOOD, INK, WARN
 from infthor_eval.report.recordings.fonts import break_lines, fit_line, font, one_line
 from infthor_eval.report.runs import choose_evenly

@@ -5,7 +5,7 @@ from functools import partial
 
 from PIL import Image
 
-from infthor_eval.plans.replay_frames import PlanFrame, PlanTitle
+from infthor_eval.plans.recorded.replay_frames import PlanFrame, PlanTitle
 from infthor_eval.report.recordings.canvas import (
     BAD,
     FAINT,
@@ -28,7 +28,9 @@ __all__ = ["draw_plan_frame", "draw_plan_title", "plan_pictures"]
 
 def plan_pictures(frames: Iterable[PlanFrame], heading: str) -> Iterator[Image.Image]:
     """Draw frames with a heading, the run and the trajectory; see `film_pictures`."""
-    return film_pictures(frames, partial(draw_plan_title, heading=heading), partial(draw_plan_frame, heading=heading))
+    return film_pictures(
+        frames, partial(draw_plan_title, heading=heading), partial(draw_plan_frame, heading=heading)
+    )
 
 
 def draw_plan_title(frame: PlanFrame, heading: str) -> Image.Image:
@@ -40,7 +42,9 @@ def draw_plan_title(frame: PlanFrame, heading: str) -> Image.Image:
         Line("", _place(title), 26, colour=FAINT),
         Line("", one_line(title.text), 46, "-Bold", most=2),
         Line("", f"goal: {one_line(title.goal)}", 24, most=3),
-        Line("", expert if most is None else f"{expert}; at most {most:.1f} points", 20, colour=FAINT),
+        Line(
+            "", expert if most is None else f"{expert}; at most {most:.1f} points", 20, colour=FAINT
+        ),
         Line("", one_line(frame.ending), 24, "-Bold", BAD, most=3),
     ]
     return title_card(heading, lines)
@@ -54,14 +58,19 @@ def draw_plan_frame(frame: PlanFrame, heading: str) -> Image.Image:
     """
     if frame.observation is None:
         raise ValueError("the frame has no observation")
-    picture, pen = draw_panes(heading, Image.fromarray(frame.observation.frame), draw_map(frame.observation, PANE))
+    picture, pen = draw_panes(
+        heading, Image.fromarray(frame.observation.frame), draw_map(frame.observation, PANE)
+    )
     write_lines(pen, _lines(frame))
     rewards = frame.rewards
     step = "-" if rewards.step is None else f"{rewards.step:+.1f}"
     plan = _share(rewards.plan, rewards.max_of_plan)
     so_far = _share(rewards.so_far, rewards.max_so_far)
     write_numbers(pen, [("this action", step), ("this plan", plan), ("so far", so_far)])
-    write_bar(pen, min(max(rewards.so_far / rewards.max_so_far, 0.0), 1.0) if rewards.max_so_far > 0 else 0.0)
+    write_bar(
+        pen,
+        min(max(rewards.so_far / rewards.max_so_far, 0.0), 1.0) if rewards.max_so_far > 0 else 0.0,
+    )
     ending = one_line(frame.ending) + (", and the goal is reached" if frame.goal_reached else "")
     write_in_hand(pen, frame.observation.held, ending if frame.ending else "", is_good=frame.done)
     return picture
@@ -71,7 +80,9 @@ def _lines(frame: PlanFrame) -> list[Line]:
     title = frame.title
     lines = [Line("goal", title.goal, 17, most=2), Line(_place(title), title.text, 22, "-Bold")]
     if frame.number:
-        action = Line("", frame.action, 20, "Mono") if frame.action else Line("", "no valid action", 18)
+        action = (
+            Line("", frame.action, 20, "Mono") if frame.action else Line("", "no valid action", 18)
+        )
         lines.append(action._replace(label=f"action {frame.number} of {title.n_actions}"))
     else:
         lines.append(Line("", "the plan starts", 18, colour=FAINT))

@@ -2,8 +2,14 @@
 
 from PIL import Image, ImageDraw
 
-from infthor_eval.manipulation.replay_frames import NearbyObject, Place, Reach
-from infthor_eval.report.recordings.canvas import FURNITURE, FURNITURE_EDGE, NAMED, NAMED_EDGE, OVERSAMPLING
+from infthor_eval.manipulation.recorded.replay_frames import NearbyObject, Place, Reach
+from infthor_eval.report.recordings.canvas import (
+    FURNITURE,
+    FURNITURE_EDGE,
+    NAMED,
+    NAMED_EDGE,
+    OVERSAMPLING,
+)
 from infthor_eval.report.recordings.fonts import Font, font
 
 __all__ = ["draw_reach"]
@@ -32,7 +38,9 @@ class _Pane:
     def __init__(self, reach: Reach, wide: int, high: int, *, is_above: bool) -> None:
         self._reach, self._size, self._is_above = reach, (wide, high), is_above
         # Objects in front of the arm or behind it would hide it.
-        self._items = [item for item in reach.objects if _is_in_view(item, reach, is_above=is_above)]
+        self._items = [
+            item for item in reach.objects if _is_in_view(item, reach, is_above=is_above)
+        ]
         corners = [self._flat(reach.low), self._flat(reach.high)]
         (left, right), (bottom, top) = (sorted(values) for values in zip(*corners, strict=True))
         # One scale in both views, so that lengths can be compared.
@@ -41,11 +49,15 @@ class _Pane:
         self._middle = (left + right) / 2, (bottom + top) / 2
 
     def draw(self, title: str) -> Image.Image:
-        large = Image.new("RGB", (self._size[0] * OVERSAMPLING, self._size[1] * OVERSAMPLING), _PAPER)
+        large = Image.new(
+            "RGB", (self._size[0] * OVERSAMPLING, self._size[1] * OVERSAMPLING), _PAPER
+        )
         pen = ImageDraw.Draw(large, "RGBA")
         # Large objects first, those that the instruction names last, on top.
         for item in sorted(self._items, key=lambda item: (item.is_named, -_size(item))):
-            fill, edge, width = (NAMED, NAMED_EDGE, 3) if item.is_named else (FURNITURE, FURNITURE_EDGE, 1)
+            fill, edge, width = (
+                (NAMED, NAMED_EDGE, 3) if item.is_named else (FURNITURE, FURNITURE_EDGE, 1)
+            )
             pen.polygon(self._outline(item), fill=fill, outline=edge, width=width * OVERSAMPLING)
         self._draw_arm(pen)
         picture = large.resize(self._size, Image.Resampling.BOX)
@@ -59,9 +71,19 @@ class _Pane:
         reach = self._reach
         x, y = self._fine(reach.hand)
         radius = reach.radius * self._per_metre * OVERSAMPLING
-        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=_SPHERE, outline=_HAND, width=OVERSAMPLING)
+        pen.ellipse(
+            (x - radius, y - radius, x + radius, y + radius),
+            fill=_SPHERE,
+            outline=_HAND,
+            width=OVERSAMPLING,
+        )
         if len(reach.path) > 1:
-            pen.line([self._fine(place) for place in reach.path], fill=_PATH, width=4 * OVERSAMPLING, joint="curve")
+            pen.line(
+                [self._fine(place) for place in reach.path],
+                fill=_PATH,
+                width=4 * OVERSAMPLING,
+                joint="curve",
+            )
         joints = [self._fine(joint) for joint in reach.joints]
         pen.line([*joints, (x, y)], fill=_ARM, width=3 * OVERSAMPLING, joint="curve")
         for place in joints:
@@ -74,13 +96,25 @@ class _Pane:
         for item in sorted(self._items, key=lambda item: not item.is_named):
             face = font(13, "-Bold") if item.is_named else font(12)
             place = self._name_place(item, face)
-            if place is None or any(abs(place[0] - x) < 90 and abs(place[1] - y) < 16 for x, y in occupied):
+            if place is None or any(
+                abs(place[0] - x) < 90 and abs(place[1] - y) < 16 for x, y in occupied
+            ):
                 continue
             occupied.append(place)
-            pen.text(place, item.name, font=face, fill=_INK, anchor="mm", stroke_width=2, stroke_fill="white")
+            pen.text(
+                place,
+                item.name,
+                font=face,
+                fill=_INK,
+                anchor="mm",
+                stroke_width=2,
+                stroke_fill="white",
+            )
 
     def _name_place(self, item: NearbyObject, face: Font) -> tuple[float, float] | None:
-        xs, ys = zip(*((x / OVERSAMPLING, y / OVERSAMPLING) for x, y in self._outline(item)), strict=True)
+        xs, ys = zip(
+            *((x / OVERSAMPLING, y / OVERSAMPLING) for x, y in self._outline(item)), strict=True
+        )
         left, right = max(min(xs), 0), min(max(xs), self._size[0])
         top, bottom = max(min(ys), _HEAD), min(max(ys), self._size[1])
         half = face.getlength(item.name) / 2 + 4
@@ -119,7 +153,9 @@ def _is_in_view(item: NearbyObject, reach: Reach, *, is_above: bool) -> bool:
     return min(across) <= reach.high[0] and reach.low[0] <= max(across)
 
 
-def _draw_dot(pen: ImageDraw.ImageDraw, place: tuple[float, float], half: float, colour: str) -> None:
+def _draw_dot(
+    pen: ImageDraw.ImageDraw, place: tuple[float, float], half: float, colour: str
+) -> None:
     x, y = place
     pen.ellipse((x - half, y - half, x + half, y + half), fill=colour)
 
@@ -131,7 +167,12 @@ def _size(item: NearbyObject) -> float:
 
 def _write_legend(pen: ImageDraw.ImageDraw, size: int) -> None:
     x, y = 4.0, size - _LEGEND / 2
-    entries = (("hand and its sphere", _HAND), ("its path", _PATH), ("arm", _ARM), ("named object", NAMED_EDGE))
+    entries = (
+        ("hand and its sphere", _HAND),
+        ("its path", _PATH),
+        ("arm", _ARM),
+        ("named object", NAMED_EDGE),
+    )
     for text, colour in entries:
         pen.ellipse((x, y - 6, x + 12, y + 6), fill=colour)
         pen.text((x + 18, y), text, font=font(13), fill=_INK, anchor="lm")

@@ -7,8 +7,20 @@ from typing import NamedTuple
 
 from PIL import Image, ImageDraw
 
-from infthor_eval.plans.replay_frames import FloorPose, MapObject, PlanObservation, Point, RoomMap
-from infthor_eval.report.recordings.canvas import FURNITURE, FURNITURE_EDGE, NAMED, NAMED_EDGE, OVERSAMPLING
+from infthor_eval.plans.recorded.replay_frames import (
+    FloorPose,
+    MapObject,
+    PlanObservation,
+    Point,
+    RoomMap,
+)
+from infthor_eval.report.recordings.canvas import (
+    FURNITURE,
+    FURNITURE_EDGE,
+    NAMED,
+    NAMED_EDGE,
+    OVERSAMPLING,
+)
 from infthor_eval.report.recordings.fonts import Font, font
 
 __all__ = ["draw_map"]
@@ -47,10 +59,14 @@ class _Scale:
 
     def __init__(self, room: RoomMap, points: Iterable[Point], size: int) -> None:
         corners = [*points, *(corner for item in room.objects for corner in (item.low, item.high))]
-        corners += [(x + shift, z + shift) for x, z in room.floor for shift in (-_CELL / 2, _CELL / 2)]
+        corners += [
+            (x + shift, z + shift) for x, z in room.floor for shift in (-_CELL / 2, _CELL / 2)
+        ]
         xs, zs = [x for x, _ in corners], [z for _, z in corners]
         wide, high = size - 2 * _MARGIN, size - 2 * _MARGIN - _LEGEND
-        self.per_metre = min(wide / max(max(xs) - min(xs), _CELL), high / max(max(zs) - min(zs), _CELL))
+        self.per_metre = min(
+            wide / max(max(xs) - min(xs), _CELL), high / max(max(zs) - min(zs), _CELL)
+        )
         self._middle = (max(xs) + min(xs)) / 2, (max(zs) + min(zs)) / 2
         self._place = size / 2, (size - _LEGEND) / 2
 
@@ -77,8 +93,12 @@ def _draw_room(pen: ImageDraw.ImageDraw, room: RoomMap, scale: _Scale) -> None:
         pen.rectangle(scale.box(*corners), fill=_FLOOR, outline=_GRID)
     # Large objects first, those that the plan names last, on top.
     for item in sorted(room.objects, key=lambda item: (item.is_named, -_area(item))):
-        fill, edge, width = (NAMED, NAMED_EDGE, 3) if item.is_named else (FURNITURE, FURNITURE_EDGE, 1)
-        pen.rectangle(scale.box(item.low, item.high), fill=fill, outline=edge, width=width * OVERSAMPLING)
+        fill, edge, width = (
+            (NAMED, NAMED_EDGE, 3) if item.is_named else (FURNITURE, FURNITURE_EDGE, 1)
+        )
+        pen.rectangle(
+            scale.box(item.low, item.high), fill=fill, outline=edge, width=width * OVERSAMPLING
+        )
         if item.is_named:
             _draw_ring(pen, item, scale)
 
@@ -93,7 +113,9 @@ def _draw_ring(pen: ImageDraw.ImageDraw, item: MapObject, scale: _Scale) -> None
     left, top, right, bottom = scale.box(item.low, item.high)
     if max(right - left, bottom - top) < 2 * half:
         x, y = scale.fine(_middle(item))
-        pen.ellipse((x - half, y - half, x + half, y + half), outline=NAMED_EDGE, width=2 * OVERSAMPLING)
+        pen.ellipse(
+            (x - half, y - half, x + half, y + half), outline=NAMED_EDGE, width=2 * OVERSAMPLING
+        )
 
 
 def _draw_path(pen: ImageDraw.ImageDraw, walked: Sequence[Point], scale: _Scale) -> None:
@@ -115,17 +137,28 @@ def _draw_agent(pen: ImageDraw.ImageDraw, agent: FloorPose, scale: _Scale) -> No
 
 
 def _draw_arrow(
-    pen: ImageDraw.ImageDraw, pose: FloorPose, scale: _Scale, fill: str | None, edge: str, width: int
+    pen: ImageDraw.ImageDraw,
+    pose: FloorPose,
+    scale: _Scale,
+    fill: str | None,
+    edge: str,
+    width: int,
 ) -> None:
     """Draw an arrow head that points where a pose faces."""
     x, y = scale.fine(pose.at)
     parts = ((0, 1.0), (140, 1.0), (180, 0.5), (220, 1.0))
-    turned = [(math.radians(pose.facing + angle), length * (17 * OVERSAMPLING)) for angle, length in parts]
-    corners = [(x + length * math.sin(angle), y - length * math.cos(angle)) for angle, length in turned]
+    turned = [
+        (math.radians(pose.facing + angle), length * (17 * OVERSAMPLING)) for angle, length in parts
+    ]
+    corners = [
+        (x + length * math.sin(angle), y - length * math.cos(angle)) for angle, length in turned
+    ]
     pen.polygon(corners, fill=fill, outline=edge, width=width * OVERSAMPLING)
 
 
-def _write_names(pen: ImageDraw.ImageDraw, observation: PlanObservation, scale: _Scale, size: int) -> None:
+def _write_names(
+    pen: ImageDraw.ImageDraw, observation: PlanObservation, scale: _Scale, size: int
+) -> None:
     """Write the names of the objects that the plan names, and of furniture where there is room.
 
     Furniture that stands on other furniture has no name: the names would cover each other.
@@ -133,7 +166,9 @@ def _write_names(pen: ImageDraw.ImageDraw, observation: PlanObservation, scale: 
     agent = scale.at(observation.agent.at)
     occupied: list[_Area] = [(agent[0] - 16, agent[1] - 16, agent[0] + 16, agent[1] + 16)]
     named: list[MapObject] = []
-    for item in sorted(observation.room.objects, key=lambda item: (item.is_named, _area(item)), reverse=True):
+    for item in sorted(
+        observation.room.objects, key=lambda item: (item.is_named, _area(item)), reverse=True
+    ):
         if not item.is_named and any(_is_on(item, other) for other in named):
             continue
         words = _name(item, scale, size)
@@ -168,7 +203,9 @@ def _name(item: MapObject, scale: _Scale, size: int) -> _Name | None:
     """Place a name in the object's box, or beside it if the plan names it and the box is too small."""
     face = font(14, "-Bold") if item.is_named else font(12)
     x, y = scale.at(_middle(item))
-    wide, high = ((high - low) * scale.per_metre for low, high in zip(item.low, item.high, strict=True))
+    wide, high = (
+        (high - low) * scale.per_metre for low, high in zip(item.low, item.high, strict=True)
+    )
     for text in (item.name, "\n".join(_PARTS.findall(item.name))):
         lines = text.split("\n")
         half, tall = max(map(face.getlength, lines)) / 2, len(lines) * 7.5
@@ -185,7 +222,9 @@ def _name(item: MapObject, scale: _Scale, size: int) -> _Name | None:
 
 def _is_on(item: MapObject, other: MapObject) -> bool:
     middle = _middle(item)
-    return all(low <= place <= high for low, place, high in zip(other.low, middle, other.high, strict=True))
+    return all(
+        low <= place <= high for low, place, high in zip(other.low, middle, other.high, strict=True)
+    )
 
 
 def _overlap(one: _Area, other: _Area) -> bool:
@@ -196,7 +235,9 @@ def _middle(item: MapObject) -> Point:
     return (item.low[0] + item.high[0]) / 2, (item.low[1] + item.high[1]) / 2
 
 
-def _draw_legend(pen: ImageDraw.ImageDraw, legend: Sequence[tuple[float, str, str]], size: int) -> None:
+def _draw_legend(
+    pen: ImageDraw.ImageDraw, legend: Sequence[tuple[float, str, str]], size: int
+) -> None:
     """Draw the dots of the legend; its text is written into the final picture, as letters need no oversampling."""
     fine, radius, y = size * OVERSAMPLING, 6 * OVERSAMPLING, (size - _LEGEND / 2) * OVERSAMPLING
     pen.rectangle((0, fine - _LEGEND * OVERSAMPLING, fine, fine), fill="white")
@@ -209,7 +250,11 @@ def _legend(observation: PlanObservation) -> Iterator[tuple[float, str, str]]:
     """Yield left edge, text and colour of each entry of the legend, from left to right."""
     entries = [("agent", _AGENT), ("path in this plan", _PATH)]
     entries += [("where the expert ended", _GOAL)] if observation.room.goal is not None else []
-    entries += [("what the plan names", NAMED_EDGE)] if any(item.is_named for item in observation.room.objects) else []
+    entries += (
+        [("what the plan names", NAMED_EDGE)]
+        if any(item.is_named for item in observation.room.objects)
+        else []
+    )
     x = 6.0
     for text, colour in entries:
         yield x, text, colour

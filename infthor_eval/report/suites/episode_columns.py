@@ -25,8 +25,12 @@ PLAN_COLUMNS = (
     payload_column("is_final", bool),
     payload_column("expert_reward", float),
     payload_column("goal_reached", bool),
-    SampleColumn("n_conditions_met", int, lambda record: (record.payload.conditions or (None, None))[0]),
-    SampleColumn("n_conditions", int, lambda record: (record.payload.conditions or (None, None))[1]),
+    SampleColumn(
+        "n_conditions_met", int, lambda record: (record.payload.conditions or (None, None))[0]
+    ),
+    SampleColumn(
+        "n_conditions", int, lambda record: (record.payload.conditions or (None, None))[1]
+    ),
     payload_column("clue_distance", int),
     payload_column("clue_tokens", int),
 )

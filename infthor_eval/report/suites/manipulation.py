@@ -8,12 +8,19 @@ from typing import TYPE_CHECKING
 from PIL import Image
 
 from infthor_eval.errors import UsageError
-from infthor_eval.manipulation.curves import arm_curves
-from infthor_eval.manipulation.radii import success_by_radius
-from infthor_eval.manipulation.recorded_runs import ArmRun, label_by_radius
+from infthor_eval.manipulation.recorded.curves import arm_curves
+from infthor_eval.manipulation.recorded.radii import success_by_radius
+from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presenter import Description, EpisodeSelection, Figure, FigureRequest, FigureResult, Recording
+from infthor_eval.report.presenter import (
+    Description,
+    EpisodeSelection,
+    Figure,
+    FigureRequest,
+    FigureResult,
+    Recording,
+)
 from infthor_eval.report.recordings.arm_pictures import arm_pictures
 from infthor_eval.report.recordings.episode_sheet import MOST_ROWS, draw_sheet, sheet_rows
 from infthor_eval.report.recordings.reach_view import draw_reach
@@ -24,8 +31,8 @@ from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
 
 if TYPE_CHECKING:
-    from infthor_eval.manipulation.replay_frames import ArmFrame, ArmObservation
-    from infthor_eval.manipulation.replaying import RecordedEpisodes
+    from infthor_eval.manipulation.recorded.replay_frames import ArmFrame, ArmObservation
+    from infthor_eval.manipulation.recorded.replaying import RecordedEpisodes
 
 __all__ = ["ManipulationPresenter"]
 
@@ -41,7 +48,7 @@ class ArmEpisodesReplay:
 
     def select(self, run: ReportRun, selection: EpisodeSelection) -> Recording:
         """See `Replay.select`."""
-        from infthor_eval.manipulation.replaying import recorded_episodes, replay_episodes
+        from infthor_eval.manipulation.recorded.replaying import recorded_episodes, replay_episodes
 
         recorded = recorded_episodes(_arm_run(run), selection.task, selection.trajectory)
         return Recording(
@@ -70,10 +77,14 @@ def _select_episodes(recorded: "RecordedEpisodes", selection: EpisodeSelection) 
     if selection.episode is None:
         return recorded.records if most is None else choose_evenly(recorded.records, most)
     if re.fullmatch(r"\s*\d{1,9}\s*(,\s*\d{1,9}\s*)*", selection.episode, re.ASCII) is None:
-        raise UsageError(f"--episode {selection.episode!r:.60}: is no number of an action; write 17, or 17,75")
+        raise UsageError(
+            f"--episode {selection.episode!r:.60}: is no number of an action; write 17, or 17,75"
+        )
     chosen = recorded.at_actions([int(number) for number in selection.episode.split(",")])
     if most is not None and len(chosen) > most:
-        raise UsageError(f"--episode: {len(chosen)} episodes, and a sheet has room for {most}; give fewer")
+        raise UsageError(
+            f"--episode: {len(chosen)} episodes, and a sheet has room for {most}; give fewer"
+        )
     return chosen
 
 
@@ -89,7 +100,11 @@ def _model_runs(runs: Sequence[ReportRun]) -> list[ArmRun]:
 def _runs_by_radius(runs: Sequence[ReportRun]) -> list[ArmRun]:
     """Runs named after their models and radii, or by all options that differ if that is ambiguous."""
     named = label_by_radius(_model_runs(runs))
-    return named if len({run.label for run in named}) == len(named) else [_arm_run(run) for run in runs]
+    return (
+        named
+        if len({run.label for run in named}) == len(named)
+        else [_arm_run(run) for run in runs]
+    )
 
 
 def _build_figure_6(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
@@ -102,7 +117,9 @@ def _build_radius_figure(runs: Sequence[ReportRun], request: FigureRequest) -> F
     from infthor_eval.report.figures.radius import draw_radii, radii_table
 
     by_radius = success_by_radius(_model_runs(runs), request.task)
-    return FigureResult(radii_table(by_radius), lambda folder, name: draw_radii(by_radius, folder, name))
+    return FigureResult(
+        radii_table(by_radius), lambda folder, name: draw_radii(by_radius, folder, name)
+    )
 
 
 class ManipulationPresenter(PlainPresenter):
@@ -117,7 +134,9 @@ class ManipulationPresenter(PlainPresenter):
     columns = ARM_COLUMNS
     figures: Mapping[str, Figure] = {
         "6": Figure("reward of pick-ups and puts along trajectories", _build_figure_6),
-        "radius": Figure("success of pick-ups and puts by the radius of the hand", _build_radius_figure, False),
+        "radius": Figure(
+            "success of pick-ups and puts by the radius of the hand", _build_radius_figure, False
+        ),
     }
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
@@ -127,11 +146,19 @@ class ManipulationPresenter(PlainPresenter):
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
         """See `Presenter.sections`: reward along trajectories, and success by radius where there are several radii."""
         from infthor_eval.report.figures.radius import radii_figure, radii_table
-        from infthor_eval.report.suites.reward_curves import DrawnFigure, curves_on_page, figure_section
+        from infthor_eval.report.suites.reward_curves import (
+            DrawnFigure,
+            curves_on_page,
+            figure_section,
+        )
 
         def radii_on_page() -> DrawnFigure:
             by_radius = success_by_radius(_model_runs(runs))
-            return DrawnFigure(lambda: radii_figure(by_radius), radii_table(by_radius), "the numbers are in the table")
+            return DrawnFigure(
+                lambda: radii_figure(by_radius),
+                radii_table(by_radius),
+                "the numbers are in the table",
+            )
 
         arm_runs = _runs_by_radius(runs)
         title = "Reward of pick-ups and puts"
@@ -142,7 +169,9 @@ class ManipulationPresenter(PlainPresenter):
     def describe(self, record: Record) -> Description:
         """See `Presenter.describe`."""
         payload = record.payload
-        target = " → ".join(name for name in (payload.object_id, payload.receptacle_id) if name is not None)
+        target = " → ".join(
+            name for name in (payload.object_id, payload.receptacle_id) if name is not None
+        )
         return Description(payload.instruction, target, payload.kind)
 
     def reply(self, record: Record) -> str:
@@ -158,7 +187,9 @@ class ManipulationPresenter(PlainPresenter):
         return [
             StepRow(
                 action=", ".join(str(call.get("action", "")) for call in step.calls),
-                reply="" if step.delta is None else " ".join(f"{value:+.3f}" for value in step.delta),
+                reply=""
+                if step.delta is None
+                else " ".join(f"{value:+.3f}" for value in step.delta),
                 error="; ".join(step.refusals),
                 note=f"{step.distance:.3f} m off",
             )

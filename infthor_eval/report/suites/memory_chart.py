@@ -6,7 +6,7 @@ from typing import NamedTuple
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
-from infthor_eval.nieh.summary import Score, main_metric
+from infthor_eval.nieh.results.summary import Score, main_metric
 from infthor_eval.report.figures.style import LEGEND, add_legend, inline_svg, looks_of
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.sections import Chart
@@ -24,7 +24,10 @@ class _Point(NamedTuple):
 def memory_charts(runs: Sequence[ReportRun]) -> Iterator[Chart]:
     """Yield a chart for each task with memories whose models count their tokens."""
     tasks = dict.fromkeys(
-        name for run in runs for name, task in run.summary.summary.tasks.items() if task.memory is not None
+        name
+        for run in runs
+        for name, task in run.summary.summary.tasks.items()
+        if task.memory is not None
     )
     for task in tasks:
         curves = _curves(runs, task)
@@ -40,11 +43,15 @@ def _curves(runs: Sequence[ReportRun], task: str) -> dict[str, list[_Point]]:
         if of_task is None or of_task.memory is None or of_task.memory.n_tokens is None:
             continue
         memory = f"{of_task.memory.name}{'*' if of_task.memory.privileged else ''}"
-        point = _Point(of_task.memory.n_tokens, of_task.by_clues["total"].scores[main_metric(of_task)])
+        point = _Point(
+            of_task.memory.n_tokens, of_task.by_clues["total"].scores[main_metric(of_task)]
+        )
         found.setdefault((run.model, memory), []).append(point)
     several = len({subject for subject, _ in found}) > 1
     return {
-        f"{subject}, {memory}" if several else memory: sorted(points, key=lambda point: point.n_tokens)
+        f"{subject}, {memory}" if several else memory: sorted(
+            points, key=lambda point: point.n_tokens
+        )
         for (subject, memory), points in found.items()
     }
 
@@ -57,11 +64,29 @@ def _chart(task: str, curves: dict[str, list[_Point]]) -> Chart:
         axes = figure.subplots()
         for name, points in curves.items():
             colour = looks[name].colour
-            tokens, means = [point.n_tokens for point in points], [100 * point.score.mean for point in points]
-            axes.plot(tokens, means, marker="o", ms=4.5, lw=1.3, ls=looks[name].style, color=colour, zorder=3)
+            tokens, means = (
+                [point.n_tokens for point in points],
+                [100 * point.score.mean for point in points],
+            )
+            axes.plot(
+                tokens,
+                means,
+                marker="o",
+                ms=4.5,
+                lw=1.3,
+                ls=looks[name].style,
+                color=colour,
+                zorder=3,
+            )
             for point in points:
                 if point.score.low is not None and point.score.high is not None:
-                    axes.vlines(point.n_tokens, 100 * point.score.low, 100 * point.score.high, color=colour, lw=0.8)
+                    axes.vlines(
+                        point.n_tokens,
+                        100 * point.score.low,
+                        100 * point.score.high,
+                        color=colour,
+                        lw=0.8,
+                    )
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter(ScalarFormatter())
         axes.set_ylim(-3, 103)
@@ -71,7 +96,12 @@ def _chart(task: str, curves: dict[str, list[_Point]]) -> Chart:
         return figure
 
     description = "; ".join(
-        f"{name} " + ", ".join(f"{100 * point.score.mean:.1f} % at {point.n_tokens:,.0f} tokens" for point in points)
+        f"{name} "
+        + ", ".join(
+            f"{100 * point.score.mean:.1f} % at {point.n_tokens:,.0f} tokens" for point in points
+        )
         for name, points in curves.items()
     )
-    return Chart(f"{task}: accuracy by tokens of what a memory recalls", inline_svg(draw), description)
+    return Chart(
+        f"{task}: accuracy by tokens of what a memory recalls", inline_svg(draw), description
+    )

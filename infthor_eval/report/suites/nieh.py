@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from infthor_eval.nieh.above_guessing import score_above_guessing
 from infthor_eval.nieh.records import Guess, NiehAnswer
+from infthor_eval.nieh.results.above_guessing import score_above_guessing
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import Description, Timelines
@@ -37,7 +37,11 @@ class NiehPresenter(PlainPresenter):
     def further_scores(self, record: Record) -> Mapping[str, float]:
         """See `Presenter.further_scores`: scores above guessing, of questions that guessing does not solve."""
         scores = {scorer: score_above_guessing(record.payload, scorer) for scorer in SCORERS}
-        return {f"{scorer}, above guessing": score for scorer, score in scores.items() if score is not None}
+        return {
+            f"{scorer}, above guessing": score
+            for scorer, score in scores.items()
+            if score is not None
+        }
 
     def charts(self, runs: Sequence[ReportRun]) -> list[Chart]:
         """See `Presenter.charts`."""
@@ -49,7 +53,9 @@ class NiehPresenter(PlainPresenter):
         """See `Presenter.describe`."""
         payload = record.payload
         target = ", ".join(map(str, payload.answers))
-        return Description(payload.question, target, payload.question_type or "untyped", payload.clue_column)
+        return Description(
+            payload.question, target, payload.question_type or "untyped", payload.clue_column
+        )
 
     def reply(self, record: Record) -> str:
         """See `Presenter.reply`."""
@@ -60,10 +66,14 @@ class NiehPresenter(PlainPresenter):
         payload = record.payload
         details: dict[str, str] = {}
         if payload.shown_clues is not None:
-            details["clue frames shown"] = f"{payload.shown_clues.n_shown} of {payload.shown_clues.n_clues}"
+            details["clue frames shown"] = (
+                f"{payload.shown_clues.n_shown} of {payload.shown_clues.n_clues}"
+            )
         if payload.guess is not None:
             details["guessing"] = _guessing(payload.guess)
-            details |= {name: f"{score:+.2f}" for name, score in self.further_scores(record).items()}
+            details |= {
+                name: f"{score:+.2f}" for name, score in self.further_scores(record).items()
+            }
         if payload.thinking is not None:
             details["thought"] = payload.thinking
         return details
@@ -74,7 +84,9 @@ class NiehPresenter(PlainPresenter):
 
         return find_prompts(run, data)
 
-    def timelines(self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
+    def timelines(
+        self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
+    ) -> Timelines:
         """See `Presenter.timelines`."""
         from infthor_eval.report.suites.nieh_frames import find_timelines
 

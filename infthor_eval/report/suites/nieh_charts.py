@@ -9,10 +9,17 @@ from matplotlib.figure import Figure
 
 from infthor_eval.distances import DISTANCES
 from infthor_eval.formats.question import ABSENCE
-from infthor_eval.nieh.above_guessing import AboveGuessing
-from infthor_eval.nieh.evidence_tables import short_name
-from infthor_eval.nieh.gains import find_gains, name_of
-from infthor_eval.nieh.summary import CLUE_COLUMNS, SHOWN_CLUES, Cell, Score, TaskSummary, main_metric
+from infthor_eval.nieh.results.above_guessing import AboveGuessing
+from infthor_eval.nieh.results.evidence_tables import short_name
+from infthor_eval.nieh.results.gains import find_gains, name_of
+from infthor_eval.nieh.results.summary import (
+    CLUE_COLUMNS,
+    SHOWN_CLUES,
+    Cell,
+    Score,
+    TaskSummary,
+    main_metric,
+)
 from infthor_eval.report.figures.style import LEGEND, Look, add_legend, inline_svg, looks_of
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.memory_chart import memory_charts
@@ -77,11 +84,15 @@ def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
 
         if any(shown(line).keys() - {"all"} for line in lines):
             title = f"{of_file}: accuracy by clue frames shown"
-            yield _by_columns(title, lines, SHOWN_CLUES, shown, "of the clue frames were shown (questions)")
+            yield _by_columns(
+                title, lines, SHOWN_CLUES, shown, "of the clue frames were shown (questions)"
+            )
         distances = [name for name in DISTANCES if any(name in far(line) for line in lines)]
         if len(distances) > 1 and any(line.task.context != "clues" for line in lines):
             title = f"{of_file}: accuracy by distance of the last clue from the end"
-            yield _by_columns(title, lines, distances, far, "frames after the last clue (questions)")
+            yield _by_columns(
+                title, lines, distances, far, "frames after the last clue (questions)"
+            )
 
 
 def _by_columns(
@@ -101,7 +112,9 @@ def _by_columns(
             _dots(axes, [cells.get(name) for name in names], line, _offset(number, len(lines)))
         first = cells_of(lines[0])
         counts = [first[name].n if name in first else 0 for name in names]
-        axes.set_xticks(range(len(names)), [f"{name}\n({n})" for name, n in zip(names, counts, strict=True)])
+        axes.set_xticks(
+            range(len(names)), [f"{name}\n({n})" for name, n in zip(names, counts, strict=True)]
+        )
         axes.set_ylim(-3, 103)
         axes.set_ylabel(f"{lines[0].metric} (%)")
         axes.set_xlabel(label)
@@ -136,16 +149,27 @@ def _offset(number: int, n_lines: int) -> float:
     return 0.0 if n_lines == 1 else _SPREAD * (number / (n_lines - 1) - 0.5)
 
 
-def _dots(axes: Axes, cells: Sequence[Cell | None], line: _Line, offset: float, *, is_flat: bool = False) -> None:
+def _dots(
+    axes: Axes, cells: Sequence[Cell | None], line: _Line, offset: float, *, is_flat: bool = False
+) -> None:
     """Draw a dot with its interval for each cell that has questions."""
     for at, cell in enumerate(cells):
         if cell is not None and cell.n:
             _dot(axes, cell.scores[line.metric], at + offset, line.look.colour, is_flat=is_flat)
 
 
-def _dot(axes: Axes, score: Score | MeanEstimate | AboveGuessing, where: float, colour: str, *, is_flat: bool) -> None:
+def _dot(
+    axes: Axes,
+    score: Score | MeanEstimate | AboveGuessing,
+    where: float,
+    colour: str,
+    *,
+    is_flat: bool,
+) -> None:
     mean = 100 * (score.mean or 0)
-    axes.plot(*((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=colour, zorder=3)
+    axes.plot(
+        *((mean, where) if is_flat else (where, mean)), marker="o", ms=4.5, color=colour, zorder=3
+    )
     if score.low is not None and score.high is not None:
         span = axes.hlines if is_flat else axes.vlines
         span(where, 100 * score.low, 100 * score.high, color=colour, lw=1.3, zorder=2.8)
@@ -173,18 +197,24 @@ def _above_guessing_chart(runs: Sequence[ReportRun]) -> Chart | None:
         (f"{run.label}, {name}", above)
         for run in runs
         for name, task in run.summary.summary.tasks.items()
-        if (above := task.above_guessing.get(main_metric(task))) is not None and above.mean is not None
+        if (above := task.above_guessing.get(main_metric(task))) is not None
+        and above.mean is not None
     ]
     return _by_rows("Above guessing", rows, "% above guessing, and 95 % interval")
 
 
-def _by_rows(title: str, rows: Sequence[tuple[str, MeanEstimate | AboveGuessing]], label: str) -> Chart | None:
+def _by_rows(
+    title: str, rows: Sequence[tuple[str, MeanEstimate | AboveGuessing]], label: str
+) -> Chart | None:
     """Draw a row with a dot for each value, around a line at 0; None without rows."""
     if not rows:
         return None
 
     def draw() -> Figure:
-        figure = Figure(figsize=(_PANEL[0] + LEGEND, max(_PANEL[1], 0.8 + _ROW * len(rows))), layout="constrained")
+        figure = Figure(
+            figsize=(_PANEL[0] + LEGEND, max(_PANEL[1], 0.8 + _ROW * len(rows))),
+            layout="constrained",
+        )
         axes = figure.subplots()
         axes.axvline(0, color="#444444", lw=0.8)
         for height, (_, value) in enumerate(reversed(rows)):
@@ -192,7 +222,9 @@ def _by_rows(title: str, rows: Sequence[tuple[str, MeanEstimate | AboveGuessing]
         axes.set_yticks(range(len(rows)), [printable(name)[:60] for name, _ in reversed(rows)])
         axes.set_ylim(-0.6, len(rows) - 0.4)
         low, high = axes.get_xlim()
-        axes.set_xlim(min(low, -5), max(high, 5))  # nothing at all would be drawn on a scale of hundredths
+        axes.set_xlim(
+            min(low, -5), max(high, 5)
+        )  # nothing at all would be drawn on a scale of hundredths
         axes.set_xlabel(label)
         axes.grid(axis="y", visible=False)
         return figure
@@ -211,11 +243,17 @@ def _heat_map(run: ReportRun) -> Chart | None:
     if not tasks:
         return None
     sizes, metric = sorted(tasks), main_metric(next(iter(tasks.values())))
-    depths = sorted({depth for task in tasks.values() for depth in task.by_variant if depth.startswith(_DEPTH)})
-    means = [[_percent(tasks[size].by_variant.get(depth), metric) for size in sizes] for depth in depths]
+    depths = sorted(
+        {depth for task in tasks.values() for depth in task.by_variant if depth.startswith(_DEPTH)}
+    )
+    means = [
+        [_percent(tasks[size].by_variant.get(depth), metric) for size in sizes] for depth in depths
+    ]
 
     def draw() -> Figure:
-        figure = Figure(figsize=(2.2 + 0.9 * len(sizes), 1.4 + 0.5 * len(depths)), layout="constrained")
+        figure = Figure(
+            figsize=(2.2 + 0.9 * len(sizes), 1.4 + 0.5 * len(depths)), layout="constrained"
+        )
         axes = figure.subplots()
         axes.grid(visible=False)
         # One hue: colour-blind readers and prints tell its values apart by lightness alone.
@@ -232,7 +270,11 @@ def _heat_map(run: ReportRun) -> Chart | None:
         figure.colorbar(picture, ax=axes, label=f"{metric} (%)")
         return figure
 
-    return Chart(f"{run.label}: accuracy by depth and size of the context", inline_svg(draw), "see the table by depth")
+    return Chart(
+        f"{run.label}: accuracy by depth and size of the context",
+        inline_svg(draw),
+        "see the table by depth",
+    )
 
 
 def _percent(cell: Cell | None, metric: str) -> float:

@@ -2,8 +2,8 @@
 
 from functools import partial
 
-from infthor_eval.nieh.above_guessing import score_above_guessing
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.results.above_guessing import score_above_guessing
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.report.sample_table import SampleColumn, payload_column
 from infthor_eval.runs import UnitRecord
@@ -44,7 +44,10 @@ NIEH_COLUMNS = (
     SampleColumn("n_clues_shown", int, partial(_clues, "n_shown")),
     SampleColumn("n_frames_after_clues", int, partial(_clues, "n_after")),
     *(SampleColumn(f"guess_{scorer}", float, partial(_guess_score, scorer)) for scorer in SCORERS),
-    *(SampleColumn(f"above_guessing_{scorer}", float, partial(_above_guessing, scorer)) for scorer in SCORERS),
+    *(
+        SampleColumn(f"above_guessing_{scorer}", float, partial(_above_guessing, scorer))
+        for scorer in SCORERS
+    ),
     SampleColumn("n_recalled", int, _n_recalled),
     SampleColumn("build_seconds", float, partial(_recall, "build_s")),
     SampleColumn("recall_seconds", float, partial(_recall, "recall_s")),

@@ -21,7 +21,9 @@ __all__ = ["find_timelines"]
 _OVERVIEW = 5  # frames of a trajectory that are shown for a question without clues
 
 
-def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore) -> Timelines:
+def find_timelines(
+    runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
+) -> Timelines:
     """See `Presenter.timelines`; a set that is missing or has changed since the run has a note.
 
     Clues of all questions get their pictures before any neighbour does, as there is a limit on the size of all.
@@ -34,10 +36,18 @@ def find_timelines(runs: Sequence[ReportRun], data: Path | None, thumbnails: Thu
         if opened is None or question is None:
             continue
         try:
-            chosen[key] = _choose_frames(opened, question, logs.read(opened.folder(question.traj_id)))
-        except DataError:  # the question was skipped or failed for it, and its record has the reason
+            chosen[key] = _choose_frames(
+                opened, question, logs.read(opened.folder(question.traj_id))
+            )
+        except (
+            DataError
+        ):  # the question was skipped or failed for it, and its record has the reason
             continue
-    thumbnails.expect(len({choice.frames[at] for choice in chosen.values() for at in choice.clues | choice.others}))
+    thumbnails.expect(
+        len(
+            {choice.frames[at] for choice in chosen.values() for at in choice.clues | choice.others}
+        )
+    )
     for choice in chosen.values():
         for index in sorted(choice.clues):
             _picture(choice.frames[index], thumbnails)
@@ -98,7 +108,11 @@ def _timeline(choice: _FrameChoice, thumbnails: ThumbnailStore) -> Timeline:
         TimelineFrame(index, _picture(choice.frames[index], thumbnails), index in choice.clues)
         for index in sorted(choice.clues | choice.others)
     )
-    note = "" if choice.clues else "absence question: no frame is evidence, so five frames are shown, evenly spaced"
+    note = (
+        ""
+        if choice.clues
+        else "absence question: no frame is evidence, so five frames are shown, evenly spaced"
+    )
     return Timeline(len(choice.frames), tuple(frames), note)
 
 

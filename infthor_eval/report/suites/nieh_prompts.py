@@ -10,8 +10,8 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.video import Video
 from infthor_eval.nieh.contexts import ContextPart
 from infthor_eval.nieh.options import SHOWN
-from infthor_eval.nieh.rebuilt_requests import RebuiltRequest, RequestRebuilder
 from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.rescoring.rebuilt_requests import RebuiltRequest, RequestRebuilder
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.suites.nieh_sets import RunSets
 from infthor_eval.report.web.samples import Prompt, PromptFrames
@@ -26,13 +26,17 @@ _OF_BASELINES = "a baseline is not sent it: it answers from the questions alone"
 def find_prompts(run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
     """See `Presenter.prompts`."""
     sets = RunSets([run], data)
-    rebuilders: dict[str, RequestRebuilder | str] = {task: _rebuilder(run, task, sets) for task in run.tasks}
+    rebuilders: dict[str, RequestRebuilder | str] = {
+        task: _rebuilder(run, task, sets) for task in run.tasks
+    }
     note = _OF_BASELINES if "baseline" in run.header.config["model"] else ""
     ablation = run.header.config["frames"]
     kept: dict[Prompt, Prompt] = {}
     prompts = {}
     for record in run.records:
-        prompt = _prompt(rebuilders[record.task], record, sets.find_set(record.task), ablation, note)
+        prompt = _prompt(
+            rebuilders[record.task], record, sets.find_set(record.task), ablation, note
+        )
         prompts[record.key] = kept.setdefault(prompt, prompt)
     return prompts
 
@@ -49,7 +53,11 @@ def _rebuilder(run: ReportRun, task: str, sets: RunSets) -> RequestRebuilder | s
 
 
 def _prompt(
-    rebuilder: RequestRebuilder | str, record: Record, data: NiehSet | None, ablation: str, note: str
+    rebuilder: RequestRebuilder | str,
+    record: Record,
+    data: NiehSet | None,
+    ablation: str,
+    note: str,
 ) -> Prompt:
     if data is None or isinstance(rebuilder, str):
         return Prompt(problem=str(rebuilder))
@@ -59,17 +67,25 @@ def _prompt(
     except InfthorError as error:
         return Prompt(problem=str(error))
     before = request.text.removesuffix(record.payload.question)
-    return Prompt((*_parts(request, places, ablation), before), _stretches(sorted(set(request.positions))), note=note)
+    return Prompt(
+        (*_parts(request, places, ablation), before),
+        _stretches(sorted(set(request.positions))),
+        note=note,
+    )
 
 
-def _parts(request: RebuiltRequest, places: Mapping[FrameRef, int], ablation: str) -> Iterator[str | PromptFrames]:
+def _parts(
+    request: RebuiltRequest, places: Mapping[FrameRef, int], ablation: str
+) -> Iterator[str | PromptFrames]:
     """Yield texts and frames; neighbours of one kind are one part."""
     for kind, group in groupby(request.context, type):
         parts = list(group)
         if kind is str:
             yield "".join(part for part in parts if isinstance(part, str))
         elif kind is FrameRef:
-            yield _frames("frames", [part for part in parts if isinstance(part, FrameRef)], places, ablation)
+            yield _frames(
+                "frames", [part for part in parts if isinstance(part, FrameRef)], places, ablation
+            )
         else:
             yield from (_film(part, places, ablation) for part in parts)
 
@@ -79,7 +95,9 @@ def _film(part: ContextPart, places: Mapping[FrameRef, int], ablation: str) -> P
     return _frames(f"video of {part.fps:g} frames per second", part.frames, places, ablation)
 
 
-def _frames(what: str, frames: Sequence[FrameRef], places: Mapping[FrameRef, int], ablation: str) -> PromptFrames:
+def _frames(
+    what: str, frames: Sequence[FrameRef], places: Mapping[FrameRef, int], ablation: str
+) -> PromptFrames:
     """Return frames by their places; frames of another trajectory, blank or decoded ones have none in this one."""
     found = [places.get(frame) for frame in frames]
     own = [place for place in found if place is not None]

@@ -11,7 +11,7 @@ from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.samples import find_set
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.runs import UnitKey, UnitRecord
-from infthor_eval.runs.stored_command import read_stored_command
+from infthor_eval.runs.stored.command import read_stored_command
 
 __all__ = ["RunSets"]
 
@@ -41,13 +41,17 @@ class RunSets:
     def find_question(self, key: UnitKey, record: Record) -> Question | None:
         """Return the question of a record; None if its set is missing or has another one there."""
         question = self._sets[key.task][1].get(key.id) if key.task in self._sets else None
-        return question if question is not None and question.text == record.payload.question else None
+        return (
+            question if question is not None and question.text == record.payload.question else None
+        )
 
     def _open(self, run: ReportRun, task: str, data: Path | None) -> None:
         folder, options = data or run.data, _options_of(run)
         try:
             opened = find_set(
-                str(folder) if folder else None, run.dataset(task).get("bundled"), options.get("trajectories")
+                str(folder) if folder else None,
+                run.dataset(task).get("bundled"),
+                options.get("trajectories"),
             )
         except (UsageError, DataError) as error:
             self.problems[task] = f"{error}; give the set's folder with --data"

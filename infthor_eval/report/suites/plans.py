@@ -8,11 +8,18 @@ from typing import TYPE_CHECKING, Any
 from PIL import Image
 
 from infthor_eval.errors import UsageError
-from infthor_eval.plans.curves import plan_curves
-from infthor_eval.plans.recorded_runs import PlansRun
+from infthor_eval.plans.recorded.curves import plan_curves
+from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.presenter import Description, EpisodeSelection, Figure, FigureRequest, FigureResult, Recording
+from infthor_eval.report.presenter import (
+    Description,
+    EpisodeSelection,
+    Figure,
+    FigureRequest,
+    FigureResult,
+    Recording,
+)
 from infthor_eval.report.recordings.plan_pictures import plan_pictures
 from infthor_eval.report.recordings.room_map import draw_map
 from infthor_eval.report.runs import ReportRun
@@ -22,8 +29,8 @@ from infthor_eval.report.web.sections import Section
 from infthor_eval.runs import UnitRecord
 
 if TYPE_CHECKING:
-    from infthor_eval.plans.replay_frames import PlanFrame, PlanObservation
-    from infthor_eval.plans.replaying import RecordedPlans
+    from infthor_eval.plans.recorded.replay_frames import PlanFrame, PlanObservation
+    from infthor_eval.plans.recorded.replaying import RecordedPlans
 
 __all__ = ["PlansPresenter"]
 
@@ -39,7 +46,7 @@ class PlansReplay:
 
     def select(self, run: ReportRun, selection: EpisodeSelection) -> Recording:
         """See `Replay.select`."""
-        from infthor_eval.plans.replaying import recorded_plans, replay_plans
+        from infthor_eval.plans.recorded.replaying import recorded_plans, replay_plans
 
         recorded = recorded_plans(_plans_run(run), selection.task, selection.trajectory)
         return Recording(
@@ -68,7 +75,9 @@ def _select_plans(recorded: "RecordedPlans", plans: str | None) -> Sequence[Reco
         return recorded.records
     numbers = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9}))?", plans.strip())
     if numbers is None:
-        raise UsageError(f"--plans {plans!r:.60}: is neither a plan's number nor two of them; write 7, or 3-7")
+        raise UsageError(
+            f"--plans {plans!r:.60}: is neither a plan's number nor two of them; write 7, or 3-7"
+        )
     return recorded.between(int(numbers[1]), int(numbers[2] or numbers[1]))
 
 
@@ -79,7 +88,9 @@ def _plans_run(run: ReportRun) -> PlansRun:
 def _build_figure_7(runs: Sequence[ReportRun], request: FigureRequest) -> FigureResult:
     from infthor_eval.report.suites.reward_curves import curves_result
 
-    return curves_result(plan_curves([_plans_run(run) for run in runs], request.task), request.panels)
+    return curves_result(
+        plan_curves([_plans_run(run) for run in runs], request.task), request.panels
+    )
 
 
 class PlansPresenter(PlainPresenter):
@@ -92,7 +103,9 @@ class PlansPresenter(PlainPresenter):
     main_metric = "success"
     replay = PlansReplay()
     columns = PLAN_COLUMNS
-    figures: Mapping[str, Figure] = {"7": Figure("reward of plans over steps and over context tokens", _build_figure_7)}
+    figures: Mapping[str, Figure] = {
+        "7": Figure("reward of plans over steps and over context tokens", _build_figure_7)
+    }
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
         """See `Presenter.is_share`."""
@@ -100,7 +113,11 @@ class PlansPresenter(PlainPresenter):
 
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
         """See `Presenter.sections`: curves of reward for each task that all runs have."""
-        from infthor_eval.report.suites.reward_curves import DrawnFigure, curves_on_page, figure_section
+        from infthor_eval.report.suites.reward_curves import (
+            DrawnFigure,
+            curves_on_page,
+            figure_section,
+        )
 
         def task_curves(task: str) -> DrawnFigure:
             return curves_on_page(plan_curves([_plans_run(run) for run in runs], task))

@@ -30,16 +30,24 @@ def figure_section(key: str, title: str, build: Callable[[], DrawnFigure]) -> Se
     """Return a section with a figure and its table, or with the reason why the runs cannot be drawn together."""
     try:
         drawn = build()
-        return Section(key, title, (Chart(title, inline_svg(drawn.draw), drawn.description),), (drawn.table,))
+        return Section(
+            key, title, (Chart(title, inline_svg(drawn.draw), drawn.description),), (drawn.table,)
+        )
     except InfthorError as error:
         return Section(key, title, notes=(f"not drawn: {error}",))
 
 
 def curves_on_page(curves: RewardCurves) -> DrawnFigure:
     """Return the figure of some curves, all of them in one panel."""
-    ends = (f"{run.label} {run.curves[curves.main].end.mean:.1f}" for run in curves.runs if curves.main in run.curves)
+    ends = (
+        f"{run.label} {run.curves[curves.main].end.mean:.1f}"
+        for run in curves.runs
+        if curves.main in run.curves
+    )
     description = "at the end: " + "; ".join(ends)
-    return DrawnFigure(lambda: curves_figure(curves, one_panel(curves)), curves_table(curves), description)
+    return DrawnFigure(
+        lambda: curves_figure(curves, one_panel(curves)), curves_table(curves), description
+    )
 
 
 def curves_result(curves: RewardCurves, panels_file: Path | None) -> FigureResult:
@@ -48,4 +56,6 @@ def curves_result(curves: RewardCurves, panels_file: Path | None) -> FigureResul
     drawn = {label for panel in panels for label in panel.labels}
     left_out = [run.label for run in curves.runs if not run.is_bound and run.label not in drawn]
     notes = (f"in no panel: {', '.join(left_out)}",) if left_out else ()
-    return FigureResult(curves_table(curves), lambda folder, name: draw_curves(curves, panels, folder, name), notes)
+    return FigureResult(
+        curves_table(curves), lambda folder, name: draw_curves(curves, panels, folder, name), notes
+    )

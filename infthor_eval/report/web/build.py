@@ -42,7 +42,9 @@ class PageRequest:
     pictures: int = 15_000_000
 
 
-def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: PageProgress | None = None) -> Page:
+def build_page(
+    runs: Sequence[ReportRun], request: PageRequest, progress: PageProgress | None = None
+) -> Page:
     """Build the page of some runs, of one suite or of several; `progress` observes what takes long.
 
     Raises:
@@ -64,7 +66,9 @@ def build_page(runs: Sequence[ReportRun], request: PageRequest, progress: PagePr
     if left_out is not None:
         sections.append(Section("left-out", "Failed, skipped, excluded", tables=(left_out,)))
     thumbnails = ThumbnailStore(request.pictures, progress=progress)
-    replays = EpisodeReplays(runs, request.episodes, (request.data, request.scenes), thumbnails, progress)
+    replays = EpisodeReplays(
+        runs, request.episodes, (request.data, request.scenes), thumbnails, progress
+    )
     samples: list[PageSample] = []
     notes: list[str] = []
     facts: dict[int, FrameFacts] = {}
@@ -112,7 +116,9 @@ def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
     """Each run against each before it, of its suite; if there are many, each against the first."""
     tables, notes = [], []
     for runs in suites:
-        pairs = combinations(runs, 2) if len(runs) <= _FEW else ((runs[0], other) for other in runs[1:])
+        pairs = (
+            combinations(runs, 2) if len(runs) <= _FEW else ((runs[0], other) for other in runs[1:])
+        )
         for first, second in pairs:
             try:
                 rows = compare(first.suite, first.presenter, first.records, second.records)
@@ -128,14 +134,20 @@ def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
 
 def _labels(runs: Sequence[ReportRun], same: Sequence[ReportRun]) -> SuiteLabels:
     presenter, places = same[0].presenter, tuple(runs.index(run) for run in same)
-    return SuiteLabels(places, presenter.target_label, presenter.reply_label, presenter.compares_scorers)
+    return SuiteLabels(
+        places, presenter.target_label, presenter.reply_label, presenter.compares_scorers
+    )
 
 
 def _metrics(runs: Sequence[ReportRun], samples: Sequence[PageSample]) -> list[str]:
     """Names of all metrics; those that decide the outcome first."""
     main = {run.presenter.main_metric for run in runs}
     names = dict.fromkeys(
-        name for sample in samples for result in sample.results if result is not None for name in result.scores
+        name
+        for sample in samples
+        for result in sample.results
+        if result is not None
+        for name in result.scores
     )
     return sorted(names, key=lambda name: name not in main)
 
@@ -155,4 +167,9 @@ def _about(run: ReportRun) -> About:
         "folder": str(run.folder),
     }
     known = tuple((name, value) for name, value in facts.items() if value)
-    return About(run.label, known, run.command, json.dumps(config, indent=1, ensure_ascii=False, sort_keys=True))
+    return About(
+        run.label,
+        known,
+        run.command,
+        json.dumps(config, indent=1, ensure_ascii=False, sort_keys=True),
+    )

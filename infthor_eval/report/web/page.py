@@ -14,9 +14,9 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from infthor_eval.errors import wrap_errors
-from infthor_eval.formats.files import write_atomically
 from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt
 from infthor_eval.report.web.sections import Section
+from infthor_eval.storage.files import write_atomically
 
 __all__ = ["About", "Page", "SuiteLabels", "write_page"]
 
@@ -30,7 +30,13 @@ _SCRIPTS = (
 )  # one script on the page, in this order
 
 # In a script element "</script" and "<!--" would end or twist it; the line separators end a line of a script.
-_ESCAPED = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
+_ESCAPED = {
+    "<": "\\u003c",
+    ">": "\\u003e",
+    "&": "\\u0026",
+    "\u2028": "\\u2028",
+    "\u2029": "\\u2029",
+}
 
 
 @dataclass(frozen=True)
@@ -109,7 +115,9 @@ def write_page(page: Page, path: Path) -> int:
     """
     script = "".join(map(_read, _SCRIPTS))
     # Questions and replies come from data files and models: whatever they hold is shown as text.
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
     text = environment.from_string(_read("report.html")).render(
         page=page,
         css=Markup(_read("report.css")),
@@ -119,7 +127,10 @@ def write_page(page: Page, path: Path) -> int:
         svg=Markup,
     )
     encoded = text.encode("utf-8", "backslashreplace")
-    with wrap_errors(f"{path}: cannot be written", "give another --out"), write_atomically(path) as partial:
+    with (
+        wrap_errors(f"{path}: cannot be written", "give another --out"),
+        write_atomically(path) as partial,
+    ):
         partial.write_bytes(encoded)
     return len(encoded)
 

@@ -56,7 +56,9 @@ class EpisodeReplays:
             thumbnails: collects the pictures.
             progress: observes the replays.
         """
-        self._chosen = {run.folder: _choose(run, most) for run in runs if run.presenter.replay is not None}
+        self._chosen = {
+            run.folder: _choose(run, most) for run in runs if run.presenter.replay is not None
+        }
         self._data, self._scenes = folders
         self._thumbnails, self._progress = thumbnails, progress
         n_episodes = sum(map(len, self._chosen.values()))
@@ -71,8 +73,12 @@ class EpisodeReplays:
         if replay is None:
             return pictures, notes
         # By trajectory, so that each scene is loaded once.
-        chosen = sorted(self._chosen[run.folder], key=lambda record: (record.task, record.cluster, record.key))
-        for (task, trajectory), group in groupby(chosen, key=lambda record: (record.task, record.cluster)):
+        chosen = sorted(
+            self._chosen[run.folder], key=lambda record: (record.task, record.cluster, record.key)
+        )
+        for (task, trajectory), group in groupby(
+            chosen, key=lambda record: (record.task, record.cluster)
+        ):
             records = list(group)
             try:
                 recording = replay.select(run, EpisodeSelection(task, trajectory))
@@ -90,18 +96,26 @@ class EpisodeReplays:
     def _count(self, run: ReportRun, trajectory: str) -> None:
         self._progress.advance(_WORK, f"{run.label}, {trajectory}")
 
-    def _draw(self, replay: Replay, session: OpenReplay, run: ReportRun, record: Record) -> EpisodePictures:
+    def _draw(
+        self, replay: Replay, session: OpenReplay, run: ReportRun, record: Record
+    ) -> EpisodePictures:
         frames = list(session.frames([record]))
         seen = [frame.observation for frame in frames if frame.observation is not None]
         if not seen:
             return EpisodePictures()
         name = f"{run.folder}/{record.key.task}/{record.key}"
         numbers = [
-            self._thumbnails.add(f"{name}/{number}", lambda frame=observation.frame: Image.fromarray(frame))  # type: ignore[misc]
+            self._thumbnails.add(
+                f"{name}/{number}", lambda frame=observation.frame: Image.fromarray(frame)
+            )  # type: ignore[misc]
             for number, observation in enumerate(seen)
         ]
-        at_end = self._thumbnails.add(f"{name}/map", lambda: replay.draw_map(seen[-1], _DRAWN), _SHOWN)
-        return EpisodePictures(numbers, at_end, next((frame.note for frame in frames if frame.note), ""))
+        at_end = self._thumbnails.add(
+            f"{name}/map", lambda: replay.draw_map(seen[-1], _DRAWN), _SHOWN
+        )
+        return EpisodePictures(
+            numbers, at_end, next((frame.note for frame in frames if frame.note), "")
+        )
 
 
 def _choose(run: ReportRun, most: int) -> list[Record]:

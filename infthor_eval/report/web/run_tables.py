@@ -34,7 +34,9 @@ def costs_table(runs: Sequence[ReportRun]) -> Table:
     tokens = ("tokens read", "of them cached, %", "tokens written")
     columns = ("samples", "seconds", "samples / s", "requests", *tokens, "cost")
     note = "Seconds are the samples' own, added up: several workers take less by the clock. Cost is in US dollars."
-    return Table("", (Column("run", False), *map(Column, columns)), tuple(map(_cost_row, runs)), (note,))
+    return Table(
+        "", (Column("run", False), *map(Column, columns)), tuple(map(_cost_row, runs)), (note,)
+    )
 
 
 def _cost_row(run: ReportRun) -> Row:
@@ -55,7 +57,11 @@ def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
         for (task, what), reason, n in count_reasons(_left_out(run))
     ]
     why = "the run was stopped; the same command continues it"
-    rows += [Row((run.label, "", "not attempted", str(run.n_missing), why)) for run in runs if run.n_missing]
+    rows += [
+        Row((run.label, "", "not attempted", str(run.n_missing), why))
+        for run in runs
+        if run.n_missing
+    ]
     if not rows:
         return None
     columns = (*_NAMES, Column("what", False), Column("samples"), Column("reason", False))

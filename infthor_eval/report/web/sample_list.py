@@ -10,11 +10,19 @@ import msgspec
 from infthor_eval.report.runs import ReportRun, records_by_unit
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
-from infthor_eval.report.web.samples import FrameFacts, Numbered, PageSample, Prompt, SampleResult, StepRow, Timeline
+from infthor_eval.report.web.samples import (
+    FrameFacts,
+    Numbered,
+    PageSample,
+    Prompt,
+    SampleResult,
+    StepRow,
+    Timeline,
+)
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
-from infthor_eval.runs.shards import FOLDER
-from infthor_eval.runs.tracebacks import StoredTracebacks
+from infthor_eval.runs.journals.shards import FOLDER
+from infthor_eval.runs.journals.tracebacks import StoredTracebacks
 
 __all__ = ["SharedTexts", "SuiteSamples", "build_samples"]
 
@@ -67,10 +75,20 @@ def build_samples(
     progress.begin(_PROMPTS, len(runs))
     sources = []
     for run in runs:
-        sources.append(_Source(run, run.presenter.prompts(run, data), StoredTracebacks(run.folder / FOLDER), texts))
+        sources.append(
+            _Source(
+                run, run.presenter.prompts(run, data), StoredTracebacks(run.folder / FOLDER), texts
+            )
+        )
         progress.advance(_PROMPTS, run.label)
     samples = [
-        _sample(key, sources, records, [pictures.get(key) for pictures, _ in replayed], timelines.by_unit)
+        _sample(
+            key,
+            sources,
+            records,
+            [pictures.get(key) for pictures, _ in replayed],
+            timelines.by_unit,
+        )
         for key, records in records_by_unit(runs).items()
     ]
     notes = [*timelines.notes, *(note for _, notes in replayed for note in notes)]
@@ -112,7 +130,9 @@ def _sample(
         suite=first_run.suite.name,
         task=key.task,
         id=key.id,
-        variant=" ".join(filter(None, (key.variant, f"answer {key.repeat}" if key.repeat > 1 else ""))),
+        variant=" ".join(
+            filter(None, (key.variant, f"answer {key.repeat}" if key.repeat > 1 else ""))
+        ),
         cluster=first.cluster,
         results=tuple(results),
         timeline=timelines.get(key),

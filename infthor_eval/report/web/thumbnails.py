@@ -43,7 +43,10 @@ class ThumbnailStore:
     @property
     def large(self) -> Mapping[int, int]:
         """Number of the enlarged picture by that of its thumbnail, where there was room for it."""
-        return {thumbnail: number for number, (thumbnail, _) in enumerate(self._enlarged, len(self._encoded))}
+        return {
+            thumbnail: number
+            for number, (thumbnail, _) in enumerate(self._enlarged, len(self._encoded))
+        }
 
     @property
     def n_left_out(self) -> int:
@@ -68,7 +71,9 @@ class ThumbnailStore:
             if self._n_expected:
                 self._n_expected -= 1
                 self._progress.advance(_WORK)
-            self._numbers[key] = self._add(load, side or self._side) if self._left > 0 or self._enlarged else None
+            self._numbers[key] = (
+                self._add(load, side or self._side) if self._left > 0 or self._enlarged else None
+            )
         return self._numbers[key]
 
     def _add(self, load: Callable[[], Image.Image], side: int) -> int | None:

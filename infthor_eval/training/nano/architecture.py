@@ -13,10 +13,10 @@ from transformers.models.qwen2_vl.image_processing_pil_qwen2_vl import Qwen2VLIm
 
 from infthor_eval.household.sequence_text import MARKS
 from infthor_eval.training.nano.settings import NanoRecipe
-from model_adapters.hf.checkpoint import assemble
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.templates import plain_template
+from model_adapters.hf.loading.checkpoint import assemble
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.templates import plain_template
 from model_adapters.tiny.qwen2_5_vl import SPECIAL
 from model_adapters.tiny.tokenizer import train_tokenizer
 from model_adapters.tiny.twin import draw_model, token_ids
@@ -38,7 +38,9 @@ def image_processor() -> Any:
     return Qwen2VLImageProcessorPil(min_pixels=_PIXELS, max_pixels=_PIXELS)
 
 
-def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]) -> LoadedCheckpoint:
+def build_untrained(
+    recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterable[str]
+) -> LoadedCheckpoint:
     """Return the model with random weights of the recipe's seed, on the CPU in float32.
 
     Args:
@@ -56,7 +58,9 @@ def build_untrained(recipe: NanoRecipe, corpus: Iterable[str], sentences: Iterab
     )
     tokenizer.add_tokens([AddedToken(sentence, normalized=False) for sentence in sentences])
     ids = token_ids(SPECIAL, tokenizer)
-    model = draw_model(_config(recipe, ids, len(tokenizer)), recipe.seed, ids["<|im_end|>"], ids["<|endoftext|>"])
+    model = draw_model(
+        _config(recipe, ids, len(tokenizer)), recipe.seed, ids["<|im_end|>"], ids["<|endoftext|>"]
+    )
     processor = image_processor()
     family = Qwen25VLFamily(model, processor, tokenizer)
     family.video = None  # it is trained on no film

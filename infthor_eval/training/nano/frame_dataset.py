@@ -68,16 +68,24 @@ def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDa
             folder_of_steps = data.folder(name)
             steps = sorted(read_steps(folder_of_steps), key=lambda step: step.img_idx)
             if any(step.seen is None for step in steps):
-                raise DataError(f"{folder_of_steps}: does not list the objects in its frames; replay the trajectory")
+                raise DataError(
+                    f"{folder_of_steps}: does not list the objects in its frames; replay the trajectory"
+                )
             for frame, step in zip(data.frames(name), steps, strict=True):
                 frames.setdefault(frame.digest, (frame, step))
     entries = list(frames.values())
     types = sorted({_type(key) for _, step in entries for key in step.seen or ()})
     labels = [_labels(step.seen or {}, types, frame.size) for frame, step in entries]
     cells, shown, present = (torch.stack(parts) for parts in zip(*labels, strict=True))
-    with ThreadPoolExecutor(_READER_THREADS) as readers:  # decoding and resizing release the interpreter lock
-        pixels = torch.stack(list(readers.map(lambda entry: _patches(entry[0], image_processor), entries)))
-    return FrameDataset(tuple(frame for frame, _ in entries), tuple(types), pixels, cells, shown, present)
+    with ThreadPoolExecutor(
+        _READER_THREADS
+    ) as readers:  # decoding and resizing release the interpreter lock
+        pixels = torch.stack(
+            list(readers.map(lambda entry: _patches(entry[0], image_processor), entries))
+        )
+    return FrameDataset(
+        tuple(frame for frame, _ in entries), tuple(types), pixels, cells, shown, present
+    )
 
 
 def _patches(frame: FrameRef, image_processor: Any) -> Tensor:
@@ -98,7 +106,9 @@ def _labels(
 ) -> tuple[Tensor, Tensor, Tensor]:
     cells = torch.zeros(TOKENS, len(types))
     shown, present = torch.zeros(len(types)), torch.zeros(len(types))
-    coverage = _cell_coverage(torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size)
+    coverage = _cell_coverage(
+        torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size
+    )
     for (key, item), in_cells in zip(seen.items(), coverage, strict=True):
         column = types.index(_type(key))
         present[column] = 1

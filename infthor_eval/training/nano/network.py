@@ -16,8 +16,8 @@ from infthor_eval.training.encoding import TrainingSequence
 from infthor_eval.training.nano.architecture import TOKENS
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.network import SequenceModel
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.prompt import Frame
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.prompt import Frame
 
 __all__ = ["NanoNetwork", "spellings"]
 
@@ -27,7 +27,12 @@ _SCALE, _BIAS = 8.0, -4.0  # initial scale and bias of similarities, which are t
 
 def spellings(object_type: str) -> tuple[str, ...]:
     """Return the spellings of an object type in questions, answers, actions and plans."""
-    return f" {noun(object_type)}", compact_name(object_type), f" {object_type}", f" {compact_name(object_type)}"
+    return (
+        f" {noun(object_type)}",
+        compact_name(object_type),
+        f" {object_type}",
+        f" {compact_name(object_type)}",
+    )
 
 
 class NanoNetwork(SequenceModel):
@@ -47,7 +52,9 @@ class NanoNetwork(SequenceModel):
         self._dataset = dataset
         self._index_by_digest = dataset.index_by_digest()
         self._cached_features: Tensor | None = None
-        self._names = [_token_means(loaded.tokenizer, dataset.types, at) for at in range(len(spellings("Mug")))]
+        self._names = [
+            _token_means(loaded.tokenizer, dataset.types, at) for at in range(len(spellings("Mug")))
+        ]
         self.scale = torch.nn.Parameter(torch.tensor(_SCALE))
         self.bias = torch.nn.Parameter(torch.full((len(dataset.types),), _BIAS))
 
@@ -63,7 +70,10 @@ class NanoNetwork(SequenceModel):
         return indices, self.frame_features(indices)
 
     def _indices(self, frames: Sequence[Frame]) -> list[int]:
-        return [self._index_by_digest[digest] for digest in dict.fromkeys(frame.digest for frame in frames)]
+        return [
+            self._index_by_digest[digest]
+            for digest in dict.fromkeys(frame.digest for frame in frames)
+        ]
 
     def cache_features(self) -> None:
         """Compute the features of all frames once, for all later sequences; the tower is not trained any more.
@@ -79,7 +89,9 @@ class NanoNetwork(SequenceModel):
         """Return the features of frames of the dataset, (frames, tokens, hidden)."""
         if self._cached_features is not None:
             return self._cached_features[list(indices)]
-        grid = torch.tensor([[1, *([int(self._dataset.pixels.shape[1] ** 0.5)] * 2)]]).expand(len(indices), 3)
+        grid = torch.tensor([[1, *([int(self._dataset.pixels.shape[1] ** 0.5)] * 2)]]).expand(
+            len(indices), 3
+        )
         output = self.model.model.visual(self._dataset.tower_inputs(indices), grid_thw=grid)
         return output.pooler_output.reshape(len(indices), TOKENS, -1)
 
@@ -97,10 +109,17 @@ class NanoNetwork(SequenceModel):
         rows = list(indices)
         names = self._names[spelling] @ self.model.get_input_embeddings().weight
         logits = self.scale * (features @ names.T) + self.bias
-        cell_loss = binary_cross_entropy_with_logits(logits, self._dataset.cells[rows], reduction="none")
+        cell_loss = binary_cross_entropy_with_logits(
+            logits, self._dataset.cells[rows], reduction="none"
+        )
         shown, present = self._dataset.shown[rows], self._dataset.present[rows]
-        frame_loss = binary_cross_entropy_with_logits(torch.logsumexp(logits, 1), shown, reduction="none")
-        return cell_loss.sum(-1).mean() + (frame_loss * (1 - present + shown).clamp(max=1)).sum(-1).mean()
+        frame_loss = binary_cross_entropy_with_logits(
+            torch.logsumexp(logits, 1), shown, reduction="none"
+        )
+        return (
+            cell_loss.sum(-1).mean()
+            + (frame_loss * (1 - present + shown).clamp(max=1)).sum(-1).mean()
+        )
 
     @property
     def n_spellings(self) -> int:

@@ -16,7 +16,7 @@ from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.plans.segments import PlanSegment
+from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.training.action_sequences import single_plans, windows
 from infthor_eval.training.data import read_history, trajectory_names
 from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
@@ -95,16 +95,30 @@ class SequenceSampler:
         recorded: list[tuple[str, list[str]]] = []
         for folder in folders:
             samples = find_samples({"data": str(folder), "context": "clues"})
-            self._questions += self._without_skipped(question_sequences(encoder, samples, window_tokens))
+            self._questions += self._without_skipped(
+                question_sequences(encoder, samples, window_tokens)
+            )
             self._samples += [(samples.data, sample) for sample in samples.samples]
             for segments in self._read_histories(NiehSet(folder)):
-                recorded += [(segment.plan, [action for action, _ in segment.steps]) for segment in segments]
+                recorded += [
+                    (segment.plan, [action for action, _ in segment.steps]) for segment in segments
+                ]
         self._synthetic = SyntheticPlans(recorded)
-        for what, pool in (("question", self._questions), ("history", self._windows), ("plan", self._synthetic)):
+        for what, pool in (
+            ("question", self._questions),
+            ("history", self._windows),
+            ("plan", self._synthetic),
+        ):
             if not pool:
-                raise DataError(f"{', '.join(map(str, folders))}: no {what} to learn from; give another set")
+                raise DataError(
+                    f"{', '.join(map(str, folders))}: no {what} to learn from; give another set"
+                )
         counts = dataset.shown.sum(0).tolist()
-        frequent = {name: count for name, count in zip(dataset.types, counts, strict=True) if count >= _LEAST_FRAMES}
+        frequent = {
+            name: count
+            for name, count in zip(dataset.types, counts, strict=True)
+            if count >= _LEAST_FRAMES
+        }
         self._names, self._weights = list(frequent), list(frequent.values())
 
     def _read_histories(self, data: NiehSet) -> Iterator[list[PlanSegment]]:
@@ -121,14 +135,18 @@ class SequenceSampler:
             self._single_plans += [plan for plan in plans if plan.n_tokens <= self._limit]
             yield segments
 
-    def _without_skipped(self, items: Iterable[TrainingSequence | SkippedItem]) -> Iterator[TrainingSequence]:
+    def _without_skipped(
+        self, items: Iterable[TrainingSequence | SkippedItem]
+    ) -> Iterator[TrainingSequence]:
         for item in items:
             if isinstance(item, TrainingSequence):
                 yield item
             else:
                 self.skipped.append(item)
 
-    def questions(self, n: int, synthetic_share: float, recalled_share: float, n_others: int) -> list[TrainingSequence]:
+    def questions(
+        self, n: int, synthetic_share: float, recalled_share: float, n_others: int
+    ) -> list[TrainingSequence]:
         """Return random questions with their answers.
 
         Args:
@@ -139,7 +157,9 @@ class SequenceSampler:
         """
         return [self._question(synthetic_share, recalled_share, n_others) for _ in range(n)]
 
-    def _question(self, synthetic_share: float, recalled_share: float, n_others: int) -> TrainingSequence:
+    def _question(
+        self, synthetic_share: float, recalled_share: float, n_others: int
+    ) -> TrainingSequence:
         if self._rng.random() < synthetic_share:
             return self._presence_question()
         if self._rng.random() < recalled_share:
@@ -155,9 +175,13 @@ class SequenceSampler:
         recalled = tuple(sorted((clues | set(others)) - {last}))
         shown = replace(sample, frames=(*recalled, last), recalled=recalled)
         context, text = CONTEXTS[MEMORY].request(data, shown)
-        return self._encoder.answer("recalled", [*as_images(context), text], doc_target(sample.question))
+        return self._encoder.answer(
+            "recalled", [*as_images(context), text], doc_target(sample.question)
+        )
 
-    def histories(self, n_windows: int, n_plans: int, single_plan_share: float) -> list[TrainingSequence]:
+    def histories(
+        self, n_windows: int, n_plans: int, single_plan_share: float
+    ) -> list[TrainingSequence]:
         """Return random histories with their actions: either windows or single plans.
 
         Args:
@@ -171,7 +195,10 @@ class SequenceSampler:
 
     def synthetic_plans(self, n: int) -> list[TrainingSequence]:
         """Return random synthetic plans with their actions, without frames."""
-        return [self._encoder.text_plan("synthetic", *self._synthetic.sample(self._rng)) for _ in range(n)]
+        return [
+            self._encoder.text_plan("synthetic", *self._synthetic.sample(self._rng))
+            for _ in range(n)
+        ]
 
     def frames(self, n: int) -> list[int]:
         """Return the indices of random frames in the dataset."""

@@ -17,7 +17,7 @@ from infthor_eval.training.nano.network import NanoNetwork
 from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts, question_intro
 from infthor_eval.training.nano.settings import NanoRecipe
 from infthor_eval.training.network import decay_groups
-from model_adapters.hf.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 __all__ = ["NanoProgress", "train_small_model"]
 
@@ -73,7 +73,12 @@ def train_small_model(
     loaded = build_untrained(recipe, corpus_texts(folders, dataset.types), [question_intro()])
     network = NanoNetwork(loaded, dataset)
     sampler = SequenceSampler(
-        Encoder(loaded), folders, dataset, window_tokens=recipe.window_tokens, words=recipe.words, seed=recipe.seed
+        Encoder(loaded),
+        folders,
+        dataset,
+        window_tokens=recipe.window_tokens,
+        words=recipe.words,
+        seed=recipe.seed,
     )
     for _, reason, n in count_reasons(("", item.reason) for item in sampler.skipped):
         print_note(f"{n} skipped: {reason}")
@@ -84,7 +89,9 @@ def train_small_model(
     trainer.run("text", recipe.text_steps, trainer.text_step)
     trainer.run("joint", recipe.joint_steps, trainer.joint_step)
     network.eval()
-    loaded.model.to(torch.bfloat16)  # halves the file; no answer of the bundled model depends on the rounding
+    loaded.model.to(
+        torch.bfloat16
+    )  # halves the file; no answer of the bundled model depends on the rounding
     return loaded
 
 
@@ -149,18 +156,27 @@ class _StageTrainer:
         """
         recipe = self._recipe
         questions = self._sampler.questions(
-            recipe.questions_per_step, recipe.synthetic_questions, recipe.recalled_questions, recipe.recalled_frames
+            recipe.questions_per_step,
+            recipe.synthetic_questions,
+            recipe.recalled_questions,
+            recipe.recalled_frames,
         )
         answers = self._token_loss(questions)
         indices, features = self._network.frames_of(questions)
-        histories = self._sampler.histories(recipe.windows_per_step, recipe.plans_per_step, recipe.single_plan_share)
+        histories = self._sampler.histories(
+            recipe.windows_per_step, recipe.plans_per_step, recipe.single_plan_share
+        )
         actions = self._token_loss(histories)
-        text_plans = self._token_loss(self._sampler.synthetic_plans(recipe.joint_text_plans_per_step))
+        text_plans = self._token_loss(
+            self._sampler.synthetic_plans(recipe.joint_text_plans_per_step)
+        )
         loss = answers + actions + recipe.text_plans_weight * text_plans
         return loss + recipe.vision_weight * self._vision_loss(features, indices), loss.detach()
 
     def _vision_loss(self, features: Tensor, indices: Sequence[int]) -> Tensor:
-        return self._network.vision_loss(features, indices, self._sampler.spelling(self._network.n_spellings))
+        return self._network.vision_loss(
+            features, indices, self._sampler.spelling(self._network.n_spellings)
+        )
 
     def _token_loss(self, sequences: Sequence[TrainingSequence]) -> Tensor:
         """Return the mean loss per token of some sequences, which are computed in batches of about one length.

@@ -7,8 +7,8 @@ import random
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
-from infthor_eval.plans.habits import fill_action, open_action
-from infthor_eval.plans.script import read_plan, replace_objects
+from infthor_eval.plans.actors.habits import fill_action, open_action
+from infthor_eval.plans.actors.script import read_plan, replace_objects
 
 __all__ = ["SyntheticPlans"]
 

@@ -23,16 +23,21 @@ from transformers.models.auto.modeling_auto import MODEL_FOR_IMAGE_TEXT_TO_TEXT_
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.adapter import load_model, wrap_mismatch_errors
-from model_adapters.hf.checkpoint import LocatedCheckpoint, load_checkpoint, locate, wrap_loading_errors
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.families.deepseek_vl import DeepseekVLFamily
 from model_adapters.hf.families.llava_onevision import LlavaOnevisionFamily
 from model_adapters.hf.families.pixtral import PixtralFamily
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.families.qwen2_5_vl import Qwen25VLFamily
 from model_adapters.hf.family import MakeFamily, Size
-from model_adapters.hf.loaded import LoadedCheckpoint
-from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.prompt import Piece, Prompter, token_ids
+from model_adapters.hf.loading.checkpoint import (
+    LocatedCheckpoint,
+    load_checkpoint,
+    locate,
+    wrap_loading_errors,
+)
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.prompting.prompt import Piece, Prompter, token_ids
 from model_adapters.hf.uncached import UncachedModel, expand_image_token, image_token, process_turns
 from model_adapters.options.checkpoints import CheckpointReading
 from model_adapters.options.families import HfVlmOptions
@@ -40,7 +45,10 @@ from model_adapters.protocols import Model, Part, Turn
 
 __all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor", "require_same_ids"]
 
-_TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}  # relative to the largest logit; more in half precision
+_TOLERANCE = {
+    torch.float32: 1e-3,
+    torch.float64: 1e-3,
+}  # relative to the largest logit; more in half precision
 _HALF_TOLERANCE = 0.1
 _BLANK = (300, 300)  # width and height of a sample image
 
@@ -72,11 +80,15 @@ class ProcessorFamily(PlainFamily):
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the model's features of each image, (slots, hidden)."""
-        compute = getattr(self._model, "get_image_features", None) or self._model.model.get_image_features
+        compute = (
+            getattr(self._model, "get_image_features", None) or self._model.model.get_image_features
+        )
         parameters = inspect.signature(compute).parameters
         features = []
         for image in images:
-            inputs = {name: value for name, value in self._inputs([image]).items() if name in parameters}
+            inputs = {
+                name: value for name, value in self._inputs([image]).items() if name in parameters
+            }
             pooled = compute(**inputs, return_dict=True).pooler_output
             parts = pooled if isinstance(pooled, list | tuple) else [pooled]
             features.append(torch.cat([part.reshape(-1, part.shape[-1]) for part in parts]))
@@ -132,9 +144,13 @@ class HfVlm:
             raise UsageError(f"{name} needs pretrained=..., a hub id or a folder")
         located = locate(options)
         model_type = located.config.model_type
-        remote = options.trust_remote_code and "AutoModelForImageTextToText" in getattr(located.config, "auto_map", {})
+        remote = options.trust_remote_code and "AutoModelForImageTextToText" in getattr(
+            located.config, "auto_map", {}
+        )
         if model_type not in MODEL_FOR_IMAGE_TEXT_TO_TEXT_MAPPING_NAMES and not remote:
-            raise ModelError(f"{options.pretrained} is a {model_type} checkpoint, which has no vision")
+            raise ModelError(
+                f"{options.pretrained} is a {model_type} checkpoint, which has no vision"
+            )
         return located
 
 
@@ -164,7 +180,9 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
             located.folder, backend="pil", **remote
         )
     if not hasattr(processor, "tokenizer"):
-        raise ModelError(f"{located.options.pretrained} has no processor of images and text together")
+        raise ModelError(
+            f"{located.options.pretrained} has no processor of images and text together"
+        )
     return processor
 
 
@@ -187,7 +205,10 @@ def _compare_ids(pieces: Iterable[Piece], inputs: Any, hint: str) -> None:
 
 @torch.inference_mode()
 def _compare_with_plain_model(
-    model: TransformersModel | UncachedModel, loaded: LoadedCheckpoint, processor: Any, pretrained: str
+    model: TransformersModel | UncachedModel,
+    loaded: LoadedCheckpoint,
+    processor: Any,
+    pretrained: str,
 ) -> None:
     """Raise `ModelError` unless a sample has the processor's token ids and the plain model's logits."""
     hint = f"{loaded.model.config.model_type} cannot be run with shared prefixes; use share_prefix=false"

@@ -31,7 +31,9 @@ class LlavaOnevisionFamily(PlainFamily):
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the packed features of overview, patches and row breaks for each image, (tokens, hidden)."""
         inputs = self._inputs(images)
-        output = self._model.get_image_features(inputs["pixel_values"], inputs["image_sizes"], return_dict=True)
+        output = self._model.get_image_features(
+            inputs["pixel_values"], inputs["image_sizes"], return_dict=True
+        )
         return list(output.pooler_output)
 
 

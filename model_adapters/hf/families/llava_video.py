@@ -34,12 +34,16 @@ class LlavaVideo:
         side = math.ceil(vision.image_size // vision.patch_size / _POOLED)
         return side**2 + _is_last(shape)
 
-    def features(self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]) -> list[torch.Tensor]:
+    def features(
+        self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
+    ) -> list[torch.Tensor]:
         """Return the pooled patches of each frame, (tokens, hidden), with the break after the last frame of a video."""
         frames = [image for _, images in clips for image in images]
         overviews = self._image_processor(images=frames, return_tensors="pt")["pixel_values"][:, 0]
         weight = self._model.get_input_embeddings().weight
-        output = self._model.get_video_features(overviews.to(weight.device, self._model.dtype)[None], return_dict=True)
+        output = self._model.get_video_features(
+            overviews.to(weight.device, self._model.dtype)[None], return_dict=True
+        )
         features = output.pooler_output[0]
         pooled, line_break = features[:-1].chunk(len(frames)), features[-1:]
         return [

@@ -25,10 +25,14 @@ class PixtralFamily(PlainFamily):
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
         super().__init__(model, image_processor, tokenizer)
         if model.config.vision_config.model_type != "pixtral":
-            raise ModelError("the checkpoint is a LLaVA without Pixtral's vision tower; use hf-vlm for it")
+            raise ModelError(
+                "the checkpoint is a LLaVA without Pixtral's vision tower; use hf-vlm for it"
+            )
         vocabulary = tokenizer.get_vocab()
         if not {"[IMG_BREAK]", "[IMG_END]"} <= set(vocabulary):
-            raise ModelError("the checkpoint's tokenizer has no [IMG_BREAK] or no [IMG_END]; it is not Pixtral's")
+            raise ModelError(
+                "the checkpoint's tokenizer has no [IMG_BREAK] or no [IMG_END]; it is not Pixtral's"
+            )
         self._break_id, self._end_id = vocabulary["[IMG_BREAK]"], vocabulary["[IMG_END]"]
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:

@@ -49,6 +49,8 @@ class PlainFamily:
         # Without weights (meta device) only shapes of pixels are used, but counts need values.
         counts = torch.device("cpu") if weight.is_meta else weight.device
         return {
-            name: value.to(weight.device, self._model.dtype) if value.is_floating_point() else value.to(counts)
+            name: value.to(weight.device, self._model.dtype)
+            if value.is_floating_point()
+            else value.to(counts)
             for name, value in inputs.items()
         }

@@ -31,7 +31,9 @@ class Qwen25VLFamily(PlainFamily):
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return one token for each square of merged patches."""
-        return (self.slot_id,) * (math.prod(self._grid(size)) // self._image_processor.merge_size**2)
+        return (self.slot_id,) * (
+            math.prod(self._grid(size)) // self._image_processor.merge_size**2
+        )
 
     def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
         """Return the placeholder between the vision markers, which the processor leaves to the template."""
@@ -41,7 +43,9 @@ class Qwen25VLFamily(PlainFamily):
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the vision tower's merged patches of each image, (tokens, hidden)."""
         inputs = self._inputs(images)
-        output = self._model.get_image_features(inputs["pixel_values"], inputs["image_grid_thw"], return_dict=True)
+        output = self._model.get_image_features(
+            inputs["pixel_values"], inputs["image_grid_thw"], return_dict=True
+        )
         return list(output.pooler_output)
 
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
@@ -52,7 +56,11 @@ class Qwen25VLFamily(PlainFamily):
         """
         rows = []
         for run in self._runs(ids, shapes):
-            row = self._clips.positions(run, start) if isinstance(run, ClipShape) else self._still(*run, start)
+            row = (
+                self._clips.positions(run, start)
+                if isinstance(run, ClipShape)
+                else self._still(*run, start)
+            )
             rows.append(row)
             start = max(start, int(row.max()) + 1)
         return torch.cat(rows, dim=-1)
@@ -62,7 +70,9 @@ class Qwen25VLFamily(PlainFamily):
     ) -> Iterator[ClipShape | tuple[torch.Tensor, list[Size]]]:
         """Yield each clip of a span, and the ids of what is between clips with the sizes of its frames."""
         left = list(shapes)
-        for in_video, run in groupby(ids.tolist(), lambda token: token == self._clips.placeholder_id):
+        for in_video, run in groupby(
+            ids.tolist(), lambda token: token == self._clips.placeholder_id
+        ):
             own, sizes = list(run), list[Size]()
             while left and own and isinstance(left[0], ClipShape) == in_video:
                 shape = left.pop(0)

@@ -36,14 +36,18 @@ class QwenVideo:
         """Return one token for each square of merged patches."""
         return math.prod(self._merged_sides(shape))
 
-    def features(self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]) -> list[torch.Tensor]:
+    def features(
+        self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
+    ) -> list[torch.Tensor]:
         """Return the vision tower's merged patches of each clip, (tokens, hidden).
 
         The tower attends within a temporal patch only, so clips can be encoded one by one as well as together.
         """
         pixels, grids = [], []
         for shape, images in clips:
-            inputs = self._image_processor(images=list(images), size=self._limits(shape), return_tensors="pt")
+            inputs = self._image_processor(
+                images=list(images), size=self._limits(shape), return_tensors="pt"
+            )
             pixels.append(self._interleave(inputs["pixel_values"], len(images)))
             grids.append(inputs["image_grid_thw"][0])
         weight = self._model.get_input_embeddings().weight
@@ -86,7 +90,9 @@ class QwenVideo:
         key = shape.size, shape.n_clips
         if key not in self._sides:
             blank = Image.new("RGB", shape.size)
-            inputs = self._image_processor(images=[blank], size=self._limits(shape), return_tensors="pt")
+            inputs = self._image_processor(
+                images=[blank], size=self._limits(shape), return_tensors="pt"
+            )
             _, height, width = inputs["image_grid_thw"][0].tolist()
             merge = self._image_processor.merge_size
             self._sides[key] = height // merge, width // merge
@@ -109,5 +115,9 @@ class QwenVideo:
         The image processor repeats an image along time; of each frame, its own place in time is taken.
         """
         area = self._image_processor.patch_size**2
-        by_frame = pixels.reshape(n_frames, -1, pixels.shape[-1] // (n_frames * area), n_frames, area)
-        return torch.stack([by_frame[place, :, :, place] for place in range(n_frames)], dim=2).flatten(1)
+        by_frame = pixels.reshape(
+            n_frames, -1, pixels.shape[-1] // (n_frames * area), n_frames, area
+        )
+        return torch.stack(
+            [by_frame[place, :, :, place] for place in range(n_frames)], dim=2
+        ).flatten(1)

@@ -57,7 +57,9 @@ class HttpPolicy:
         try:
             numbers = decode_numbers(reply)
         except (ValueError, OverflowError) as error:
-            raise ModelError(f"{self._url} answers without an action of numbers: {error}; see its log") from error
+            raise ModelError(
+                f"{self._url} answers without an action of numbers: {error}; see its log"
+            ) from error
         actions = numbers[None] if numbers.ndim == 1 else numbers
         return arm_deltas(f"{self.name} ({self._url})", actions)[: self._options.execute]
 

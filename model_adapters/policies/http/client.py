@@ -62,7 +62,9 @@ class JsonClient:
             except (urllib.error.URLError, ConnectionError, http.client.HTTPException) as error:
                 reason = error
         cause = in_one_line(getattr(reason, "reason", None) or reason or ConnectionError())
-        raise ModelError(f"{self._url} cannot be reached in {self._retries + 1} attempts ({cause}); is the server up?")
+        raise ModelError(
+            f"{self._url} cannot be reached in {self._retries + 1} attempts ({cause}); is the server up?"
+        )
 
     def _send_once(self, body: bytes) -> bytes:
         request = urllib.request.Request(self._url, body, {"Content-Type": "application/json"})
@@ -88,13 +90,17 @@ class JsonClient:
             if time.monotonic() > end:
                 raise self._timeout_error()
             if len(content) > _LARGEST:
-                raise ModelError(f"{self._url} answers more than {_LARGEST} bytes; is it a policy's?")
+                raise ModelError(
+                    f"{self._url} answers more than {_LARGEST} bytes; is it a policy's?"
+                )
         if reply.length:  # bytes of the announced length that are missing
             raise http.client.IncompleteRead(content, reply.length)
         return content
 
     def _timeout_error(self) -> ModelError:
-        return ModelError(f"{self._url} does not answer within {self._timeout_s:g} s; raise timeout_s if it is slow")
+        return ModelError(
+            f"{self._url} does not answer within {self._timeout_s:g} s; raise timeout_s if it is slow"
+        )
 
 
 def _quote(content: bytes) -> str:

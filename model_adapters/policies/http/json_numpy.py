@@ -53,6 +53,8 @@ def _decode_array(value: dict[str, Any]) -> npt.NDArray[Any]:
         dtype = np.dtype(str(value["dtype"]))
         if dtype.kind not in _KINDS:
             raise ValueError(f"an array of {dtype}")
-        return np.frombuffer(base64.b64decode(value[_MARK], validate=True), dtype).reshape(value["shape"])
+        return np.frombuffer(base64.b64decode(value[_MARK], validate=True), dtype).reshape(
+            value["shape"]
+        )
     except (KeyError, TypeError, binascii.Error) as error:
         raise ValueError(f"a damaged array ({error})") from error

@@ -6,7 +6,7 @@ from typing import Any
 from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.checkpoint import wrap_loading_errors
+from model_adapters.hf.loading.checkpoint import wrap_loading_errors
 from model_adapters.options.policies import OpenVLAOptions, PolicyOptions
 from model_adapters.policies.adapter import PolicyAdapter
 from model_adapters.policies.checkpoint import PolicyCheckpoint
@@ -72,7 +72,14 @@ def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions
         with empty_parameters():
             weights = OpenVLAWeights(towers, size, config.language(options.attn_implementation))
         layout = weights_layout(weights, towers)
-        load_weights(weights, checkpoint.folder, layout, pretrained=checkpoint.pretrained, device=device, dtype=dtype)
+        load_weights(
+            weights,
+            checkpoint.folder,
+            layout,
+            pretrained=checkpoint.pretrained,
+            device=device,
+            dtype=dtype,
+        )
     network = OpenVLANetwork(weights.eval(), description.tokenizer, description.bins, size)
     identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": description.key}
     return VlaPolicy(name, network, description.statistics, options, identity, options.threads)
@@ -82,7 +89,9 @@ def _tokenizer(checkpoint: PolicyCheckpoint) -> Tokenizer:
     tokenizer = checkpoint.tokenizer()
     # The network inserts the patches after the first token, so this has to be the begin token.
     if tokenizer.encode("In").ids[0] != tokenizer.token_to_id("<s>"):
-        raise ModelError(f"{checkpoint.pretrained}: the tokenizer does not begin a text with <s>; restore its file")
+        raise ModelError(
+            f"{checkpoint.pretrained}: the tokenizer does not begin a text with <s>; restore its file"
+        )
     return tokenizer
 
 

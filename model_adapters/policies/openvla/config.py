@@ -52,7 +52,11 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
             ModelError: the checkpoint needs another preprocessing of frames.
         """
         is_known = self.use_fused_vision_backbone and self.image_resize_strategy == "resize-naive"
-        if not is_known or set(self.timm_override_act_layers) != {None} or len(set(self.image_sizes)) != 1:
+        if (
+            not is_known
+            or set(self.timm_override_act_layers) != {None}
+            or len(set(self.image_sizes)) != 1
+        ):
             raise ModelError(
                 f"{pretrained} has image_sizes={self.image_sizes}, image_resize_strategy={self.image_resize_strategy}, "
                 f"use_fused_vision_backbone={self.use_fused_vision_backbone}, timm_override_act_layers="
@@ -67,7 +71,9 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
             ModelError: the checkpoint has other towers.
         """
         unknown = [name for name in self.timm_model_ids if name not in TOWERS]
-        shapes = self.vision_towers or [TOWERS[name] for name in self.timm_model_ids if name in TOWERS]
+        shapes = self.vision_towers or [
+            TOWERS[name] for name in self.timm_model_ids if name in TOWERS
+        ]
         if unknown or [shape.kind for shape in shapes] != ["dinov2", "siglip"]:
             raise ModelError(
                 f"{pretrained} has the vision towers {self.timm_model_ids}; only {list(TOWERS)} are supported"

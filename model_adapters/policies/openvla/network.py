@@ -64,10 +64,14 @@ class _OpenVLAProjector(nn.Module):
 class OpenVLAWeights(nn.Module):
     """All modules with weights, under the names of the published checkpoint; the image size is in pixels."""
 
-    def __init__(self, towers: tuple[TowerShape, TowerShape], image_size: int, language: LlamaConfig) -> None:
+    def __init__(
+        self, towers: tuple[TowerShape, TowerShape], image_size: int, language: LlamaConfig
+    ) -> None:
         super().__init__()
         self.vision_backbone = _Vision(towers, image_size)
-        self.projector = _OpenVLAProjector(sum(tower.width for tower in towers), language.hidden_size)
+        self.projector = _OpenVLAProjector(
+            sum(tower.width for tower in towers), language.hidden_size
+        )
         self.language_model = LlamaForCausalLM(language)
 
 
@@ -75,7 +79,9 @@ def weights_layout(weights: OpenVLAWeights, towers: tuple[TowerShape, TowerShape
     """Return the layout of the checkpoint, of modules without memory; the key of every parameter is its name."""
     parts = zip(("featurizer", "fused_featurizer"), towers, strict=True)
     unused = {
-        f"vision_backbone.{part}.{key}": shape for part, tower in parts for key, shape in unused_keys(tower).items()
+        f"vision_backbone.{part}.{key}": shape
+        for part, tower in parts
+        for key, shape in unused_keys(tower).items()
     }
     return Layout.of(weights, lambda name: name, unused)
 
@@ -103,7 +109,9 @@ class OpenVLANetwork:
         cache = DynamicCache(config=model.config)
 
         def logits(embeds: torch.Tensor) -> torch.Tensor:
-            output = model(inputs_embeds=embeds, past_key_values=cache, use_cache=True, logits_to_keep=1)
+            output = model(
+                inputs_embeds=embeds, past_key_values=cache, use_cache=True, logits_to_keep=1
+            )
             return output.logits[0, -1].float()
 
         def step(token: int) -> torch.Tensor:
@@ -113,5 +121,7 @@ class OpenVLANetwork:
         patches = self.weights.projector(self.weights.vision_backbone(pixels))
         text = embed_ids(model, prompt_ids(self.tokenizer, instruction))
         first = logits(torch.cat([text[:, :1], patches, text[:, 1:]], dim=1))
-        ids = decode_greedily(first, step, [self.bins.action_ids] * ACTION_SIZE, constrained=constrained)
+        ids = decode_greedily(
+            first, step, [self.bins.action_ids] * ACTION_SIZE, constrained=constrained
+        )
         return self.bins.decode(ids)

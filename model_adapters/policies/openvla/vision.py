@@ -51,7 +51,9 @@ class _Attention(nn.Module):
 
     def forward(self, tokens: torch.Tensor) -> torch.Tensor:
         batch, length, width = tokens.shape
-        query, key, value = self.qkv(tokens).view(batch, length, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
+        query, key, value = (
+            self.qkv(tokens).view(batch, length, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
+        )
         mixed = scaled_dot_product_attention(query, key, value)
         return self.proj(mixed.transpose(1, 2).reshape(batch, length, width))
 
@@ -132,7 +134,9 @@ def unused_keys(shape: TowerShape) -> dict[str, Shape]:
     width = shape.width
     with empty_parameters():
         last = _Block(shape).state_dict()
-    keys: dict[str, Shape] = {f"blocks.{shape.depth - 1}.{name}": tuple(value.shape) for name, value in last.items()}
+    keys: dict[str, Shape] = {
+        f"blocks.{shape.depth - 1}.{name}": tuple(value.shape) for name, value in last.items()
+    }
     keys |= _affine("norm", width)
     if shape.kind == "siglip":
         keys["attn_pool.latent"] = (1, 1, width)

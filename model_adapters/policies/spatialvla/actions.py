@@ -88,7 +88,9 @@ class SpatialBins:
     yaw: Sequence[float]
 
     @classmethod
-    def of(cls, config: ProcessorConfig, begin: int, n_tokens: int, pretrained: str) -> "SpatialBins":
+    def of(
+        cls, config: ProcessorConfig, begin: int, n_tokens: int, pretrained: str
+    ) -> "SpatialBins":
         """Return the bins of a checkpoint, by its first action token, their number and the config of its processor.
 
         Raises:
@@ -99,10 +101,14 @@ class SpatialBins:
         expected = {**counts.translation, **counts.rotation}
         wrong = [name for name, borders in axes.items() if len(borders) - 1 != expected.get(name)]
         if wrong or not config.action_config.use_spherical or counts.gripper != _GRIPPER_IDS:
-            raise ModelError(f"{pretrained}: bins and num_bins do not fit ({', '.join(wrong) or 'no spherical bins'})")
+            raise ModelError(
+                f"{pretrained}: bins and num_bins do not fit ({', '.join(wrong) or 'no spherical bins'})"
+            )
         bins = cls(begin, *(tuple(axes[name]) for name in axes))
         if bins.action_ids[-1].stop != begin + n_tokens:
-            raise ModelError(f"{pretrained} has {n_tokens} action tokens and {bins.action_ids[-1].stop - begin} bins")
+            raise ModelError(
+                f"{pretrained} has {n_tokens} action tokens and {bins.action_ids[-1].stop - begin} bins"
+            )
         return bins
 
     @property
@@ -110,7 +116,11 @@ class SpatialBins:
         """Ids of a step's three tokens: translations, then rotations, then gripper closed and open."""
         rotations = self.begin + _n(self.theta) * _n(self.phi) * _n(self.r)
         grippers = rotations + _n(self.roll) * _n(self.pitch) * _n(self.yaw)
-        return range(self.begin, rotations), range(rotations, grippers), range(grippers, grippers + _GRIPPER_IDS)
+        return (
+            range(self.begin, rotations),
+            range(rotations, grippers),
+            range(grippers, grippers + _GRIPPER_IDS),
+        )
 
     def decode(self, ids: Sequence[int]) -> Actions:
         """Return actions, (steps, 7), each number between -1 and 1, the gripper 0 or 1.
@@ -121,11 +131,15 @@ class SpatialBins:
         Args:
             ids: three ids per step, each among `action_ids` of its place.
         """
-        steps = np.array(ids).reshape(-1, TOKENS_PER_STEP) - [place.start for place in self.action_ids]
+        steps = np.array(ids).reshape(-1, TOKENS_PER_STEP) - [
+            place.start for place in self.action_ids
+        ]
         theta, phi, r = _centres(steps[:, 0], self.theta, self.phi, self.r)
         xyz = [r * np.sin(theta) * np.cos(phi), r * np.sin(theta) * np.sin(phi), r * np.cos(theta)]
         rotation = _centres(steps[:, 1], self.roll, self.pitch, self.yaw)
-        actions: Actions = np.stack([*np.clip(xyz, -1, 1), *rotation, steps[:, 2].astype(np.float64)], axis=1)
+        actions: Actions = np.stack(
+            [*np.clip(xyz, -1, 1), *rotation, steps[:, 2].astype(np.float64)], axis=1
+        )
         assert actions.shape[1] == ACTION_SIZE
         return actions
 
@@ -137,4 +151,7 @@ def _n(borders: Sequence[float]) -> int:
 def _centres(index: np.ndarray, *axes: Sequence[float]) -> list[np.ndarray]:
     """Return the centres on three axes of bins, (steps,), that are numbered with the last axis fastest."""
     places = np.unravel_index(index, [_n(axis) for axis in axes])
-    return [(np.array(axis)[at] + np.array(axis)[at + 1]) / 2 for at, axis in zip(places, axes, strict=True)]
+    return [
+        (np.array(axis)[at] + np.array(axis)[at + 1]) / 2
+        for at, axis in zip(places, axes, strict=True)
+    ]

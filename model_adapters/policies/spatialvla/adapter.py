@@ -3,8 +3,12 @@
 from tokenizers import Tokenizer
 
 from infthor_eval.errors import ModelError
-from model_adapters.hf.checkpoint import wrap_loading_errors
-from model_adapters.options.policies import SpatialVLACheckpointOptions, SpatialVLAOptions, parse_field_of_view
+from model_adapters.hf.loading.checkpoint import wrap_loading_errors
+from model_adapters.options.policies import (
+    SpatialVLACheckpointOptions,
+    SpatialVLAOptions,
+    parse_field_of_view,
+)
 from model_adapters.policies.adapter import PolicyAdapter
 from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.policy import VlaPolicy
@@ -20,14 +24,18 @@ __all__ = ["MODEL_TYPE", "SpatialVLA", "load_spatialvla"]
 MODEL_TYPE = "spatialvla"
 
 
-def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLAOptions) -> VlaPolicy:
+def load_spatialvla(
+    name: str, checkpoint: PolicyCheckpoint, options: SpatialVLAOptions
+) -> VlaPolicy:
     """Load a SpatialVLA; see `PolicyAdapter.build`."""
     checkpoint.require_model_type(MODEL_TYPE)
     config = checkpoint.read("config.json", SpatialVLAConfig)
     processor = checkpoint.read("processor_config.json", ProcessorConfig)
     pretrained = checkpoint.pretrained
     key, statistics = select_statistics(processor.statistics, options.unnorm_key, pretrained)
-    bins = SpatialBins.of(processor, config.action_token_begin_idx, config.spatial_token_num, pretrained)
+    bins = SpatialBins.of(
+        processor, config.action_token_begin_idx, config.spatial_token_num, pretrained
+    )
     tokenizer = _tokenizer(checkpoint, config)
     device, dtype = checkpoint.resolve_placement(options)
     with wrap_loading_errors(pretrained):
@@ -35,12 +43,22 @@ def load_spatialvla(name: str, checkpoint: PolicyCheckpoint, options: SpatialVLA
         view = _view(config, processor, key, options, pretrained)
         with empty_parameters():
             weights = SpatialVLAWeights(config, options.attn_implementation)
-        load_weights(weights, checkpoint.folder, weights.layout(), pretrained=pretrained, device=device, dtype=dtype)
+        load_weights(
+            weights,
+            checkpoint.folder,
+            weights.layout(),
+            pretrained=pretrained,
+            device=device,
+            dtype=dtype,
+        )
         weights.place_action_embeddings()
     network = SpatialVLANetwork(
         weights.eval(), tokenizer, bins, processor.action_chunk_size, config.image_token_index, view
     )
-    identity = checkpoint.identity(device, dtype, options) | {"unnorm_key": key, "intrinsics": options.intrinsics}
+    identity = checkpoint.identity(device, dtype, options) | {
+        "unnorm_key": key,
+        "intrinsics": options.intrinsics,
+    }
     return VlaPolicy(name, network, statistics, options, identity, options.threads)
 
 
@@ -56,7 +74,11 @@ def _tokenizer(checkpoint: PolicyCheckpoint, config: SpatialVLAConfig) -> Tokeni
 
 
 def _view(
-    config: SpatialVLAConfig, processor: ProcessorConfig, key: str, options: SpatialVLAOptions, pretrained: str
+    config: SpatialVLAConfig,
+    processor: ProcessorConfig,
+    key: str,
+    options: SpatialVLAOptions,
+    pretrained: str,
 ) -> View:
     degrees, cameras = parse_field_of_view(options.intrinsics), processor.intrinsic_config
     size, patch, zoe_size = config.sides(pretrained)
@@ -65,7 +87,9 @@ def _view(
         patch=patch,
         resolution=config.ego3d_patch_reso,
         zoe_size=zoe_size,
-        intrinsics=published_intrinsics(cameras, key, size, pretrained) if degrees is None else None,
+        intrinsics=published_intrinsics(cameras, key, size, pretrained)
+        if degrees is None
+        else None,
         field_of_view=degrees,
     )
 

@@ -28,7 +28,11 @@ def published_intrinsics(
     """
     camera = cameras.get(unnorm_key) or cameras.get(DEFAULT_INTRINSICS)
     rows = [] if camera is None else camera.intrinsic
-    if camera is None or [len(row) for row in rows] != [3, 3, 3] or min(camera.width, camera.height) < 1:
+    if (
+        camera is None
+        or [len(row) for row in rows] != [3, 3, 3]
+        or min(camera.width, camera.height) < 1
+    ):
         raise ModelError(
             f"{pretrained} has no intrinsics for {unnorm_key} and no default; give intrinsics=thor:DEGREES"
         )
@@ -47,4 +51,10 @@ def thor_intrinsics(degrees: float, size: tuple[int, int], image_size: int) -> t
     width, height = size
     focal = (height / 2) / math.tan(math.radians(degrees) / 2)
     middle = image_size / 2
-    return torch.tensor([[focal * image_size / width, 0, middle], [0, focal * image_size / height, middle], [0, 0, 1]])
+    return torch.tensor(
+        [
+            [focal * image_size / width, 0, middle],
+            [0, focal * image_size / height, middle],
+            [0, 0, 1],
+        ]
+    )

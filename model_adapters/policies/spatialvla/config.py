@@ -62,7 +62,9 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
         sides = vision.image_size, vision.patch_size, getattr(backbone, "image_size", None)
         image, patch, zoe = sides
         if not (isinstance(image, int) and isinstance(patch, int) and isinstance(zoe, int)):
-            raise ModelError(f"{pretrained}: images, patches and depth images of sides {sides} are not supported")
+            raise ModelError(
+                f"{pretrained}: images, patches and depth images of sides {sides} are not supported"
+            )
         return image, patch, zoe
 
     def text(self) -> Gemma2Config:

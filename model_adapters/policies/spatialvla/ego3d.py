@@ -9,7 +9,11 @@ from model_adapters.policies.preprocessing import normalise
 __all__ = ["Ego3DEmbedding", "back_project", "estimate_depth"]
 
 _HALF = (0.5, 0.5, 0.5)
-_CENTRE = (0.0, 0.0, 2.0)  # metres; the point in front of the camera that coordinates are relative to
+_CENTRE = (
+    0.0,
+    0.0,
+    2.0,
+)  # metres; the point in front of the camera that coordinates are relative to
 _REACH = 2.0  # metres; coordinates are divided by it
 
 
@@ -26,7 +30,10 @@ class Ego3DEmbedding(nn.Module):
         super().__init__()
         self._n_freqs = n_freqs
         self.position_embedding_head = nn.Sequential(
-            nn.Linear(3 * n_points * (2 * n_freqs + 1), width), nn.LayerNorm(width), nn.ReLU(), nn.Linear(width, width)
+            nn.Linear(3 * n_points * (2 * n_freqs + 1), width),
+            nn.LayerNorm(width),
+            nn.ReLU(),
+            nn.Linear(width, width),
         )
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:
@@ -51,13 +58,17 @@ def estimate_depth(zoe: nn.Module, pixels: torch.Tensor, zoe_size: int) -> torch
     border = int((size / 2) ** 0.5 * 3)  # 31 for 224, as in ZoeDepth's own preprocessing
     framed = pad(pixels, (border,) * 4, mode="reflect")
     # Normalised after resizing and with 0.5 for all channels, unlike ZoeDepth: SpatialVLA was trained so.
-    inputs = normalise(interpolate(framed, (zoe_size, zoe_size), mode="bicubic", align_corners=True), _HALF, _HALF)
+    inputs = normalise(
+        interpolate(framed, (zoe_size, zoe_size), mode="bicubic", align_corners=True), _HALF, _HALF
+    )
     depth = zoe(pixel_values=inputs).predicted_depth.unsqueeze(1)
     whole = interpolate(depth, framed.shape[-2:], mode="bicubic", align_corners=True)
     return whole[..., border:-border, border:-border]
 
 
-def back_project(depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolution: int) -> torch.Tensor:
+def back_project(
+    depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolution: int
+) -> torch.Tensor:
     """Return points in front of the camera, (batch, patches, 3 * resolution ** 2), in metres and float32.
 
     Args:
@@ -72,7 +83,9 @@ def back_project(depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, reso
     # The original computes these in the type of its weights, which rounds: in bfloat16, 220.5 becomes 220.
     middle = middle.to(depth.dtype).float()
     v, u = torch.meshgrid(middle, middle, indexing="ij")
-    rays = torch.linalg.inv(intrinsics.float()) @ torch.stack([u, v, torch.ones_like(u)]).reshape(3, -1)
+    rays = torch.linalg.inv(intrinsics.float()) @ torch.stack([u, v, torch.ones_like(u)]).reshape(
+        3, -1
+    )
     averaged = interpolate(depth, (n_cells, n_cells), mode="area").flatten(2)
     points = (rays * averaged).unflatten(2, (n_patches, resolution, n_patches, resolution))
     return points.permute(0, 2, 4, 3, 5, 1).reshape(len(depth), n_patches**2, -1)

@@ -7,7 +7,12 @@ import torch
 from PIL import Image
 from tokenizers import Tokenizer
 from torch import nn
-from transformers import DynamicCache, Gemma2ForCausalLM, SiglipVisionModel, ZoeDepthForDepthEstimation
+from transformers import (
+    DynamicCache,
+    Gemma2ForCausalLM,
+    SiglipVisionModel,
+    ZoeDepthForDepthEstimation,
+)
 
 from infthor_eval.errors import ModelError
 from model_adapters.policies.decoding import decode_greedily, embed_ids
@@ -49,7 +54,9 @@ class SpatialVLAWeights(nn.Module):
             part._attn_implementation = attn_implementation
         self.vision_tower = SiglipVisionModel(vision)
         self.vision_zoe_model = ZoeDepthForDepthEstimation(zoe)
-        self.position_embedding_3d = Ego3DEmbedding(config.ego3d_patch_reso**2, config.n_freqs, vision.hidden_size)
+        self.position_embedding_3d = Ego3DEmbedding(
+            config.ego3d_patch_reso**2, config.n_freqs, vision.hidden_size
+        )
         self.multi_modal_projector = _SpatialVLAProjector(vision.hidden_size, config.projection_dim)
         self.language_model = Gemma2ForCausalLM(text)
         self.spatial_embed_tokens = nn.Embedding(config.spatial_token_num, text.hidden_size)
@@ -62,7 +69,9 @@ class SpatialVLAWeights(nn.Module):
     def layout(self) -> Layout:
         """Return the layout of the checkpoint; all of its keys are used."""
         return Layout.of(
-            self, lambda name: None if self.has_tied_head and name == _LM_HEAD else checkpoint_key(name), {}
+            self,
+            lambda name: None if self.has_tied_head and name == _LM_HEAD else checkpoint_key(name),
+            {},
         )
 
     @torch.inference_mode()
@@ -137,7 +146,9 @@ class SpatialVLANetwork:
         text = f"{_IMAGE * self.view.n_patches}{_BEGIN}{prompt(instruction)}\n"
         ids: list[int] = self.tokenizer.encode(text, add_special_tokens=False).ids
         if ids.count(self.image_id) != self.view.n_patches or ids[0] != self.image_id:
-            raise ModelError(f"the tokenizer has no {_IMAGE} of id {self.image_id}; is it the checkpoint's own?")
+            raise ModelError(
+                f"the tokenizer has no {_IMAGE} of id {self.image_id}; is it the checkpoint's own?"
+            )
         return ids
 
     def features(self, image: Image.Image) -> torch.Tensor:
@@ -147,9 +158,14 @@ class SpatialVLANetwork:
         # Like the original, pixels and intrinsics are rounded to the weights' type first.
         pixels = resize(image, view.image_size).to(weight.device, weight.dtype)[None]
         camera = view.camera(image.size).to(weight.device, weight.dtype)
-        patches = weights.vision_tower(pixel_values=normalise(pixels, _HALF, _HALF)).last_hidden_state
+        patches = weights.vision_tower(
+            pixel_values=normalise(pixels, _HALF, _HALF)
+        ).last_hidden_state
         points = back_project(
-            estimate_depth(weights.vision_zoe_model, pixels, view.zoe_size), camera, view.patch, view.resolution
+            estimate_depth(weights.vision_zoe_model, pixels, view.zoe_size),
+            camera,
+            view.patch,
+            view.resolution,
         )
         # The original divides by the root of the width, because its Gemma scaled all inputs; now it scales tokens only.
         return weights.multi_modal_projector.linear(patches + weights.position_embedding_3d(points))
@@ -181,5 +197,7 @@ class SpatialVLANetwork:
         ids = self.prompt_ids(instruction)
         places = torch.tensor(ids, device=model.device) == self.image_id
         prefix = embed_ids(model, ids).masked_scatter(places[None, :, None], self.features(image))
-        action = decode_greedily(logits(prefix), step, self.bins.action_ids * self.chunk, constrained=constrained)
+        action = decode_greedily(
+            logits(prefix), step, self.bins.action_ids * self.chunk, constrained=constrained
+        )
         return self.bins.decode(action)

@@ -33,5 +33,9 @@ def report_in(folder):
 
 def row(said, *beginning):
     """The rest of the row of a printed table that begins like this."""
-    (found,) = [line.split() for line in said.splitlines() if line.split()[: len(beginning)] == list(beginning)]
+    (found,) = [
+        line.split()
+        for line in said.splitlines()
+        if line.split()[: len(beginning)] == list(beginning)
+    ]
     return found[len(beginning) :]

@@ -7,14 +7,24 @@ from ...plans.made_runs import made_run as plans_run
 from ...plans.made_runs import plan
 from ...plans.made_runs import write_run as write_plans
 
-EPISODES = [episode(name, 5 * number, kind) for name in "ab" for number, kind in enumerate(("pickup", "put"))]
-LOST = [episode(name, 5 * number, kind, done=False) for name in "ab" for number, kind in enumerate(("pickup", "put"))]
+EPISODES = [
+    episode(name, 5 * number, kind)
+    for name in "ab"
+    for number, kind in enumerate(("pickup", "put"))
+]
+LOST = [
+    episode(name, 5 * number, kind, done=False)
+    for name in "ab"
+    for number, kind in enumerate(("pickup", "put"))
+]
 
 
 @pytest.fixture
 def folders(tmp_path):
     made = (made_run("m", EPISODES), made_run("m", LOST, radius=0.1), planner_run(EPISODES))
-    return [write_run(run, tmp_path / "results", f"arm-{number}") for number, run in enumerate(made)]
+    return [
+        write_run(run, tmp_path / "results", f"arm-{number}") for number, run in enumerate(made)
+    ]
 
 
 def refused(found, *said):
@@ -32,7 +42,20 @@ def test_figure_6_is_drawn_and_its_ends_are_printed(folders, tmp_path, run):
     assert said.splitlines()[-2:] == [str(out / "figure6.png"), str(out / "figure6.svg")]
     assert all((out / name).stat().st_size > 1000 for name in ("figure6.png", "figure6.svg"))
     rows = [line.split() for line in said.splitlines()]
-    assert ["m,", "0.1", "m", "0.00", "[0.00,", "0.00]", "0.0", "0.00", "0.00", "5", "4", "0"] in rows
+    assert [
+        "m,",
+        "0.1",
+        "m",
+        "0.00",
+        "[0.00,",
+        "0.00]",
+        "0.0",
+        "0.00",
+        "0.00",
+        "5",
+        "4",
+        "0",
+    ] in rows
 
 
 def test_runs_of_figure_6_can_be_put_into_panels(folders, tmp_path, run):
@@ -53,12 +76,21 @@ def test_what_cannot_be_drawn_is_one_line(folders, tmp_path, run):
     plans = write_plans(plans_run("p", [plan("a", 0, (0, 1))]), tmp_path)
     said = f"{plans}: is a run of plans, and figure 6 is of manipulation; leave it out"
     refused(run("report", folders[0], plans, "--figure", "6"), said)
-    refused(run("report", folders[0], "--figure", "7"), "is a run of manipulation, and figure 7 is of plans")
+    refused(
+        run("report", folders[0], "--figure", "7"),
+        "is a run of manipulation, and figure 7 is of plans",
+    )
     refused(run("report", folders[0], folders[0], "--figure", "radius"), "given twice")
     panels = tmp_path / "panels.yaml"
-    refused(run("report", *folders, "--figure", "radius", "--panels", panels), "--panels: figure radius has panels of")
+    refused(
+        run("report", *folders, "--figure", "radius", "--panels", panels),
+        "--panels: figure radius has panels of",
+    )
     other = write_run(made_run("z", [episode("z", 1)]), tmp_path)
-    refused(run("report", folders[0], other, "--figure", "6", "--out", tmp_path), "share no trajectory of arm_pickup")
+    refused(
+        run("report", folders[0], other, "--figure", "6", "--out", tmp_path),
+        "share no trajectory of arm_pickup",
+    )
     twin = write_run(made_run("m", EPISODES), tmp_path, "twin")
     words = ("report", folders[0], twin, "--figure", "radius", "--out", tmp_path)
     refused(run(*words), "two runs are called m and have a radius of 0.5 m")

@@ -8,19 +8,31 @@ from tests.faults.told import said_in_one_line
 def leaking(n=40):
     """All mugs are there, and no book; and as many questions that nothing gives away."""
     asked = [(f"t{k}", *(("mug", "yes"), ("book", "no"))[k % 2]) for k in range(n)]
-    questions = [Question(t, f"Is there any {item} in this room?", (1,), (said,)) for t, item, said in asked]
-    fair = [(f"t{k % 8}", f"Have you seen a thing{k}?", ("yes", "no")[k // 2 % 2]) for k in range(n)]
+    questions = [
+        Question(t, f"Is there any {item} in this room?", (1,), (said,)) for t, item, said in asked
+    ]
+    fair = [
+        (f"t{k % 8}", f"Have you seen a thing{k}?", ("yes", "no")[k // 2 % 2]) for k in range(n)
+    ]
     return [*questions, *(Question(t, text, (1,), (said,)) for t, text, said in fair)]
 
 
 def test_a_set_is_audited_beside_a_run(make_nieh_set, tmp_path, run):
     data = make_nieh_set(leaking(24), size=8)
-    assert run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")[0] == 0
+    assert (
+        run(
+            "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+        )[0]
+        == 0
+    )
     (folder,) = (tmp_path / "out" / "oracle").iterdir()
     code, out, _ = run("audit", data, folder)
     assert code == 0
     text = " ".join(out.split())
-    assert "Is there any {} in this room? (24 questions): words (blind) gets 100.0 % without a frame." in text
+    assert (
+        "Is there any {} in this room? (24 questions): words (blind) gets 100.0 % without a frame."
+        in text
+    )
     assert "100.0 (solved)" in text
 
 
@@ -30,7 +42,9 @@ def test_the_balanced_part_is_written(make_nieh_set, tmp_path, run):
     assert code == 0
     kept = read_questions(part)
     assert f"{part}: {len(kept)} of" in err
-    assert sum("thing" in question.text for question in kept) > sum("any" in question.text for question in kept)
+    assert sum("thing" in question.text for question in kept) > sum(
+        "any" in question.text for question in kept
+    )
 
 
 def test_what_cannot_be_audited_is_one_line(make_nieh_set, tmp_path, run, scripted_run):
@@ -38,7 +52,9 @@ def test_what_cannot_be_audited_is_one_line(make_nieh_set, tmp_path, run, script
     said_in_one_line(run("audit", tmp_path / "none"), "no such folder")
     said_in_one_line(run("audit", data, scripted_run), "only runs of nieh can stand beside guesses")
     yes = make_nieh_set(
-        [Question(f"t{n}", "Have you seen a mug?", (1,), ("yes",)) for n in range(4)], size=8, name="yes"
+        [Question(f"t{n}", "Have you seen a mug?", (1,), ("yes",)) for n in range(4)],
+        size=8,
+        name="yes",
     )
     code, _, err = run("audit", yes, "--balanced", tmp_path / "part.csv")
     assert (code, "has a balanced part; nothing is written" in err) == (2, True)

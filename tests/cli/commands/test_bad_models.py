@@ -30,7 +30,8 @@ def ask(make_nieh_set, tmp_path, run):
 
     def ask(model, folder, *options, **model_args):
         given = ",".join(
-            f"{key}={value}" for key, value in {"pretrained": folder, "device": "cpu", **model_args}.items()
+            f"{key}={value}"
+            for key, value in {"pretrained": folder, "device": "cpu", **model_args}.items()
         )
         arguments = ["--model", model, "--model-args", given, "--tasks", "nieh_gt", "--data", data]
         return run(*arguments, "--output", tmp_path / "out", *options)
@@ -50,8 +51,20 @@ def _without_slot(folder):
 
 
 BROKEN = {
-    "text only": ("hf-vlm", "text", lambda folder: None, {}, "is a llama checkpoint, which has no vision"),
-    "text only, by a family": ("qwen2.5-vl", "text", lambda folder: None, {}, "is a llama checkpoint, not qwen2_5_vl"),
+    "text only": (
+        "hf-vlm",
+        "text",
+        lambda folder: None,
+        {},
+        "is a llama checkpoint, which has no vision",
+    ),
+    "text only, by a family": (
+        "qwen2.5-vl",
+        "text",
+        lambda folder: None,
+        {},
+        "is a llama checkpoint, not qwen2_5_vl",
+    ),
     "merged patches": (
         "qwen2.5-vl",
         "qwen",
@@ -87,13 +100,27 @@ BROKEN = {
         {},
         "0 image placeholders for",
     ),
-    "template without a slot": ("qwen2.5-vl", "qwen", _without_slot, {}, "the template must show every frame"),
-    "template without a slot, hf-vlm": ("hf-vlm", "llava", _without_slot, {}, "the template must show every frame"),
+    "template without a slot": (
+        "qwen2.5-vl",
+        "qwen",
+        _without_slot,
+        {},
+        "the template must show every frame",
+    ),
+    "template without a slot, hf-vlm": (
+        "hf-vlm",
+        "llava",
+        _without_slot,
+        {},
+        "the template must show every frame",
+    ),
 }
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_checkpoint_that_cannot_work_is_one_line_before_any_question(checkpoints, tmp_path, ask, name):
+def test_a_checkpoint_that_cannot_work_is_one_line_before_any_question(
+    checkpoints, tmp_path, ask, name
+):
     model, checkpoint, damage, model_args, said = BROKEN[name]
     folder = shutil.copytree(checkpoints / checkpoint, tmp_path / "checkpoint")
     damage(folder)
@@ -105,25 +132,50 @@ def test_a_checkpoint_that_cannot_work_is_one_line_before_any_question(checkpoin
     assert not list(tmp_path.rglob("worker-*.jsonl"))
 
 
-def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(make_nieh_set, tmp_path, run, records_in):
+def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(
+    make_nieh_set, tmp_path, run, records_in
+):
     data = make_nieh_set()
-    arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "max_tokens=600", "--tasks", "nieh", "--data", data]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--model-args",
+        "max_tokens=600",
+        "--tasks",
+        "nieh",
+        "--data",
+        data,
+    ]
     code, _, err = run(*arguments, "--output", tmp_path / "out")
     records = records_in(tmp_path / "out")
     failed = [record for record in records if record.failure]
     # Six frames of 123 tokens; of the clues, three at most.
     assert {record.task for record in failed} == {"nieh_full"}
     assert len(failed) == 5
-    assert all("and 50 new ones is beyond the 600 tokens of qwen2.5-vl-tiny" in record.failure for record in failed)
+    assert all(
+        "and 50 new ones is beyond the 600 tokens of qwen2.5-vl-tiny" in record.failure
+        for record in failed
+    )
     assert all(int(record.failure.split()[3]) > 6 * 123 for record in failed)
     assert code == 1
     assert "Traceback" not in err
 
 
-def test_a_question_with_the_models_image_token_fails_alone(make_nieh_set, tmp_path, run, records_in):
+def test_a_question_with_the_models_image_token_fails_alone(
+    make_nieh_set, tmp_path, run, records_in
+):
     bad = Question("traj_b", "What is <|image_pad|>?", (3,), ("mug",))
     data = make_nieh_set([*QUESTIONS, bad], size=56)
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     assert run(*arguments)[0] == 1
     (failed,) = [record for record in records_in(tmp_path / "out") if record.failure]
     assert failed.payload.question == bad.text
@@ -141,7 +193,10 @@ class Cramped(Qwen25VLTiny):
         text_model = model._loaded.model.get_decoder()
 
         def allocate(_, args, kwargs):
-            if kwargs["past_key_values"].get_seq_length() + kwargs["inputs_embeds"].shape[1] > cls.ROOM:
+            if (
+                kwargs["past_key_values"].get_seq_length() + kwargs["inputs_embeds"].shape[1]
+                > cls.ROOM
+            ):
                 raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB.")
 
         text_model.register_forward_pre_hook(allocate, with_kwargs=True)
@@ -169,7 +224,16 @@ def test_out_of_memory_in_mid_run_costs_the_contexts_that_are_too_large(
     install("cramped", f"{__name__}:Cramped")
     long = Question("traj_a", "What did you see?", (0, 1, 2, 3, 4), ("mug",))
     data = make_nieh_set([QUESTIONS[0], long, *QUESTIONS[3:]])
-    arguments = ["--model", "cramped", "--model-args", f"batch_size={batch_size}", "--tasks", "nieh", "--data", data]
+    arguments = [
+        "--model",
+        "cramped",
+        "--model-args",
+        f"batch_size={batch_size}",
+        "--tasks",
+        "nieh",
+        "--data",
+        data,
+    ]
     code, out, err = run(*arguments, "--output", tmp_path / "out")
     assert code == 1
     assert "Traceback" not in err
@@ -179,10 +243,20 @@ def test_out_of_memory_in_mid_run_costs_the_contexts_that_are_too_large(
         ("nieh_gt", 5),
         *(("nieh_full", n) for n in (1, 5)),
     }
-    assert [record.payload.reply is not None for record in records if record not in failed] == [True] * 3
+    assert [record.payload.reply is not None for record in records if record not in failed] == [
+        True
+    ] * 3
     for record in failed:
         n_frames = 5 if record.task == "nieh_gt" else 6
-        assert int(record.failure.removeprefix("out of memory on a context of ").split()[0]) > n_frames * 123
-        assert record.failure.endswith("(cramped); use fewer frames, kv_offload=true, or a smaller chunk_tokens")
+        assert (
+            int(record.failure.removeprefix("out of memory on a context of ").split()[0])
+            > n_frames * 123
+        )
+        assert record.failure.endswith(
+            "(cramped); use fewer frames, kv_offload=true, or a smaller chunk_tokens"
+        )
     assert "nieh_full: " in err
-    assert any(line.split()[:2] == ["cramped", "nieh_gt"] and line.split()[-1] == "1" for line in out.splitlines())
+    assert any(
+        line.split()[:2] == ["cramped", "nieh_gt"] and line.split()[-1] == "1"
+        for line in out.splitlines()
+    )

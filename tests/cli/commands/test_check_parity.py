@@ -37,7 +37,9 @@ def test_different_policies_end_with_1(run: Run, tmp_path: Path) -> None:
     words = ("--frames", tmp_path, "--instruction", "open the drawer")
     with serving(policy_answers(load_policy("openvla-tiny", {}), change=0.125)) as other:
         code, out, _ = run("check-parity", "openvla-tiny", "--reference-url", other, *words)
-        tolerated, _, _ = run("check-parity", "openvla-tiny", "--reference-url", other, *words, "--tolerance", "0.2")
+        tolerated, _, _ = run(
+            "check-parity", "openvla-tiny", "--reference-url", other, *words, "--tolerance", "0.2"
+        )
     assert (code, tolerated) == (1, 0)
     assert "0.12" in out
     assert "open the drawer" in out
@@ -49,8 +51,14 @@ def test_different_policies_end_with_1(run: Run, tmp_path: Path) -> None:
     [
         (("openvla-tin", "--reference-url", "http://127.0.0.1:9"), "did you mean 'openvla-tiny'"),
         (("openvla-tiny",), "--reference-url"),
-        (("openvla-tiny", "--reference-url", "nowhere"), "--reference-url: url is not the address of a server"),
-        (("openvla-tiny", "--reference-url", "http://x", "--frames", "/nowhere"), "has no pictures"),
+        (
+            ("openvla-tiny", "--reference-url", "nowhere"),
+            "--reference-url: url is not the address of a server",
+        ),
+        (
+            ("openvla-tiny", "--reference-url", "http://x", "--frames", "/nowhere"),
+            "has no pictures",
+        ),
         (
             ("openvla-tiny", "--reference-url", "http://x", "--model-args", "unnorm_key=a"),
             "unnorm_key=a is not a dataset",

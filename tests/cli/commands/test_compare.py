@@ -24,7 +24,9 @@ def test_two_runs_are_compared_question_by_question(make_nieh_set, tmp_path, run
     assert "1.0000" in out
 
 
-def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(make_nieh_set, tmp_path, run):
+def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
+    make_nieh_set, tmp_path, run
+):
     data = make_nieh_set(size=56)
     for task in ("nieh_gt", "nieh_full"):
         run("--model", "oracle", "--tasks", task, "--data", data, "--output", tmp_path)
@@ -38,46 +40,105 @@ def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(make_n
 
 
 def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_path, run):
-    run("--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "out")
+    run(
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path / "out",
+    )
     (ours,) = (tmp_path / "out" / "oracle").iterdir()
     old = tmp_path / "old"
     old.mkdir()
-    (old / "journal.jsonl").write_text(json.dumps({"format": 1, "identity": {"model": {"name": "oracle"}}}) + "\n")
+    (old / "journal.jsonl").write_text(
+        json.dumps({"format": 1, "identity": {"model": {"name": "oracle"}}}) + "\n"
+    )
     for folders in ((old, ours), (ours, old)):
         code, out, err = run("compare", *folders)
         assert (code, out, len(err.splitlines())) == (2, "", 1)
-        assert f"{old}: its journal is of format 1, this version reads 3; run the evaluation again" in err
+        assert (
+            f"{old}: its journal is of format 1, this version reads 3; run the evaluation again"
+            in err
+        )
 
 
 def test_rewards_are_points_and_shares_are_percent(tmp_path, run):
     """Mean rewards of 4.4 and 2.2, of which every plan or none is a success."""
     steps = (StepRecord(),)
     records = [plan(name, index, (index, index + 1), 4.4) for name in "ab" for index in range(2)]
-    better = [replace(it, payload=replace(it.payload, steps=steps, max_reward=4.4)) for it in records]
-    worse = [replace(it, payload=replace(it.payload, reward=2.2, ended="step limit")) for it in better]
-    folders = [write_run(made_run(label, of_run), tmp_path) for label, of_run in (("w", worse), ("b", better))]
+    better = [
+        replace(it, payload=replace(it.payload, steps=steps, max_reward=4.4)) for it in records
+    ]
+    worse = [
+        replace(it, payload=replace(it.payload, reward=2.2, ended="step limit")) for it in better
+    ]
+    folders = [
+        write_run(made_run(label, of_run), tmp_path)
+        for label, of_run in (("w", worse), ("b", better))
+    ]
     code, out, err = run("compare", *folders)
     assert (code, err) == (0, "")
-    rows = {line.split()[1]: line.split()[2:] for line in out.splitlines() if line.split()[:1] == ["infthor_plans"]}
+    rows = {
+        line.split()[1]: line.split()[2:]
+        for line in out.splitlines()
+        if line.split()[:1] == ["infthor_plans"]
+    }
     assert rows["success"][:4] == ["%", "0.00", "100.00", "+100.00"]
-    assert rows["reward"] == ["points", "2.20", "4.40", "+2.20", "[+2.20,", "+2.20]", "0.0000", "4", "0"]
+    assert rows["reward"] == [
+        "points",
+        "2.20",
+        "4.40",
+        "+2.20",
+        "[+2.20,",
+        "+2.20]",
+        "0.0000",
+        "4",
+        "0",
+    ]
 
 
 def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     for seed in (0, 1):
-        arguments = ["--model", "random", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path, "--seed", seed]
+        arguments = [
+            "--model",
+            "random",
+            "--tasks",
+            "nieh_gt",
+            "--data",
+            data,
+            "--output",
+            tmp_path,
+            "--seed",
+            seed,
+        ]
         assert run(*arguments)[0] == 0
-    folders = sorted((tmp_path / "random").iterdir(), key=lambda folder: "seed: 1" in (folder / "run.yaml").read_text())
+    folders = sorted(
+        (tmp_path / "random").iterdir(),
+        key=lambda folder: "seed: 1" in (folder / "run.yaml").read_text(),
+    )
     code, out, _ = run("compare", *folders)
     assert code == 0
     assert "random (seed=1) against random (seed=0)" in " ".join(out.split())
 
 
 def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run):
-    words = ("--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path, "--frames", "shown,blank")
+    words = (
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path,
+        "--frames",
+        "shown,blank",
+    )
     assert run("--model", "oracle", *words)[0] == 0
     folders = sorted(
-        (tmp_path / "oracle").iterdir(), key=lambda folder: "frames: blank" in (folder / "run.yaml").read_text()
+        (tmp_path / "oracle").iterdir(),
+        key=lambda folder: "frames: blank" in (folder / "run.yaml").read_text(),
     )
     assert "oracle, blank frames against oracle" in run("compare", *folders)[1]

@@ -64,7 +64,9 @@ def test_what_they_print_for_people(made, tmp_path, run):
     assert code == 0
     assert "1 trajectories on 1 floor plans (1 replayed earlier, 0 failed), 1 complete" in out
     assert "actions accepted, " in out and "MoveAhead" not in out and len(out.splitlines()) == 2
-    code, out, _ = run("generate", "--scene", "kitchen-5", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path)
+    code, out, _ = run(
+        "generate", "--scene", "kitchen-5", "--min-steps", 1, "--min-subgoals", 1, "--out", tmp_path
+    )
     assert code == 0
     assert "1 trajectories (0 generated earlier)" in out
 
@@ -84,7 +86,10 @@ def test_a_truncated_trajectory_is_named_and_nothing_half_written(made, tmp_path
         (("replay", "nowhere.jsonl", "--out", "set"), "nowhere.jsonl"),
         (("questions", "nowhere", "--out", "qa.csv"), "has no trajectory; replay"),
         (("generate", "--scene", "nowhere-1", "--out", "out"), "unknown scene 'nowhere-1'"),
-        (("generate", "--scene", "kitchn-3", "--out", "out"), "unknown scene 'kitchn-3'; did you mean 'kitchen-3'?"),
+        (
+            ("generate", "--scene", "kitchn-3", "--out", "out"),
+            "unknown scene 'kitchn-3'; did you mean 'kitchen-3'?",
+        ),
         (("generate", "--scene", "FloorPlan1", "--out", "out"), "not generated: scene FloorPlan1"),
     ],
 )
@@ -100,7 +105,9 @@ def test_bad_input_is_one_line(arguments, words, tmp_path, monkeypatch, run):
 def test_an_action_on_a_missing_object_is_reported_with_its_step(made, tmp_path, run):
     document = json.loads(next((made / "trajectories").glob("*.json")).read_text())
     actions = document["plan"]["low_actions"]
-    step = next(index for index, low in enumerate(actions) if low["api_action"]["action"] == "PickupObject")
+    step = next(
+        index for index, low in enumerate(actions) if low["api_action"]["action"] == "PickupObject"
+    )
     actions[step]["api_action"]["objectId"] = "Teapot|+00.00|+01.00|+00.00"
     (tmp_path / "odd.json").write_text(json.dumps(document))
     code, out, err = run("replay", tmp_path / "odd.json", "--out", tmp_path / "set")
@@ -116,13 +123,19 @@ def test_a_scene_in_which_no_task_can_be_done_is_one_line_and_leaves_no_file(tmp
     path = data / "thor_scenes" / "objects.jsonl.gz"
     scene = json.loads(gzip.decompress(path.read_bytes()))
     bare = [item for item in scene["objects"] if not item["pickupable"]]
-    path.write_bytes(gzip.compress(json.dumps(scene | {"scene": "FloorPlan7", "objects": bare}).encode()))
+    path.write_bytes(
+        gzip.compress(json.dumps(scene | {"scene": "FloorPlan7", "objects": bare}).encode())
+    )
     for layout in (data / "alfred" / "layouts").iterdir():
         layout.rename(layout.with_name(layout.name.replace("kitchen-5", "FloorPlan7")))
-    code, _, err = run("generate", "--scene", "FloorPlan7", "--data", data, "--out", tmp_path / "out")
+    code, _, err = run(
+        "generate", "--scene", "FloorPlan7", "--data", data, "--out", tmp_path / "out"
+    )
     assert code == 1
     (line,) = err.strip().splitlines()
-    assert line.startswith("not generated: scene FloorPlan7, seed 0: no further task works after 0 steps")
+    assert line.startswith(
+        "not generated: scene FloorPlan7, seed 0: no further task works after 0 steps"
+    )
     assert line.endswith("choose another scene or seed")
     assert not list((tmp_path / "out").iterdir())
 
@@ -134,7 +147,16 @@ def test_a_set_of_another_version_is_neither_continued_nor_evaluated(made, tmp_p
     for arguments in (
         ("replay", made / "trajectories", "--out", tmp_path / "set"),
         ("questions", tmp_path / "set", "--out", tmp_path / "set/qa_set_new.csv"),
-        ("--model", "oracle", "--tasks", "nieh_gt", "--data", tmp_path / "set", "--output", tmp_path / "runs"),
+        (
+            "--model",
+            "oracle",
+            "--tasks",
+            "nieh_gt",
+            "--data",
+            tmp_path / "set",
+            "--output",
+            tmp_path / "runs",
+        ),
     ):
         code, _, err = run(*arguments)
         assert code == 2

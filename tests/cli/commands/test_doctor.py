@@ -27,13 +27,30 @@ def test_everything_is_checked_and_what_is_missing_has_a_hint(run, monkeypatch):
     code, out, err = run("doctor", "--json")
     assert (code, err) == (0, "")
     by_name = {check["name"]: check for check in json.loads(out)}
-    assert {"Python", "torch", "memory", "embedded simulator", "AI2-THOR", "display", "hub token", "hub"} <= set(
-        by_name
-    )
-    assert {"disk, here", "disk, cache", "NIEH data", *(f"extra {name}" for name in checks._EXTRAS)} <= set(by_name)
+    assert {
+        "Python",
+        "torch",
+        "memory",
+        "embedded simulator",
+        "AI2-THOR",
+        "display",
+        "hub token",
+        "hub",
+    } <= set(by_name)
+    assert {
+        "disk, here",
+        "disk, cache",
+        "NIEH data",
+        *(f"extra {name}" for name in checks._EXTRAS),
+    } <= set(by_name)
     assert all(check["hint"] for check in by_name.values() if check["state"] != "ok")
     assert by_name["hub"]["detail"].endswith("cannot be reached (no answer in 0.1 s)")
-    assert by_name["hub token"] == {"name": "hub token", "state": "ok", "detail": "stored", "hint": ""}
+    assert by_name["hub token"] == {
+        "name": "hub token",
+        "state": "ok",
+        "detail": "stored",
+        "hint": "",
+    }
     assert "fetch nieh" in by_name["NIEH data"]["hint"]
     assert TOKEN not in out
 
@@ -46,7 +63,9 @@ def test_people_read_lines(run):
 
 
 def test_a_missing_requirement_sets_the_exit_code(run, monkeypatch):
-    monkeypatch.setattr(checks, "_torch", lambda: Check("torch", "wrong", "none", "pip install torch"))
+    monkeypatch.setattr(
+        checks, "_torch", lambda: Check("torch", "wrong", "none", "pip install torch")
+    )
     code, out, _ = run("doctor")
     assert code == 1
     assert "wrong    torch: none\n         pip install torch" in out
@@ -79,9 +98,13 @@ def test_a_set_is_read_whole_and_what_can_be_asked_is_said(run):
 
 def test_what_a_set_lacks_is_counted_by_reason(run, make_nieh_set):
     asked = Question("t", "Have you seen a mug?", (1,), ("yes",))
-    root = make_nieh_set([asked, Question("t", "q", (99,), ("a",)), Question("t", "q", (98,), ("a",))])
+    root = make_nieh_set(
+        [asked, Question("t", "q", (99,), ("a",)), Question("t", "q", (98,), ("a",))]
+    )
     (root / "metadata" / "other").mkdir()
-    (root / "qa_set_x.csv").write_text("traj_id,question,gt_img_idx,answer\ngone,q,[1],['a']\nt,q,[1,['a']\n")
+    (root / "qa_set_x.csv").write_text(
+        "traj_id,question,gt_img_idx,answer\ngone,q,[1],['a']\nt,q,[1,['a']\n"
+    )
     (root / "metadata" / "t" / "expert_log.json").unlink(missing_ok=True)
     code, by_name = checks_of(run, "--data", str(root))
     assert code == 0

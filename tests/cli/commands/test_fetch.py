@@ -8,7 +8,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from infthor_eval.formats.hub_data import NIEH_REPOSITORY
+from infthor_eval.nieh.published.hub_data import NIEH_REPOSITORY
 
 COMMIT = "0" * 40
 
@@ -26,13 +26,21 @@ class Hub(BaseHTTPRequestHandler):
             self.answer(self.status, b"{}", {"X-Error-Code": "GatedRepo"})
         elif "/tree/" in self.path:
             entries = [
-                {"type": "file", "path": file, "size": len(content), "oid": hashlib.sha1(content).hexdigest()}
+                {
+                    "type": "file",
+                    "path": file,
+                    "size": len(content),
+                    "oid": hashlib.sha1(content).hexdigest(),
+                }
                 for file, content in self.files.items()
             ]
             self.answer(200, json.dumps(entries).encode(), {"Content-Type": "application/json"})
         elif self.path.startswith(f"/api/datasets/{NIEH_REPOSITORY}"):
             siblings = [{"rfilename": file} for file in self.files]
-            self.answer(200, json.dumps({"id": NIEH_REPOSITORY, "sha": COMMIT, "siblings": siblings}).encode())
+            self.answer(
+                200,
+                json.dumps({"id": NIEH_REPOSITORY, "sha": COMMIT, "siblings": siblings}).encode(),
+            )
         elif name in self.files:
             content = self.files[name]
             etag = hashlib.sha256(content).hexdigest()

@@ -18,7 +18,13 @@ PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 
 
 def question(file, number, text, answer, clues=(1,)):
-    return Question(f"t{number % 3}", text, clues, (answer,), published=PublishedColumns(file, f"q{file}{number}"))
+    return Question(
+        f"t{number % 3}",
+        text,
+        clues,
+        (answer,),
+        published=PublishedColumns(file, f"q{file}{number}"),
+    )
 
 
 QUESTIONS = (
@@ -44,7 +50,12 @@ def data(tmp_path):
 def row(number, reply, score, questions=QUESTIONS, **more):
     """A row as the published scripts write it."""
     asked = questions[number]
-    published = {"qidx": number, "traj_id": asked.traj_id, "question": asked.text, "gt_img_idx": list(asked.clues)}
+    published = {
+        "qidx": number,
+        "traj_id": asked.traj_id,
+        "question": asked.text,
+        "gt_img_idx": list(asked.clues),
+    }
     published |= {"ctx_size_k": 32, "n_imgs": 6, "ctx_n_tokens": 726, "llm_response": reply}
     return published | {"gt_answer": list(asked.answers), "score": score} | more
 
@@ -59,7 +70,9 @@ def import_log(data, tmp_path, run):
     def import_log(content, name=LOG, *options):
         path = tmp_path / name
         if isinstance(content, list):
-            content = "".join(one if isinstance(one, str) else json.dumps(one) + "\n" for one in content).encode()
+            content = "".join(
+                one if isinstance(one, str) else json.dumps(one) + "\n" for one in content
+            ).encode()
             content = gzip.compress(content, mtime=0) if name.endswith(".gz") else content
         path.write_bytes(content)
         output = tmp_path / "out"
@@ -84,8 +97,14 @@ def test_a_published_log_becomes_a_run(import_log, tmp_path, run, name):
     assert [record.payload.scores["reference"] for record in records] == [1.0, 1.0, 0.0, 1.0]
     assert {record.tokens.context for record in records} == {726}
     (folder,) = (tmp_path / "out" / "Some-VL-7B").iterdir()
-    assert {"results.json", "scores.jsonl", "usage.json", "journal"} <= {path.name for path in folder.iterdir()}
-    for words in (("show", folder, "--full"), ("ls", "runs", tmp_path / "out"), ("compare", folder, folder)):
+    assert {"results.json", "scores.jsonl", "usage.json", "journal"} <= {
+        path.name for path in folder.iterdir()
+    }
+    for words in (
+        ("show", folder, "--full"),
+        ("ls", "runs", tmp_path / "out"),
+        ("compare", folder, folder),
+    ):
         assert run(*words)[0] == 0
     assert run("report", folder, "--out", tmp_path / "report.html")[0] == 0
     before = (folder / "results.json").read_bytes()
@@ -98,24 +117,39 @@ def test_logs_of_one_mode_on_two_files_are_one_run(data, tmp_path, run):
     single, multi = tmp_path / LOG, tmp_path / f"eval_{MULTI}_Some-VL-7B_full_traj.log"
     single.write_text("\n".join(map(json.dumps, ROWS)))
     multi.write_text(json.dumps(row(0, "no", 1.0, OTHERS)))
-    assert run("import-replies", single, multi, "--data", data, "--output", tmp_path / "out")[0] == 0
+    assert (
+        run("import-replies", single, multi, "--data", data, "--output", tmp_path / "out")[0] == 0
+    )
     (folder,) = (tmp_path / "out" / "Some-VL-7B").iterdir()
-    by_clues = json.loads((folder / "results.json").read_text())["summary"]["tasks"]["nieh_full"]["by_clues"]
-    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {"1": 4, "2": 1, ">=3": 0, "total": 5}
+    by_clues = json.loads((folder / "results.json").read_text())["summary"]["tasks"]["nieh_full"][
+        "by_clues"
+    ]
+    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {
+        "1": 4,
+        "2": 1,
+        ">=3": 0,
+        "total": 5,
+    }
 
 
 def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run):
     for name, question_id in (("first.jsonl", "qsingle0"), ("second.jsonl", "qmulti4")):
         (tmp_path / name).write_text(json.dumps({"question_id": question_id, "reply": "no"}))
     logs = [tmp_path / "first.jsonl", tmp_path / "second.jsonl"]
-    code, _, err = run("import-replies", *logs, "--model", "me", "--data", data, "--output", tmp_path / "out")
+    code, _, err = run(
+        "import-replies", *logs, "--model", "me", "--data", data, "--output", tmp_path / "out"
+    )
     assert (code, "2 replies imported, 3 of 5 questions without one" in err) == (0, True)
 
 
 @pytest.mark.parametrize(
     ("more", "task", "setting"),
     [
-        ({"eval_mode": "truncate_head", "ctx_size_k": 64}, "nieh_truncate_head_64k", ("ctx_size", 64.0)),
+        (
+            {"eval_mode": "truncate_head", "ctx_size_k": 64},
+            "nieh_truncate_head_64k",
+            ("ctx_size", 64.0),
+        ),
         ({"eval_mode": "clip_retrieval", "n_imgs": 20}, "nieh_clip_retrieval", ("top_k", 20)),
         ({"eval_mode": "video"}, "nieh_video", ("context", "video")),
     ],
@@ -137,7 +171,10 @@ def test_half_a_log_is_a_run_with_the_rest_missing(import_log, tmp_path):
 
 
 BAD = {
-    "another question": ({**ROWS[1], "question": "Was Safe open?"}, "answers another question than row 1"),
+    "another question": (
+        {**ROWS[1], "question": "Was Safe open?"},
+        "answers another question than row 1",
+    ),
     "swapped": ({**ROWS[1], "qidx": 3}, "answers another question than row 3"),
     "another answer": ({**ROWS[1], "gt_answer": ["No"]}, "answers another question than row 1"),
     "beyond the end": ({**ROWS[1], "qidx": 4}, "answers question 4; the file has 4"),
@@ -167,7 +204,12 @@ def test_a_row_that_does_not_fit_is_counted_and_named(import_log, bad):
 @pytest.mark.parametrize(
     ("content", "name", "options", "reason"),
     [
-        ([{**one, "traj_id": "x"} for one in ROWS], LOG, (), "no row answers a question of this set (answers another"),
+        (
+            [{**one, "traj_id": "x"} for one in ROWS],
+            LOG,
+            (),
+            "no row answers a question of this set (answers another",
+        ),
         ([], LOG, (), "no row answers a question of this set (it is empty)"),
         (ROWS, "replies.log", (), "replies.log: its name has no model; give one with --model"),
         (
@@ -199,7 +241,13 @@ def test_replies_in_any_language_are_scored(import_log):
 
 def test_the_neutral_form(import_log):
     rows = [
-        {"question_id": "qsingle0", "reply": "SideTable", "n_context_tokens": 9, "n_reply_tokens": 2, "seconds": 1.5},
+        {
+            "question_id": "qsingle0",
+            "reply": "SideTable",
+            "n_context_tokens": 9,
+            "n_reply_tokens": 2,
+            "seconds": 1.5,
+        },
         {"question_id": "qmulti4", "reply": "no"},
         {"question_id": "q?", "reply": "no"},
     ]
@@ -207,7 +255,10 @@ def test_the_neutral_form(import_log):
     assert (code, header.name, list(header.config["tasks"])) == (1, "a person", ["imported"])
     assert "2 replies imported, 3 of 5 questions without one" in said
     assert "mine.jsonl, line 3: answers 'q?', which is not in the set" in said
-    assert [(record.id, record.payload.scores["strict"]) for record in records] == [("qmulti4", 1.0), ("qsingle0", 1.0)]
+    assert [(record.id, record.payload.scores["strict"]) for record in records] == [
+        ("qmulti4", 1.0),
+        ("qsingle0", 1.0),
+    ]
     assert (records[1].tokens.context, records[1].tokens.reply, records[1].seconds) == (9, 2, 1.5)
 
 
@@ -218,7 +269,9 @@ def test_samples_of_lm_eval(make_nieh_set, tmp_path, run):
     (samples,) = out.rglob("samples_nieh_gt_*.jsonl")
     words = ("import-replies", samples, "--data", data, "--model", "again", "--output", out)
     assert run(*words)[0] == 0
-    first, again = (read_run(next((out / name).iterdir()), RECORDS)[1] for name in ("blind", "again"))
+    first, again = (
+        read_run(next((out / name).iterdir()), RECORDS)[1] for name in ("blind", "again")
+    )
     assert len(again) == len(read_questions(next(data.glob("qa_set*.csv"))))
     # The samples do not say which frames were shown.
     payloads = {record.id: replace(record.payload, shown_clues=None) for record in first}
@@ -233,9 +286,13 @@ def test_every_published_reply_has_its_logged_score(tmp_path, run):
     assert err.count("the prompt it was asked with: published-logs\n") == 3
     means = {}
     for folder in (tmp_path / "Qwen2.5-VL-7B-Instruct").iterdir():
-        ((task, summary),) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].items()
+        ((task, summary),) = json.loads((folder / "results.json").read_text())["summary"][
+            "tasks"
+        ].items()
         cells = [summary["by_clues"][name] for name in ("1", "total")]
-        means[task] = [(cell["n"], round(100 * cell["scores"]["reference"]["mean"], 2)) for cell in cells]
+        means[task] = [
+            (cell["n"], round(100 * cell["scores"]["reference"]["mean"], 2)) for cell in cells
+        ]
     # The first of each is the mean of the single-clue log, as counted by hand.
     assert means == {
         "nieh_published_full": [(829, 55.86), (1303, 51.08)],

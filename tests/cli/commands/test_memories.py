@@ -29,15 +29,42 @@ def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run):
     ("typed", "words"),
     [
         (("check-memory", "nothing"), "unknown memory 'nothing'"),
-        (("check-memory", "last", "--memory-args", "k"), "--memory-args: 'k' is not of the form key=value"),
-        (("--model", "oracle", "--tasks", "nieh_mini_memory"), "this task needs a memory: give --memory NAME"),
+        (
+            ("check-memory", "last", "--memory-args", "k"),
+            "--memory-args: 'k' is not of the form key=value",
+        ),
+        (
+            ("--model", "oracle", "--tasks", "nieh_mini_memory"),
+            "this task needs a memory: give --memory NAME",
+        ),
         (
             ("--model", "oracle", "--tasks", "nieh_mini_gt", "--memory", "last"),
             "no task of nieh_mini_gt leaves",
         ),
-        (("--model", "oracle", "--tasks", "nieh_mini_memory", "--memory", "last", "--budget", "0"), "--budget 0: give"),
         (
-            ("--model", "oracle", "--tasks", "nieh_mini_memory", "--memory", "last", "--retriever", "x"),
+            (
+                "--model",
+                "oracle",
+                "--tasks",
+                "nieh_mini_memory",
+                "--memory",
+                "last",
+                "--budget",
+                "0",
+            ),
+            "--budget 0: give",
+        ),
+        (
+            (
+                "--model",
+                "oracle",
+                "--tasks",
+                "nieh_mini_memory",
+                "--memory",
+                "last",
+                "--retriever",
+                "x",
+            ),
             "--retriever:",
         ),
     ],
@@ -59,7 +86,16 @@ def test_all_are_listed_with_their_options(run):
 
 
 def test_a_run_for_each_memory_and_budget_with_a_table_of_all(tmp_path, run):
-    typed = ("--model", "qwen2.5-vl-tiny", "--tasks", "nieh_mini_memory", "--limit", 4, "--output", tmp_path)
+    typed = (
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_mini_memory",
+        "--limit",
+        4,
+        "--output",
+        tmp_path,
+    )
     code, out, err = run(*typed, "--memory", "last,oracle", "--budget", "30,1k")
     assert code == 0, err
     assert "Memories\n" in out
@@ -76,7 +112,9 @@ def test_a_run_for_each_memory_and_budget_with_a_table_of_all(tmp_path, run):
             recalled = unit["payload"]["recall"]["recalled"]
             assert all(isinstance(item, int) for item in recalled)
             assert (memory["budget"] == 1000) == (len(recalled) > 0)
-    before = {path: path.read_bytes() for folder in folders for path in folder.rglob("results.json")}
+    before = {
+        path: path.read_bytes() for folder in folders for path in folder.rglob("results.json")
+    }
     assert run(*typed, "--memory", "last,oracle", "--budget", "30,1k")[0] == 0
     assert all(path.read_bytes() == content for path, content in before.items())
     code, _, err = run("report", *folders, "--out", tmp_path / "page.html")
@@ -89,13 +127,26 @@ def test_a_memory_that_fails_fails_its_questions_alone(tmp_path, run):
     path = tmp_path / "mine.py"
     fails = "        if len(query.text) % 2:\n            raise KeyError('mug')\n        room ="
     path.write_text((EXAMPLES / "changes.py").read_text().replace("        room =", fails))
-    typed = ("--model", "qwen2.5-vl-tiny", "--tasks", "nieh_mini_memory", "--limit", 12, "--output", tmp_path / "out")
+    typed = (
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_mini_memory",
+        "--limit",
+        12,
+        "--output",
+        tmp_path / "out",
+    )
     _, _, err = run(*typed, "--memory", f"{path}:Changes")
     (journal,) = (tmp_path / "out").rglob("worker-0.jsonl")
-    units = [line for line in map(json.loads, journal.read_text().splitlines()) if line["type"] == "unit"]
+    units = [
+        line for line in map(json.loads, journal.read_text().splitlines()) if line["type"] == "unit"
+    ]
     failed = [unit for unit in units if "failure" in unit]
     assert len(units) == 12
     assert 0 < len(failed) < 12
     assert {len(unit["payload"]["question"]) % 2 for unit in failed} == {1}
-    assert {unit["failure"].partition(";")[0] for unit in failed} == {f"the memory {path}:Changes fails (no 'mug')"}
+    assert {unit["failure"].partition(";")[0] for unit in failed} == {
+        f"the memory {path}:Changes fails (no 'mug')"
+    }
     assert "Traceback" not in err

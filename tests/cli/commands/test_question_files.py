@@ -28,11 +28,25 @@ def results_of(output, model):
 
 def test_baselines_run_on_them(alone, tmp_path, run):
     out = tmp_path / "out"
-    words = ("--model", "oracle,blind,blind-count,random", "--tasks", "nieh_gt", "--data", alone, "--output", out)
+    words = (
+        "--model",
+        "oracle,blind,blind-count,random",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        alone,
+        "--output",
+        out,
+    )
     code, _, err = run(*words)
     assert code == 0, err
     by_clues = results_of(out, "oracle")["summary"]["tasks"]["nieh_gt"]["by_clues"]
-    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {"1": 3, "2": 1, ">=3": 1, "total": 5}
+    assert {name: by_clues[name]["n"] for name in ("1", "2", ">=3", "total")} == {
+        "1": 3,
+        "2": 1,
+        ">=3": 1,
+        "total": 5,
+    }
     assert run("show", *(next((out / model).iterdir()) for model in ("oracle", "blind")))[0] == 0
 
 
@@ -44,17 +58,30 @@ def test_baselines_run_on_them(alone, tmp_path, run):
     ],
 )
 def test_what_shows_frames_says_that_there_are_none(alone, tmp_path, run, model, task, said):
-    code, out, err = run("--model", model, "--tasks", task, "--data", alone, "--output", tmp_path / "out")
+    code, out, err = run(
+        "--model", model, "--tasks", task, "--data", alone, "--output", tmp_path / "out"
+    )
     assert (code, out) == (2, "")
     assert said in err.splitlines()[-1]
     assert "Traceback" not in err
 
 
 def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_path, run):
-    words = ("questions", make_nieh_set(size=56), "--out", tmp_path / "a.csv", "--words", "published", "--further")
+    words = (
+        "questions",
+        make_nieh_set(size=56),
+        "--out",
+        tmp_path / "a.csv",
+        "--words",
+        "published",
+        "--further",
+    )
     code, out, err = run(*words)
     assert (code, out) == (2, "")
-    assert "--further adds forms that have no published words; leave it out, or --words published" in err
+    assert (
+        "--further adds forms that have no published words; leave it out, or --words published"
+        in err
+    )
     assert not (tmp_path / "a.csv").exists()
 
 
@@ -78,14 +105,25 @@ def test_table4_is_printed_from_the_files_scores(tmp_path, run):
     assert "no question for the column 2; give a folder with both published question files" in err
 
 
-@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data")
-@pytest.mark.parametrize(
-    ("file", "n", "reference", "strict"), [(FILES[0], 829, 76.47, 76.53), (FILES[1], 474, 67.33, 67.28)]
+@pytest.mark.skipif(
+    not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
 )
-def test_who_sees_nothing_scores_this_on_the_published_files(tmp_path, run, file, n, reference, strict):
+@pytest.mark.parametrize(
+    ("file", "n", "reference", "strict"),
+    [(FILES[0], 829, 76.47, 76.53), (FILES[1], 474, 67.33, 67.28)],
+)
+def test_who_sees_nothing_scores_this_on_the_published_files(
+    tmp_path, run, file, n, reference, strict
+):
     data, out = PUBLISHED / file, tmp_path / "out"
-    assert run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0] == 0
-    totals = {m: results_of(out, m)["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"] for m in ("oracle", "blind")}
+    assert (
+        run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", out)[0]
+        == 0
+    )
+    totals = {
+        m: results_of(out, m)["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]
+        for m in ("oracle", "blind")
+    }
     assert (totals["oracle"]["n"], totals["oracle"]["scores"]["strict"]["mean"]) == (n, 1.0)
     for metric, accuracy in (("reference", reference), ("strict", strict)):
         assert round(100 * totals["blind"]["scores"][metric]["mean"], 2) == accuracy
@@ -105,17 +143,42 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
         ]  # fmt: skip
         write_questions(tmp_path / name, questions)
     path = tmp_path / FILES[0]
-    path.write_text(path.read_text().replace("t1,Is there a mug 1?,[2],['yes']", "t1,Is there a mug 1?,[2],"))
+    path.write_text(
+        path.read_text().replace("t1,Is there a mug 1?,[2],['yes']", "t1,Is there a mug 1?,[2],")
+    )
     log = tmp_path / "log.jsonl"
-    log.write_text("".join(json.dumps({"question_id": f"single{n}", "reply": "yes"}) + "\n" for n in range(3)))
+    log.write_text(
+        "".join(json.dumps({"question_id": f"single{n}", "reply": "yes"}) + "\n" for n in range(3))
+    )
     said = f"{FILES[0]}, line 3: answer is empty; fill it or remove the row"
     commands = {
         ("table4", tmp_path): 0,
         ("audit", tmp_path): 0,
-        ("import-replies", log, "--data", tmp_path, "--model", "m", "--output", tmp_path / "out"): 1,
-        ("--model", "oracle", "--tasks", "nieh_gt", "--data", tmp_path, "--output", tmp_path / "out"): 0,
+        (
+            "import-replies",
+            log,
+            "--data",
+            tmp_path,
+            "--model",
+            "m",
+            "--output",
+            tmp_path / "out",
+        ): 1,
+        (
+            "--model",
+            "oracle",
+            "--tasks",
+            "nieh_gt",
+            "--data",
+            tmp_path,
+            "--output",
+            tmp_path / "out",
+        ): 0,
     }
     for command, code in commands.items():
         found, _, err = run(*command)
         assert (found, said in " ".join(err.split())) == (code, True), (command, err)
-        assert command[0] != "import-replies" or "2 replies imported, 2 of 4 questions without one" in err
+        assert (
+            command[0] != "import-replies"
+            or "2 replies imported, 2 of 4 questions without one" in err
+        )

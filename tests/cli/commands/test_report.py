@@ -6,7 +6,11 @@ import pytest
 
 from ...plans.made_runs import made_run, plan, planner_run, write_run
 
-PLANS = [plan(name, index, (index, index + 1), 1.0, context=10 * index) for name in "ab" for index in range(3)]
+PLANS = [
+    plan(name, index, (index, index + 1), 1.0, context=10 * index)
+    for name in "ab"
+    for index in range(3)
+]
 
 
 @pytest.fixture
@@ -41,40 +45,84 @@ def test_runs_in_no_panel_are_named(folders, tmp_path, run):
 
 
 def test_runs_of_one_name_are_told_apart_by_their_folders(tmp_path, run):
-    twins = [write_run(made_run("m", PLANS), tmp_path, f"infthor_plans-{number}") for number in (1, 2)]
+    twins = [
+        write_run(made_run("m", PLANS), tmp_path, f"infthor_plans-{number}") for number in (1, 2)
+    ]
     _, said, _ = run("report", *twins, "--figure", "7", "--out", tmp_path / "figures")
     assert "m (infthor_plans-1)" in said
     assert "m (infthor_plans-2)" in said
 
 
 def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, run):
-    refused(run("report", tmp_path, "--figure", "7"), f"{tmp_path}: no journal in it; give the folder of a run")
-    run("--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "nieh")
+    refused(
+        run("report", tmp_path, "--figure", "7"),
+        f"{tmp_path}: no journal in it; give the folder of a run",
+    )
+    run(
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path / "nieh",
+    )
     (asked,) = (tmp_path / "nieh" / "oracle").iterdir()
-    refused(run("report", folders[0], asked, "--figure", "7"), f"{asked}: is a run of nieh, and figure 7 is of plans")
+    refused(
+        run("report", folders[0], asked, "--figure", "7"),
+        f"{asked}: is a run of nieh, and figure 7 is of plans",
+    )
 
 
 def test_misuse_is_one_line(folders, tmp_path, run):
-    refused(run("report", *folders, "--figure", "5"), "--figure 5: is none that can be drawn; there are 6 (reward")
-    refused(run("report", *folders, "--task", "a"), "--task: is for a figure; give --figure too, or leave it out")
-    refused(run("report", *folders, "--out", tmp_path / "page"), "the page is an .html file; name one")
+    refused(
+        run("report", *folders, "--figure", "5"),
+        "--figure 5: is none that can be drawn; there are 6 (reward",
+    )
+    refused(
+        run("report", *folders, "--task", "a"),
+        "--task: is for a figure; give --figure too, or leave it out",
+    )
+    refused(
+        run("report", *folders, "--out", tmp_path / "page"), "the page is an .html file; name one"
+    )
     refused(run("report", "--figure", "7"), "RUN...")
     refused(run("report", folders[0], folders[0], "--figure", "7"), "given twice")
     (tmp_path / "file").write_text("")
-    refused(run("report", folders[0], "--figure", "7", "--out", tmp_path / "file"), "cannot be written to")
+    refused(
+        run("report", folders[0], "--figure", "7", "--out", tmp_path / "file"),
+        "cannot be written to",
+    )
     missing = tmp_path / "missing.yaml"
-    refused(run("report", folders[0], "--figure", "7", "--panels", missing, "--out", tmp_path), f"{missing}: ")
+    refused(
+        run("report", folders[0], "--figure", "7", "--panels", missing, "--out", tmp_path),
+        f"{missing}: ",
+    )
 
 
 def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run):
-    run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "out")
-    runs = [folder for model in ("oracle", "blind") for folder in (tmp_path / "out" / model).iterdir()]
+    run(
+        "--model",
+        "oracle,blind",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path / "out",
+    )
+    runs = [
+        folder for model in ("oracle", "blind") for folder in (tmp_path / "out" / model).iterdir()
+    ]
     code, out, err = run("report", *runs, "--out", tmp_path / "pages" / "report.html")
     assert (code, err) == (0, "")
     assert out.startswith("5 samples, ")
     assert out.strip().endswith(f"MB: {tmp_path / 'pages' / 'report.html'}")
     page = (tmp_path / "pages" / "report.html").read_text()
-    assert "infthor-eval run --model oracle --tasks nieh_gt" in page  # how it is done again, and where its frames were
+    assert (
+        "infthor-eval run --model oracle --tasks nieh_gt" in page
+    )  # how it is done again, and where its frames were
     assert "no frames are shown" not in page
 
 
@@ -83,7 +131,14 @@ def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
 ):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
     code, out, err = run(
-        "report", scripted_run, "--data", scripted_data, "--episodes", 3, "--out", tmp_path / "report.html"
+        "report",
+        scripted_run,
+        "--data",
+        scripted_data,
+        "--episodes",
+        3,
+        "--out",
+        tmp_path / "report.html",
     )
     assert code == 0
     assert "12 samples, " in out

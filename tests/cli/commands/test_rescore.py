@@ -5,9 +5,9 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from infthor_eval.formats.digests import fingerprint
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
+from infthor_eval.storage.digests import fingerprint
 
 from ...nieh.made import record
 from .rescored import REPLIES, lines_of, row, scores_in
@@ -29,7 +29,9 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run):
     assert "  q0: 0, now 1: 'Sofa'" in said
     assert row(said, "nieh_gt", "strict", "our", "strict", "scorer") == ["7", "40.00", "54.29", "1"]
     header, records = read_run(new, RECORDS)
-    assert (header.name, new.parent.name, new.name) == ("m-rescored",) * 2 + (f"nieh_gt-{fingerprint(header.config)}",)
+    assert (header.name, new.parent.name, new.name) == ("m-rescored",) * 2 + (
+        f"nieh_gt-{fingerprint(header.config)}",
+    )
     assert header.config["rescored"] == {
         "from": {"name": "m", "config": fingerprint(read_run(folder, RECORDS)[0].config)},
         "scorer": None,
@@ -47,33 +49,53 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run):
 
 def test_the_same_command_again_writes_nothing_new(source, rescore):
     _, _, new = rescore(source())
-    before = lines_of(new), (new / "results.json").read_bytes(), (new / "rescored.json").read_bytes()
+    before = (
+        lines_of(new),
+        (new / "results.json").read_bytes(),
+        (new / "rescored.json").read_bytes(),
+    )
     _, _, again = rescore(new.parents[2] / "elsewhere" / "a run")
     assert again == new
-    assert (lines_of(new), (new / "results.json").read_bytes(), (new / "rescored.json").read_bytes()) == before
+    assert (
+        lines_of(new),
+        (new / "results.json").read_bytes(),
+        (new / "rescored.json").read_bytes(),
+    ) == before
 
 
 def test_a_changed_scorer_replaces_what_the_journal_has(source, rescore, monkeypatch):
     folder = source()
     _, _, new = rescore(folder)
-    monkeypatch.setattr("infthor_eval.nieh.rescoring.scores", lambda reply, answers: WRONG)
+    monkeypatch.setattr("infthor_eval.nieh.rescoring.rescore.scores", lambda reply, answers: WRONG)
     code, said, again = rescore(folder)
     assert (code, again) == (0, new)
     assert "nieh_gt, strict: 4 of 7 scores differ" in said
     assert set(scores_in(new, "strict").values()) == {0.0, None}
 
 
-def test_metrics_of_a_task_file_are_left_out_and_replies_that_they_failed_on_are_scored(source, rescore):
-    failed = record(0, "Sofa", ("Sofa",), scores={}, failure="process_results fails on q0: no letters")
-    folder = source([failed, record(1, "Bed", ("Bed",), scores={"letters": 0.3})], n_samples=2, metrics=("letters",))
+def test_metrics_of_a_task_file_are_left_out_and_replies_that_they_failed_on_are_scored(
+    source, rescore
+):
+    failed = record(
+        0, "Sofa", ("Sofa",), scores={}, failure="process_results fails on q0: no letters"
+    )
+    folder = source(
+        [failed, record(1, "Bed", ("Bed",), scores={"letters": 0.3})],
+        n_samples=2,
+        metrics=("letters",),
+    )
     code, said, new = rescore(folder)
     assert code == 0
     assert "nieh_gt: letters: left out, as the journal does not say how to compute it" in said
-    assert [(one.payload.scores, one.failure) for one in read_run(new, RECORDS)[1]] == [(RIGHT, None)] * 2
+    assert [(one.payload.scores, one.failure) for one in read_run(new, RECORDS)[1]] == [
+        (RIGHT, None)
+    ] * 2
     assert row(said, "nieh_gt", "strict", "our", "strict", "scorer") == ["2", "-", "100.00", "-"]
 
 
-def test_a_run_of_another_suite_and_a_folder_without_a_run_are_refused_in_one_line(source, rescore, tmp_path):
+def test_a_run_of_another_suite_and_a_folder_without_a_run_are_refused_in_one_line(
+    source, rescore, tmp_path
+):
     code, said, new = rescore(source((), suite="plans"))
     assert (code, new, said.count("\n")) == (2, None, 1)
     assert "a run: is a run of plans; give a run of nieh, which has replies" in said
@@ -84,7 +106,19 @@ def test_a_run_of_another_suite_and_a_folder_without_a_run_are_refused_in_one_li
 
 def test_a_run_of_ours_has_the_scores_that_it_had(make_nieh_set, run, rescore, tmp_path):
     data = make_nieh_set(size=56)
-    assert run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "first")[0] == 0
+    assert (
+        run(
+            "--model",
+            "oracle",
+            "--tasks",
+            "nieh_gt",
+            "--data",
+            data,
+            "--output",
+            tmp_path / "first",
+        )[0]
+        == 0
+    )
     (folder,) = (tmp_path / "first" / "oracle").iterdir()
     code, said, new = rescore(folder)
     assert (code, "5 replies scored\n" in said, "differ from" in said) == (0, True, False)
@@ -115,7 +149,16 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
     own(LENGTH)
     code, said, new = rescore(source(), "--scorer", "own.py:length")
     assert code == 0
-    assert scores_in(new, "length") == {"q0": 5, "q1": 15, "q2": 4, "q3": 4, "q4": 4, "q5": 8, "q6": None, "q7": 12}
+    assert scores_in(new, "length") == {
+        "q0": 5,
+        "q1": 15,
+        "q2": 4,
+        "q3": 4,
+        "q4": 4,
+        "q5": 8,
+        "q6": None,
+        "q7": 12,
+    }
     assert row(said, "nieh_gt", "length", "length", "in", "own.py") == ["7", "-", "742.86", "-"]
     scorer = read_run(new, RECORDS)[0].config["rescored"]["scorer"]
     assert (scorer["name"], scorer["metrics"], scorer["file"]) == ("length", ["length"], "own.py")
@@ -126,7 +169,12 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
 def test_a_mapping_is_several_metrics(source, rescore, own):
     own("def both(reply, answers):\n    return {'b': True, 'a': reply == answers[0]}\n")
     _, said, new = rescore(source(), "--scorer", "./own.py:both")
-    assert read_run(new, RECORDS)[0].config["tasks"]["nieh_gt"]["metrics"]["names"] == ["reference", "strict", "b", "a"]
+    assert read_run(new, RECORDS)[0].config["tasks"]["nieh_gt"]["metrics"]["names"] == [
+        "reference",
+        "strict",
+        "b",
+        "a",
+    ]
     assert scores_in(new, "a")["q0"] == scores_in(new, "b")["q1"] == 1.0
     assert "a: both in own.py." in said
 
@@ -136,14 +184,16 @@ def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, re
     folder = source()
     code, said, new = rescore(folder, "--scorer", "own.py:third")
     assert code == 1
-    failure = (
-        "third fails: IndexError in own.py:2 (third): list index out of range; traceback in journal/tracebacks.txt"
-    )
+    failure = "third fails: IndexError in own.py:2 (third): list index out of range; traceback in journal/tracebacks.txt"
     assert f"nieh_gt: 6 sample(s) failed, counted as wrong: {failure}" in said
     assert "1 replies scored; 6 failed by the scorer; 1 without a reply stay failed" in said
     assert "reply.split()[2]" in (new / "journal" / "tracebacks.txt").read_text()
     records = {one.id: one for one in read_run(new, RECORDS)[1]}
-    assert (records["q0"].failure, records["q0"].payload.scores, records["q0"].payload.reply) == (failure, {}, "Sofa")
+    assert (records["q0"].failure, records["q0"].payload.scores, records["q0"].payload.reply) == (
+        failure,
+        {},
+        "Sofa",
+    )
     assert records["q1"].failure is None
     lines = lines_of(new)
     rescore(folder, "--scorer", "own.py:third")
@@ -172,9 +222,17 @@ def test_what_is_no_score_is_a_failure(source, rescore, own, body, failure):
     [
         ("", "none.py:f", "none.py: there is no such file; write FILE.py:NAME"),
         ("", "own.py:f", "own.py has no function f; write FILE.py:NAME with a function in it"),
-        ("f = 3", "own.py:f", "--scorer own.py:f: is not a function of a reply and the gold answers"),
+        (
+            "f = 3",
+            "own.py:f",
+            "--scorer own.py:f: is not a function of a reply and the gold answers",
+        ),
         ("import nothing_of_this_name", "own.py:f", "fails when it is imported"),
-        ("def strict(r, a): return 1", "own.py:strict", "calls its metric strict, as one of ours is called"),
+        (
+            "def strict(r, a): return 1",
+            "own.py:strict",
+            "calls its metric strict, as one of ours is called",
+        ),
         (
             "",
             "measure",
@@ -196,7 +254,9 @@ def shout(reply, answers):
 
 def test_a_scorer_of_another_package_is_found_by_its_entry_point(source, rescore, monkeypatch):
     point = EntryPoint("loud", f"{__name__}:shout", "infthor_eval.scorers")
-    monkeypatch.setattr("infthor_eval.plugins.entry_points", lambda group: [point] if group == point.group else [])
+    monkeypatch.setattr(
+        "infthor_eval.plugins.entry_points", lambda group: [point] if group == point.group else []
+    )
     code, _, new = rescore(source(REPLIES[:1]), "--scorer", "loud")
     assert (code, scores_in(new, "loud")) == (0, {"q0": 0.0})
     scorer = read_run(new, RECORDS)[0].config["rescored"]["scorer"]

@@ -91,8 +91,22 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
         "n_not_asked": 0,
     }
     assert row(said, "the", "rules", "are", "unsure", "of") == ["2", "1", "0", "1", "0", "0"]
-    assert row(said, "are", "right", "by", "the", "rules", "(sample)") == ["2", "2", "0", "0", "0", "0"]
-    assert row(said, "are", "wrong", "by", "the", "rules", "(sample)") == ["1", "0", "0", "1", "0", "0"]
+    assert row(said, "are", "right", "by", "the", "rules", "(sample)") == [
+        "2",
+        "2",
+        "0",
+        "0",
+        "0",
+        "0",
+    ]
+    assert row(said, "are", "wrong", "by", "the", "rules", "(sample)") == [
+        "1",
+        "0",
+        "0",
+        "1",
+        "0",
+        "0",
+    ]
     assert "Judge and rules agree on 100.00 % of the sample." in said
     by = "strict, and Judge where the rules are unsure"
     assert row(said, "nieh_gt", "judged", *by.split()) == ["7", "-", "68.57", "-"]
@@ -120,17 +134,24 @@ def test_a_verdict_is_in_the_journal_and_is_not_asked_for_again(source, rescore,
 
 
 @pytest.mark.parametrize("said_by_judge", ["perhaps", "yes and no", "unsure"])
-def test_no_verdict_leaves_the_strict_score_and_is_counted(source, rescore, requests, said_by_judge):
+def test_no_verdict_leaves_the_strict_score_and_is_counted(
+    source, rescore, requests, said_by_judge
+):
     _, said, new = rescore(source(), *WITH_JUDGE, "--judge-args", f"soft={said_by_judge}")
     assert scores_in(new, "judged")["q1"] == 0.0
     assert row(said, "the", "rules", "are", "unsure", "of") == ["2", "0", "0", "1", "1", "0"]
 
 
-def test_a_judge_that_cannot_be_asked_is_counted_and_asked_again_next_time(source, rescore, requests, tmp_path):
+def test_a_judge_that_cannot_be_asked_is_counted_and_asked_again_next_time(
+    source, rescore, requests, tmp_path
+):
     folder = source()
     code, said, new = rescore(folder, *WITH_JUDGE, "--judge-args", "soft=raise")
     assert code == 1
-    assert "judge: not asked about 1 replies, whose strict score stands: Judge fails on the request" in said
+    assert (
+        "judge: not asked about 1 replies, whose strict score stands: Judge fails on the request"
+        in said
+    )
     assert "ZeroDivisionError in judge.py:" in said
     assert row(said, "the", "rules", "are", "unsure", "of") == ["2", "0", "0", "1", "0", "1"]
     assert scores_in(new, "judged")["q1"] == 0.0
@@ -167,16 +188,28 @@ class Talk(judge.Talk):
 """
 
 
-def test_the_published_prompt_asks_for_a_score_and_a_share_counts(source, rescore, requests, tmp_path, monkeypatch):
+def test_the_published_prompt_asks_for_a_score_and_a_share_counts(
+    source, rescore, requests, tmp_path, monkeypatch
+):
     """Bed for Sofa is wrong by the rules; this judge gives it 1."""
     (tmp_path / "scoring.py").write_text(SCORING)
     monkeypatch.syspath_prepend(tmp_path)
     folder = source()
     _, said, new = rescore(folder, "--judge", "scoring.py:Judge", "--judge-prompt", "published")
     judged, strict = scores_in(new, "judged"), scores_in(new, "strict")
-    assert {name: judged[name] for name in judged if judged[name] != strict[name]} == {"q1": 0.5, "q5": 1.0}
+    assert {name: judged[name] for name in judged if judged[name] != strict[name]} == {
+        "q1": 0.5,
+        "q5": 1.0,
+    }
     assert row(said, "the", "rules", "are", "unsure", "of") == ["2", "1", "1", "0", "0", "0"]
-    assert row(said, "are", "wrong", "by", "the", "rules", "(sample)") == ["1", "1", "0", "0", "0", "0"]
+    assert row(said, "are", "wrong", "by", "the", "rules", "(sample)") == [
+        "1",
+        "1",
+        "0",
+        "0",
+        "0",
+        "0",
+    ]
     assert read_run(new, RECORDS)[0].config["rescored"]["judge"]["prompt"] == "published"
 
 
@@ -187,7 +220,10 @@ def test_a_no_leaves_the_share_of_several_answers(source, rescore, requests):
 
 
 def test_the_sample_is_seeded_and_half_right_half_wrong(source, rescore, requests):
-    many = [record(n, "Sofa" if n % 2 else "Bed", ("Sofa",), question=f"Question {n}?") for n in range(60)]
+    many = [
+        record(n, "Sofa" if n % 2 else "Bed", ("Sofa",), question=f"Question {n}?")
+        for n in range(60)
+    ]
     folder = source([*many, record(999, "Bed", ("Bed",))])
     asked = []
     for seed in (0, 0, 1):
@@ -207,9 +243,15 @@ def test_the_sample_is_seeded_and_half_right_half_wrong(source, rescore, request
             ("--judge", "judge.py:Judge", "--judge-args", "hard=1"),
             "judge.py:Judge has no option hard; it takes: soft=yes",
         ),
-        (("--judge", "judge.py:Judge", "--judge-args", "hard"), "--judge-args: 'hard' is not of the form key=value"),
+        (
+            ("--judge", "judge.py:Judge", "--judge-args", "hard"),
+            "--judge-args: 'hard' is not of the form key=value",
+        ),
         (("--judge", "a,b"), "--judge names 2 models; give one"),
-        (("--judge-prompt", "published"), "--judge-prompt is how a judge is asked; give one with --judge"),
+        (
+            ("--judge-prompt", "published"),
+            "--judge-prompt is how a judge is asked; give one with --judge",
+        ),
         (("--judge-args", "soft=no"), "--judge-args are options of a judge; give one with --judge"),
     ],
 )
@@ -220,7 +262,9 @@ def test_a_judge_that_cannot_be_had_is_one_line(source, rescore, requests, optio
 
 
 def test_what_drives_an_arm_is_no_judge(source, rescore, tmp_path):
-    policy = JUDGE.replace("def conversation(self)", "def reset(self): pass\n    def act(self, frame, instruction)")
+    policy = JUDGE.replace(
+        "def conversation(self)", "def reset(self): pass\n    def act(self, frame, instruction)"
+    )
     (tmp_path / "judge.py").write_text(policy)
     code, said, _ = rescore(source(), *WITH_JUDGE)
     assert (code, said.count("\n")) == (2, 1)

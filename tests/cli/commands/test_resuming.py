@@ -6,7 +6,7 @@ import pytest
 
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_header, read_run
-from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.journals.journal import Journal
 
 
 @pytest.fixture
@@ -15,7 +15,16 @@ def ask(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
 
     def ask(*options, model="qwen2.5-vl-tiny"):
-        arguments = ["--model", model, "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+        arguments = [
+            "--model",
+            model,
+            "--tasks",
+            "nieh_gt",
+            "--data",
+            data,
+            "--output",
+            tmp_path / "out",
+        ]
         return run(*arguments, *options)
 
     return ask
@@ -113,7 +122,10 @@ def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
 
     code, _, err = ask("--recover")
     assert code == 0
-    assert "qwen2.5-vl-tiny: 2 bad line(s) of the journal set aside; those samples are tried again" in err
+    assert (
+        "qwen2.5-vl-tiny: 2 bad line(s) of the journal set aside; those samples are tried again"
+        in err
+    )
     assert "2 evaluated now, 3 resumed from the journal" in err
     assert replies(path.parents[1]) == before
     assert (path.parent / "bad_lines.txt").read_bytes() == lines[2] + lines[4]

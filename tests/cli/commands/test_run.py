@@ -30,9 +30,20 @@ FULL_MARKS = [
 ]
 
 
-def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(make_nieh_set, tmp_path, run):
+def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(
+    make_nieh_set, tmp_path, run
+):
     data = make_nieh_set(size=56)
-    arguments = ["--model", "oracle,blind", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "oracle,blind",
+        "--tasks",
+        "nieh",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     code, out, _ = run(*arguments, "--full")
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
@@ -49,29 +60,56 @@ def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(m
 def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     (data / "set.json").write_text('{"simulator": "embedded"}')
-    _, out, _ = run("run", "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
+    _, out, _ = run(
+        "run",
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    )
     assert "embedded simulator: not comparable" in " ".join(out.split())
 
 
 def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(make_nieh_set, tmp_path, run):
     data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
-    code, out, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out", "--full")
+    code, out, err = run(
+        "--model",
+        "oracle",
+        "--tasks",
+        tasks,
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+        "--full",
+    )
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
     # 8,000 // 121 = 66 frames: from frame 70, 57, 44, 31, 18; all inside 140 frames.
     assert ["oracle", "nieh_haystack_8k", "strict", *["100.00", "(1)"] * 5] in rows
-    assert next(row for row in rows if row[1:3] == ["nieh_haystack_1m", "strict"])[-3:] == ["0", "5", "0"]
+    assert next(row for row in rows if row[1:3] == ["nieh_haystack_1m", "strict"])[-3:] == [
+        "0",
+        "5",
+        "0",
+    ]
     assert "nieh_haystack_1m: 5 sample(s) skipped: the window reaches outside the trajectory" in err
 
 
-def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(make_nieh_set, tmp_path, run):
+def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(
+    make_nieh_set, tmp_path, run
+):
     data = make_nieh_set(n_frames=20)
     arguments = ["--model", "qwen2.5-vl-tiny", "--model-args", "max_tokens=1200", "--data", data]
     code, _, err = run(*arguments, "--tasks", "nieh", "--output", tmp_path / "out")
     assert code == 1
     fits, refused = (
-        next(line for line in err.splitlines() if line.startswith(name)) for name in ("nieh_gt", "nieh_full")
+        next(line for line in err.splitlines() if line.startswith(name))
+        for name in ("nieh_gt", "nieh_full")
     )
     assert "(limit 1,200): fits" in fits
     assert "2 of 2 contexts refused" in refused
@@ -81,29 +119,47 @@ def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(make
 
 def test_limit_evaluates_only_so_many_of_each_task(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
-    run("--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "o", "--limit", 2)
+    run(
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "o",
+        "--limit",
+        2,
+    )
     results = json.loads(only(tmp_path / "o", "results.json").read_text())
-    assert {name: task["n"] for name, task in results["summary"]["tasks"].items()} == {"nieh_gt": 2, "nieh_full": 2}
+    assert {name: task["n"] for name, task in results["summary"]["tasks"].items()} == {
+        "nieh_gt": 2,
+        "nieh_full": 2,
+    }
 
 
 def test_the_limit_counts_questions_and_what_is_skipped_follows_it(make_nieh_set, tmp_path, run):
     questions = [Question("t", f"Is there a {name}?", (70,), ("yes",)) for name in ("mug", "cup")]
     outside = [Question("t", f"Is there a {name}?", (999,), ("yes",)) for name in ("pan", "pot")]
-    data = make_nieh_set([outside[0], questions[0], outside[1], questions[1]], n_frames=140, size=56)
+    data = make_nieh_set(
+        [outside[0], questions[0], outside[1], questions[1]], n_frames=140, size=56
+    )
     arguments = ["--model", "oracle", "--tasks", "nieh_haystack_8k", "--data", data]
     for limit, n in ((1, 5), (2, 10)):
         code, _, err = run(*arguments, "--output", tmp_path / str(limit), "--limit", limit)
         assert code == 0
-        task = json.loads(only(tmp_path / str(limit), "results.json").read_text())["summary"]["tasks"][
-            "nieh_haystack_8k"
-        ]
+        task = json.loads(only(tmp_path / str(limit), "results.json").read_text())["summary"][
+            "tasks"
+        ]["nieh_haystack_8k"]
         assert task["n"] == n
         line = f"nieh_haystack_8k: {task['skipped']['n']} sample(s) skipped: clue 999 is outside"
         assert (line in err) == bool(task["skipped"]["n"])
         assert {cell["n"] for cell in task["by_variant"].values()} == {limit}
 
 
-def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nieh_set, tmp_path, run, task_files):
+def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
+    make_nieh_set, tmp_path, run, task_files
+):
     (task_files / "nieh" / "own.py").write_text(
         "def measure(doc, results):\n    return {'letters': len(results[0]) / 20}\n"
     )
@@ -111,11 +167,20 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nie
         "include: _nieh.yaml\ntask: nieh_own\ndataset_kwargs: {context: clues}\n"
         "process_results: !function own.measure\nmetric_list: [{metric: letters}]\n"
     )
-    arguments = ["--model", "oracle", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "oracle",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path / "out",
+    ]
     code, out, err = run(*arguments, "--tasks", "nieh_gt,nieh_own", "--full")
     assert code == 0, err
     rows = [line.split() for line in out.splitlines()]
-    assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 7] == ["letters"]
+    assert [row[2] for row in rows if row[:2] == ["oracle", "nieh_own"] and len(row) > 7] == [
+        "letters"
+    ]
     # By clues: 3, 2 and 2 letters of 20; 10; 10.
     assert next(row for row in rows if row[1:3] == ["nieh_own", "letters"])[3:10:2] == [
         "11.67",
@@ -124,9 +189,14 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nie
         "27.00",
     ]
     assert ["oracle", "nieh_gt", "strict", *FULL_MARKS] in rows
-    summary = json.loads(only(tmp_path / "out", "results.json").read_text())["summary"]["tasks"]["nieh_own"]
+    summary = json.loads(only(tmp_path / "out", "results.json").read_text())["summary"]["tasks"][
+        "nieh_own"
+    ]
     assert summary["by_clues"]["total"]["scores"]["letters"]["mean"] == pytest.approx(0.27)
-    samples = [json.loads(line) for line in only(tmp_path / "out", "samples_nieh_own_*.jsonl").read_text().splitlines()]
+    samples = [
+        json.loads(line)
+        for line in only(tmp_path / "out", "samples_nieh_own_*.jsonl").read_text().splitlines()
+    ]
     assert [sample["letters"] for sample in samples] == [0.15, 0.5, 0.5, 0.1, 0.1]
 
     (task_files / "nieh" / "own.py").write_text("def measure(doc, results):\n    return {}\n")
@@ -134,7 +204,9 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(make_nie
     assert code == 1
     assert "nieh_own: 1 sample(s) failed, counted as wrong: process_results fails on traj_a/" in err
     (task_files / "nieh" / "nieh_own.yaml").write_text(
-        (task_files / "nieh" / "nieh_own.yaml").read_text().replace("letters}", "letters, aggregation: median}")
+        (task_files / "nieh" / "nieh_own.yaml")
+        .read_text()
+        .replace("letters}", "letters, aggregation: median}")
     )
     code, out, err = run(*arguments, "--tasks", "nieh_own")
     assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
@@ -147,14 +219,27 @@ def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
     n_answers = 2 * repeats * len(MANY)
 
     def start(output):
-        arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh", "--data", data, "--output", output]
+        arguments = [
+            "--model",
+            "qwen2.5-vl-tiny",
+            "--tasks",
+            "nieh",
+            "--data",
+            data,
+            "--output",
+            output,
+        ]
         arguments += ["--repeats", repeats]
         code = "from infthor_eval.cli import main; main()"
-        return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            [sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True
+        )
 
     killed = start(tmp_path / "killed")
     shards = (tmp_path / "killed").rglob  # until some answers, not all, are on disk
-    wait_until(lambda: any(path.read_bytes().count(b"\n") > 3 for path in shards("worker-0.jsonl")), killed)
+    wait_until(
+        lambda: any(path.read_bytes().count(b"\n") > 3 for path in shards("worker-0.jsonl")), killed
+    )
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     n_before = only(tmp_path / "killed", "worker-0.jsonl").read_bytes().count(b"\n") - 1
@@ -185,9 +270,27 @@ BAD = [
     (["--model", "oracle", "--tasks", "nieh", "--data", "nowhere"], "nowhere: no such folder"),
     (["--model", "oracle", "--tasks", ",", "--data", "SET"], "--tasks is empty"),
     (["--model", "oracle"], "Missing option '--tasks'; see `infthor-eval run --help`"),
-    (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a"], "not of the form key=value"),
-    (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a=1"], "oracle has no option a"),
-    (["--model", "qwen2.5-vl-tiny", "--tasks", "nieh", "--data", "SET", "--model-args", "dtpe=x"], "mean dtype?"),
+    (
+        ["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a"],
+        "not of the form key=value",
+    ),
+    (
+        ["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--model-args", "a=1"],
+        "oracle has no option a",
+    ),
+    (
+        [
+            "--model",
+            "qwen2.5-vl-tiny",
+            "--tasks",
+            "nieh",
+            "--data",
+            "SET",
+            "--model-args",
+            "dtpe=x",
+        ],
+        "mean dtype?",
+    ),
     (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--limit", "0"], "--limit"),
     (["--modle", "oracle"], "unknown option --modle; did you mean --model?"),
     (["--model", "oracle", "--taks", "nieh"], "unknown option --taks; did you mean --tasks?"),
@@ -202,7 +305,9 @@ BAD = [
 def test_misuse_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run, arguments, said):
     data = make_nieh_set(size=56)
     arguments = [str(data) if argument == "SET" else argument for argument in arguments]
-    code, out, err = run(*arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else []))
+    code, out, err = run(
+        *arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else [])
+    )
     assert code == 2
     assert said in err
     assert out == ""
@@ -214,7 +319,9 @@ def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run)
     data = make_nieh_set(size=56)
     for traj_id in ("traj_a", "traj_b"):
         (data / "metadata" / traj_id / "img" / "extra.png").write_bytes(b"")
-    code, _, err = run("--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
+    code, _, err = run(
+        "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
+    )
     assert code == 2
     assert "trajectory traj_a: 7 frames but 6 entries" in err
     assert len(err.strip().splitlines()) == 1
@@ -222,21 +329,38 @@ def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run)
 
 def test_what_is_skipped_is_counted_and_named(make_nieh_set, tmp_path, run):
     data = make_nieh_set([*MANY, Question("traj_a", "Where is it?", (77,), ("Shelf",))], size=56)
-    code, _, err = run("--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
+    code, _, err = run(
+        "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
+    )
     assert code == 0
     assert "nieh_gt: 1 sample(s) skipped: clue 77 is outside trajectory traj_a (6 frames)" in err
 
 
-def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_says_so(make_nieh_set, tmp_path, run):
+def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_says_so(
+    make_nieh_set, tmp_path, run
+):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     code, out, err = run(*arguments)
     assert code == 1
     assert "nieh_gt: 2 sample(s) failed, counted as wrong" in err
     assert str(frame) in err
-    assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-3:] == ["5", "0", "2"]
+    assert next(line for line in out.splitlines() if "nieh_gt" in line).split()[-3:] == [
+        "5",
+        "0",
+        "2",
+    ]
 
 
 def test_help_names_the_commands_and_the_version_is_printed(run):
@@ -253,7 +377,9 @@ def test_ls_lists_models_and_tasks(run):
 
 
 def test_ls_lists_a_users_own_tasks(run, tmp_path):
-    (tmp_path / "mine.yaml").write_text("include: _nieh.yaml\ntask: my_own_task\ndataset_kwargs: {context: clues}\n")
+    (tmp_path / "mine.yaml").write_text(
+        "include: _nieh.yaml\ntask: my_own_task\ndataset_kwargs: {context: clues}\n"
+    )
     assert "my_own_task" not in run("ls", "tasks")[1]
     assert "my_own_task" in run("ls", "tasks", "--include-path", tmp_path)[1]
 
@@ -265,7 +391,9 @@ def test_help_of_a_run_has_each_option_once(run):
     assert "9223372036854775807" not in said
 
 
-@pytest.mark.parametrize(("limit", "reason"), [("0", "0 is less than 1"), (str(2**63), "is more than"), ("x", "'x'")])
+@pytest.mark.parametrize(
+    ("limit", "reason"), [("0", "0 is less than 1"), (str(2**63), "is more than"), ("x", "'x'")]
+)
 def test_an_invalid_number_is_refused(run, limit, reason):
     code, _, said = run("--model", "oracle", "--tasks", "nieh_mini_gt", "--limit", limit)
     assert code == 2

@@ -38,7 +38,10 @@ def test_a_scene_is_drawn_from_above_and_from_the_agent(tmp_path, run):
     [
         (["scenes", "show", "attic-1"], "attic-1"),
         (["scenes", "show", "FloorPlan1"], "FloorPlan1"),
-        (["scenes", "dump", "FloorPlan1", "--out", "x", "--unity", "/nowhere/thor"], "/nowhere/thor"),
+        (
+            ["scenes", "dump", "FloorPlan1", "--out", "x", "--unity", "/nowhere/thor"],
+            "/nowhere/thor",
+        ),
         (["ls", "scenes", "--data", "nowhere"], "does not exist"),
         (["ls", "scenes", "--data", "."], "give a folder of recorded floor plans"),
     ],

@@ -15,7 +15,16 @@ from tests.faults.told import said_in_one_line
 def ran(make_nieh_set, tmp_path, run):
     """The folders of runs of the oracle and of the blind on five questions, and what was printed at their end."""
     data = make_nieh_set(size=56)
-    arguments = ["--model", "oracle,blind", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "oracle,blind",
+        "--tasks",
+        "nieh",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
 
     def ran(*options):
         code, out, err = run(*arguments, *options)
@@ -26,7 +35,9 @@ def ran(make_nieh_set, tmp_path, run):
     return ran
 
 
-@pytest.mark.parametrize("options", [(), ("--full",), ("--json",), ("--format", "latex"), ("--format", "csv")])
+@pytest.mark.parametrize(
+    "options", [(), ("--full",), ("--json",), ("--format", "latex"), ("--format", "csv")]
+)
 def test_a_run_is_shown_again_as_it_was_shown(ran, run, options):
     folders, printed = ran(*options)
     code, out, err = run("show", *folders, *options)
@@ -45,10 +56,14 @@ def test_the_first_screen_has_one_number_a_task_and_fits(ran):
 def test_a_task_without_samples_is_a_line(make_nieh_set, tmp_path, run):
     data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
-    code, out, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out")
+    code, out, err = run(
+        "--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out"
+    )
     assert code == 0, err
     assert not any(line.split()[1:2] == ["nieh_haystack_1m"] for line in out.splitlines())
-    assert "nieh_haystack_1m: nothing asked, 5 skipped: the window reaches outside" in " ".join(out.split())
+    assert "nieh_haystack_1m: nothing asked, 5 skipped: the window reaches outside" in " ".join(
+        out.split()
+    )
 
 
 def test_quiet_prints_folders_and_nothing_else(ran, capfd, run):
@@ -69,7 +84,16 @@ def test_json_alone_is_on_standard_output(ran):
 def test_csv_is_a_table_with_one_number_a_cell(ran):
     _, printed = ran("--format", "csv")
     heading, *rows = csv.reader(io.StringIO(printed))
-    assert heading == ["model", "task", "total", "95 % low", "95 % high", "bootstrap low", "bootstrap high", "n"]
+    assert heading == [
+        "model",
+        "task",
+        "total",
+        "95 % low",
+        "95 % high",
+        "bootstrap low",
+        "bootstrap high",
+        "n",
+    ]
     assert rows[0] == ["oracle", "nieh_gt", "100.00", "34.2", "100.0", "", "", "5"]
     assert rows[1][:3] == ["oracle", "nieh_full", "100.00"]
 
@@ -80,7 +104,9 @@ def test_all_tables_of_csv_have_numbers_in_their_columns_of_numbers(ran):
     for block in filter(str.strip, printed.split("\n\n")):
         heading, *rows = csv.reader(line for line in block.splitlines() if not line.startswith("#"))
         for name, *cells in zip(heading, *rows, strict=True):
-            assert name in texts or all(cell == "" or math.isfinite(float(cell)) for cell in cells), (name, cells)
+            assert name in texts or all(
+                cell == "" or math.isfinite(float(cell)) for cell in cells
+            ), (name, cells)
 
 
 def test_json_with_format_or_full_is_refused(run, tmp_path):
@@ -88,7 +114,9 @@ def test_json_with_format_or_full_is_refused(run, tmp_path):
 
 
 def test_a_folder_without_a_run_is_named(run, tmp_path):
-    said_in_one_line(run("show", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run")
+    said_in_one_line(
+        run("show", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run"
+    )
 
 
 # -- ls

@@ -16,7 +16,16 @@ from tests.faults.told import said_in_one_line
 def folders(make_nieh_set, tmp_path, run):
     """The folders of runs of the oracle and of the blind on five questions."""
     data = make_nieh_set(size=56)
-    code, _, err = run("--model", "oracle,blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")
+    code, _, err = run(
+        "--model",
+        "oracle,blind",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    )
     assert code == 0, err
     return [next((tmp_path / "out" / model).iterdir()) for model in ("oracle", "blind")]
 
@@ -30,12 +39,23 @@ def test_csv_has_a_row_per_sample_of_every_run(folders, run):
     assert {row["n_clues"] for row in rows} == {"1", "2", "3"}
 
 
-@pytest.mark.parametrize("options", [("--format", "parquet"), ("--per-sample", "--format", "parquet")])
+@pytest.mark.parametrize(
+    "options", [("--format", "parquet"), ("--per-sample", "--format", "parquet")]
+)
 def test_parquet_is_the_frame(folders, options):
-    words = [sys.executable, "-c", "from infthor_eval.cli import main; main()", "show", *folders[:1], *options]
+    words = [
+        sys.executable,
+        "-c",
+        "from infthor_eval.cli import main; main()",
+        "show",
+        *folders[:1],
+        *options,
+    ]
     done = subprocess.run(words, capture_output=True, check=True, timeout=600)
     pandas.testing.assert_frame_equal(
-        pandas.read_parquet(io.BytesIO(done.stdout)), infthor_eval.load_run(folders[0]), check_dtype=True
+        pandas.read_parquet(io.BytesIO(done.stdout)),
+        infthor_eval.load_run(folders[0]),
+        check_dtype=True,
     )
 
 
@@ -49,9 +69,13 @@ def test_parquet_is_the_frame(folders, options):
     ],
 )
 def test_what_has_no_row_per_sample_is_refused(folders, run, options):
-    said_in_one_line(run("show", *folders, *options), "--per-sample: is for --format csv and --format parquet")
+    said_in_one_line(
+        run("show", *folders, *options), "--per-sample: is for --format csv and --format parquet"
+    )
 
 
 def test_parquet_is_not_written_on_a_terminal(folders, run, monkeypatch):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    said_in_one_line(run("show", *folders, "--format", "parquet"), "write it into a file, `> samples.parquet`")
+    said_in_one_line(
+        run("show", *folders, "--format", "parquet"), "write it into a file, `> samples.parquet`"
+    )

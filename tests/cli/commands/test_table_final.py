@@ -11,7 +11,9 @@ LOG = "eval_longhrz_checkpoints_infini-ft_step-20000-hf.log"
 
 def test_the_table_is_printed_and_bad_lines_are_named(tmp_path, run):
     path = tmp_path / LOG
-    path.write_text("".join(json.dumps({"traj_id": name, "metric": ROW}) + "\n" for name in ("t0", "t1")))
+    path.write_text(
+        "".join(json.dumps({"traj_id": name, "metric": ROW}) + "\n" for name in ("t0", "t1"))
+    )
     code, out, err = run("table-final", path)
     assert (code, err) == (0, "")
     assert "25.0 (2 of 8)" in out

@@ -3,11 +3,11 @@ import json
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.baselines import BASELINES
+from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.suite import NiehSuite
+from infthor_eval.storage.packaged import packaged_folder
 from model_adapters import Capabilities
 
 # Of known skill: which answers each scripted model gets right.
@@ -49,7 +49,9 @@ class Scripted:
         question = sample.question
         if self.name == "half" and SKILLS["half"](question):
             return str(question.answers[0])
-        return ", ".join(question.answers) if SKILLS[self.name](question) else "<script>wrong</script>"
+        return (
+            ", ".join(question.answers) if SKILLS[self.name](question) else "<script>wrong</script>"
+        )
 
 
 @pytest.fixture
@@ -63,7 +65,9 @@ def kept(folder):
     return [question.text for question in read_questions(folder / "qa_set_validated.csv")]
 
 
-def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_inspected(data, tmp_path, run):
+def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_inspected(
+    data, tmp_path, run
+):
     out = tmp_path / "validated"
     code, printed, err = run("validate", data, "--models", "yes,none", "--out", out)
     assert code == 0, err
@@ -78,7 +82,10 @@ def test_questions_that_one_model_answers_are_kept_and_the_rest_is_rejected_or_i
     assert next(line for line in printed.splitlines() if line.startswith("  yes")).split()[3:9] == [
         *("100.00", "(1)", "100.00", "(1)", "-", "100.00")
     ]
-    assert run("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o")[0] == 0
+    assert (
+        run("--model", "oracle", "--tasks", "nieh_gt", "--data", out, "--output", tmp_path / "o")[0]
+        == 0
+    )
 
 
 def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp_path, run):
@@ -89,16 +96,25 @@ def test_the_bundled_set_keeps_exactly_what_a_model_of_four_can_answer(data, tmp
     )
     code, printed, err = run("validate", bundled, "--models", ",".join(models), "--out", out)
     assert code == 0, err
-    questions = [item for path in sorted(bundled.glob("qa_set*.csv")) for item in read_questions(path)]
+    questions = [
+        item for path in sorted(bundled.glob("qa_set*.csv")) for item in read_questions(path)
+    ]
     known = [item for item in questions if any(SKILLS[name](item) for name in models)]
     unknown = [item for item in questions if item not in known]
-    alone = {name: [q for q in known if [m for m in models if SKILLS[m](q)] == [name]] for name in models}
+    alone = {
+        name: [q for q in known if [m for m in models if SKILLS[m](q)] == [name]] for name in models
+    }
     assert len(known) > 50 and len(unknown) > 20 and all(alone[name] for name in models[:3])
     assert read_questions(out / "qa_set_validated.csv") == known
-    rejected = {json.loads(line)["question_id"] for line in (out / "rejected.jsonl").read_text().splitlines()}
+    rejected = {
+        json.loads(line)["question_id"]
+        for line in (out / "rejected.jsonl").read_text().splitlines()
+    }
     assert rejected == {item.id for item in unknown if len(item.clues) == 1}
     with (out / "inspection.csv").open(newline="") as file:
-        assert {row["question_id"] for row in csv.DictReader(file)} == {q.id for q in unknown if len(q.clues) > 1}
+        assert {row["question_id"] for row in csv.DictReader(file)} == {
+            q.id for q in unknown if len(q.clues) > 1
+        }
     assert f"{len(questions)} questions: {len(known)} kept" in printed
 
 
@@ -120,7 +136,9 @@ def test_decisions_are_applied(data, tmp_path, run):
     rows = list(csv.DictReader((out / "inspection.csv").open(newline="")))
     decisions = tmp_path / "decisions.csv"
     choices = zip(rows, ("keep", "drop", ""), strict=True)
-    decisions.write_text("question_id,decision\n" + "".join(f"{row['question_id']},{c}\n" for row, c in choices))
+    decisions.write_text(
+        "question_id,decision\n" + "".join(f"{row['question_id']},{c}\n" for row, c in choices)
+    )
     code, printed, err = run(*arguments, "--decisions", decisions)
     assert code == 0
     assert kept(out) == ["Is there a mug?", "What is <b>it</b>?", "Was it there?"]
@@ -139,7 +157,9 @@ def test_decisions_are_applied(data, tmp_path, run):
 def test_decisions_that_do_not_fit_are_refused(data, tmp_path, run, content, said):
     decisions = tmp_path / "decisions.csv"
     decisions.write_text(content)
-    code, _, err = run("validate", data, "--models", "none", "--out", tmp_path / "v", "--decisions", decisions)
+    code, _, err = run(
+        "validate", data, "--models", "none", "--out", tmp_path / "v", "--decisions", decisions
+    )
     assert code == 2
     assert said in err
     assert not (tmp_path / "v" / "qa_set_validated.csv").exists()

@@ -9,7 +9,7 @@ from infthor_eval.cli import main
 from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
-from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.journals.journal import Journal
 
 from ..remarks import remarks
 
@@ -18,10 +18,21 @@ from ..remarks import remarks
 def arm_run(tmp_path_factory):
     """Two pick-ups and two puts of one trajectory, by an arm that moves at random: in deltas, as policies do."""
     output = tmp_path_factory.mktemp("arms")
-    words = ("--model", "random-arm", "--tasks", "manipulathor_mini", "--limit", 2, "--output", output)
+    words = (
+        "--model",
+        "random-arm",
+        "--tasks",
+        "manipulathor_mini",
+        "--limit",
+        2,
+        "--output",
+        output,
+    )
     with pytest.MonkeyPatch.context() as patched, pytest.raises(SystemExit) as ended:
         # The first ones, which are of one trajectory; a limit takes them from all.
-        patched.setattr("infthor_eval.manipulation.task.limit_items", lambda episodes, *_: episodes[:2])
+        patched.setattr(
+            "infthor_eval.manipulation.task.limit_items", lambda episodes, *_: episodes[:2]
+        )
         main([str(word) for word in words])
     assert ended.value.code == 0
     (folder,) = (output / "random-arm").iterdir()
@@ -30,7 +41,10 @@ def arm_run(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def episodes(arm_run):
-    return sorted((record.payload for record in read_run(arm_run, RECORDS)[1]), key=lambda payload: payload.index)
+    return sorted(
+        (record.payload for record in read_run(arm_run, RECORDS)[1]),
+        key=lambda payload: payload.index,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +68,15 @@ def rewritten(folder, place, change):
     return place
 
 
-def test_episodes_become_an_mp4_and_go_as_they_were_recorded(arm_run, episodes, trajectory, tmp_path, run):
+def test_episodes_become_an_mp4_and_go_as_they_were_recorded(
+    arm_run, episodes, trajectory, tmp_path, run
+):
     out = tmp_path / "new" / "watched.mp4"
     chosen = [episodes[0], next(payload for payload in episodes if payload.kind == "put")]
     numbers = ",".join(str(payload.index) for payload in chosen)
-    code, said, err = run("watch", arm_run, "--trajectory", trajectory, "--episode", numbers, "--out", out)
+    code, said, err = run(
+        "watch", arm_run, "--trajectory", trajectory, "--episode", numbers, "--out", out
+    )
     wanted = sum(TITLE_REPEATS + len(payload.steps) + END_REPEATS for payload in chosen)
     assert (code, remarks(err)) == (0, [])
     assert said.splitlines() == [f"2 of 4 episodes, {wanted / 2:.0f} s: {out}"]
@@ -83,7 +101,9 @@ def test_what_goes_otherwise_than_recorded_is_said_in_a_line(arm_run, episodes, 
             msgspec.structs.replace(step, hand=(step.hand[0], step.hand[1] + 0.1, step.hand[2]))
             for step in record.payload.steps
         )
-        return msgspec.structs.replace(record, payload=msgspec.structs.replace(record.payload, steps=steps))
+        return msgspec.structs.replace(
+            record, payload=msgspec.structs.replace(record.payload, steps=steps)
+        )
 
     folder = rewritten(arm_run, tmp_path / "run", moved)
     first = episodes[0].index
@@ -98,23 +118,44 @@ def test_episodes_in_which_nobody_acted_have_the_title_alone(arm_run, episodes, 
         return msgspec.structs.replace(record, payload=fresh, failure="out of memory")
 
     folder = rewritten(arm_run, tmp_path / "run", failed)
-    code, said, _ = run("watch", folder, "--episode", episodes[0].index, "--out", tmp_path / "a.gif", "--fps", 1)
-    assert (code, said.splitlines()) == (0, [f"1 of 4 episodes, {TITLE_REPEATS} s: {tmp_path / 'a.gif'}"])
+    code, said, _ = run(
+        "watch", folder, "--episode", episodes[0].index, "--out", tmp_path / "a.gif", "--fps", 1
+    )
+    assert (code, said.splitlines()) == (
+        0,
+        [f"1 of 4 episodes, {TITLE_REPEATS} s: {tmp_path / 'a.gif'}"],
+    )
     assert run("watch", folder, "--sheet", tmp_path / "sheet.png")[0] == 0
 
 
-def test_what_cannot_be_watched_is_one_line(arm_run, episodes, trajectory, scripted_run, tmp_path, run):
+def test_what_cannot_be_watched_is_one_line(
+    arm_run, episodes, trajectory, scripted_run, tmp_path, run
+):
     def watch(*words):
         return run("watch", arm_run, *words)
 
     there = ", ".join(str(payload.index) for payload in episodes)
-    refused(watch("--trajectory", "hall-9"), f"unknown trajectory of this run 'hall-9'; there are {trajectory}")
+    refused(
+        watch("--trajectory", "hall-9"),
+        f"unknown trajectory of this run 'hall-9'; there are {trajectory}",
+    )
     refused(watch("--task", "nothing"), "unknown task of this run 'nothing'")
     refused(watch("--episode", "1"), f"--episode 1: the run has episodes {there} of {trajectory}")
-    refused(watch("--episode", "one"), "--episode 'one': is no number of an action; write 17, or 17,75")
-    refused(watch("--plans", "1"), f"--plans: is not for runs of manipulation, and {arm_run} is one; leave it out")
+    refused(
+        watch("--episode", "one"), "--episode 'one': is no number of an action; write 17, or 17,75"
+    )
+    refused(
+        watch("--plans", "1"),
+        f"--plans: is not for runs of manipulation, and {arm_run} is one; leave it out",
+    )
     refused(watch("--sheet", tmp_path / "a.jpg"), "a.jpg: a sheet is a PNG")
-    refused(watch("--sheet", tmp_path / "a.png", "--out", tmp_path / "a.gif"), "--sheet and --out: one picture or")
+    refused(
+        watch("--sheet", tmp_path / "a.png", "--out", tmp_path / "a.gif"),
+        "--sheet and --out: one picture or",
+    )
     refused(watch("--data", tmp_path / "none"), "there is no such file or folder")
     refused(run("watch", scripted_run, "--episode", "1"), "--episode: is not for runs of plans")
-    refused(run("watch", scripted_run, "--sheet", tmp_path / "a.png"), "--sheet: is not for runs of plans")
+    refused(
+        run("watch", scripted_run, "--sheet", tmp_path / "a.png"),
+        "--sheet: is not for runs of plans",
+    )

@@ -10,12 +10,14 @@ import urllib.request
 import pytest
 
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.journals.journal import Journal
 from tests.faults.told import said_in_one_line
 from tests.nieh.made import record
 from tests.report.live.conftest import header_of
 
-pytest.importorskip("uvicorn", reason="the extra `page` is not installed: pip install 'infthor-eval[page]'")
+pytest.importorskip(
+    "uvicorn", reason="the extra `page` is not installed: pip install 'infthor-eval[page]'"
+)
 
 # Where the tests run in the background of a shell, what they start would ignore Ctrl-C.
 OURS = """
@@ -48,7 +50,9 @@ def test_the_page_is_served_until_ctrl_c_while_the_run_goes_on(tmp_path):
 
 def test_a_file_is_no_folder_of_runs(run, tmp_path):
     (tmp_path / "file").write_text("")
-    said_in_one_line(run("watch-run", tmp_path / "file"), "is a file; give the folder of a run, or one above it")
+    said_in_one_line(
+        run("watch-run", tmp_path / "file"), "is a file; give the folder of a run, or one above it"
+    )
 
 
 def test_without_the_extra_it_says_how_to_install_it(run, tmp_path, monkeypatch):

@@ -31,7 +31,12 @@ def config(make_nieh_set, tmp_path):
 
     def config(**changes: object) -> Path:
         path = tmp_path / "typed.yaml"
-        options = {"model": "oracle", "tasks": ["nieh_gt"], "data": str(data), "output": str(tmp_path / "out")}
+        options = {
+            "model": "oracle",
+            "tasks": ["nieh_gt"],
+            "data": str(data),
+            "output": str(tmp_path / "out"),
+        }
         path.write_text(yaml.safe_dump({**options, **changes}))
         return path
 
@@ -49,7 +54,10 @@ def test_a_run_by_a_file_and_the_command_line_overrides_it(config, tmp_path, run
 
 def test_the_file_of_a_run_resumes_that_run(config, tmp_path, run, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    run("--config", config(data="set", output="out", limit=4, frames="blank,shown", seed=3, name="mine"))
+    run(
+        "--config",
+        config(data="set", output="out", limit=4, frames="blank,shown", seed=3, name="mine"),
+    )
     left = sorted((tmp_path / "out" / "mine").rglob("run.yaml"))
     assert len(left) == 2
     monkeypatch.chdir("/")
@@ -91,9 +99,15 @@ BAD = {
     "seed": ({"seed": "x"}, "typed.yaml: seed: 'x' is not a valid"),
     "tasks": ({"tasks": {"a": 1}}, "typed.yaml: tasks is {'a': 1}; write one value"),
     "model_args": ({"model_args": {"a": [1]}}, "typed.yaml: model_args: a is [1]; write one value"),
-    "model options": ({"model_args": "a"}, "typed.yaml: model_args: --model-args: 'a' is not of the form key=value"),
+    "model options": (
+        {"model_args": "a"},
+        "typed.yaml: model_args: --model-args: 'a' is not of the form key=value",
+    ),
     "frames": ({"frames": "none"}, "--frames none: there are shown, blank"),
-    "unknown model option": ({"model": "qwen2.5-vl-tiny", "model_args": {"dtpe": "x"}}, "did you mean dtype?"),
+    "unknown model option": (
+        {"model": "qwen2.5-vl-tiny", "model_args": {"dtpe": "x"}},
+        "did you mean dtype?",
+    ),
     "choice": ({"engine": "trt"}, "typed.yaml: engine: 'trt' is not one of"),
     "flag": ({"greedy": "maybe"}, "typed.yaml: greedy: 'maybe' is not a valid boolean"),
 }
@@ -120,7 +134,9 @@ def requests():
         def command(**given: Any) -> list[tuple[RunRequest, Suite]]:
             return RunOptions.from_click(given).requests()
 
-        return [request for request, _ in command.main(list(map(str, arguments)), standalone_mode=False)]
+        return [
+            request for request, _ in command.main(list(map(str, arguments)), standalone_mode=False)
+        ]
 
     return requests
 
@@ -130,7 +146,9 @@ def test_threads_are_for_models_that_compute_here(config, requests):
     models = "oracle,qwen2.5-vl-tiny,qwen2.5-vl-tiny:threads=3,openai:model=m"
     asked = requests("--config", file, "--model", models, "--threads", 2)
     assert [request.model_options.get("threads") for request in asked] == [None, "2", "3", None]
-    (request,) = requests("--config", file, "--model", "qwen2.5-vl", "--engine", "vllm", "--threads", 2)
+    (request,) = requests(
+        "--config", file, "--model", "qwen2.5-vl", "--engine", "vllm", "--threads", 2
+    )
     assert request.model_options == {"threads": "2"}
     with pytest.raises(UsageError, match="--threads 2: oracle takes no threads"):
         requests("--config", file, "--threads", 2)
@@ -164,7 +182,11 @@ TYPED = {
     "A:url=http://h:1/v=2,B": [("A", {"url": "http://h:1/v=2"}), ("B", {})],
     "./a.py:Class,B": [("./a.py:Class", {}), ("B", {})],
     "./a.py:Class:x=1": [("./a.py:Class", {"x": "1"})],
-    "A:x=1,B:x=1,y=2,A:z=1,w=2": [("A", {"x": "1"}), ("B", {"x": "1", "y": "2"}), ("A", {"z": "1", "w": "2"})],
+    "A:x=1,B:x=1,y=2,A:z=1,w=2": [
+        ("A", {"x": "1"}),
+        ("B", {"x": "1", "y": "2"}),
+        ("A", {"z": "1", "w": "2"}),
+    ],
     "A:x=1,A:x=2,A": [("A", {"x": "1"}), ("A", {"x": "2"}), ("A", {})],
     "A,B,A,A:x=1,A:x=1": [("A", {}), ("B", {}), ("A", {"x": "1"})],
 }
@@ -190,7 +212,8 @@ def test_models_as_typed_come_back(models):
 
 
 @pytest.mark.parametrize(
-    ("typed", "said"), [("x=1,A", "comes before any model"), (",", "--model is empty"), ("A:x=1,x=2", "given twice")]
+    ("typed", "said"),
+    [("x=1,A", "comes before any model"), (",", "--model is empty"), ("A:x=1,x=2", "given twice")],
 )
 def test_invalid_lists_of_models_are_refused(run, typed, said):
     said_in_one_line(run("--model", typed, "--tasks", "nieh_gt"), said)

@@ -39,12 +39,24 @@ def n_frames(folder, task):
 
 
 @pytest.mark.parametrize(
-    ("options", "haystack", "truncated"), [((), 66, 67), (("--k-tokens", 1000), 66, 66), (("--k-tokens", 1024), 67, 67)]
+    ("options", "haystack", "truncated"),
+    [((), 66, 67), (("--k-tokens", 1000), 66, 66), (("--k-tokens", 1024), 67, 67)],
 )
-def test_a_kilo_token_has_the_default_or_the_given_value(make_nieh_set, tmp_path, run, options, haystack, truncated):
+def test_a_kilo_token_has_the_default_or_the_given_value(
+    make_nieh_set, tmp_path, run, options, haystack, truncated
+):
     data = make_nieh_set(ONE, n_frames=80, size=56)
     tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
-    arguments = ["--model", "oracle", "--tasks", ",".join(tasks), "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "oracle",
+        "--tasks",
+        ",".join(tasks),
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     code, _, err = run(*arguments, *options)
     assert code == 0, err
     # A baseline is counted as Qwen2.5-VL: 121 tokens a frame.
@@ -67,15 +79,44 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(make_nieh_s
     data = make_nieh_set(ONE, n_frames=80, size=56)
     tasks, out = "nieh_gt,nieh_haystack_8k", tmp_path / "out"
     for options in ((), ("--k-tokens", 1024), ("--rope", "yarn:2")):
-        assert run("--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out, *options)[0] == 0
+        assert (
+            run(
+                "--model",
+                "qwen2.5-vl-tiny",
+                "--tasks",
+                tasks,
+                "--data",
+                data,
+                "--output",
+                out,
+                *options,
+            )[0]
+            == 0
+        )
     configs = [read_header(path.parent).config for path in sorted(out.rglob("journal"))]
-    limits = {(each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"]) for each in configs}
-    assert limits == {(None, "default", 128_000), (1024, "default", 128_000), (None, "yarn", 256_000)}
+    limits = {
+        (each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"])
+        for each in configs
+    }
+    assert limits == {
+        (None, "default", 128_000),
+        (1024, "default", 128_000),
+        (None, "yarn", 256_000),
+    }
 
 
 def test_the_extension_is_the_same_run_whichever_way_it_is_given(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     assert run(*arguments, "--rope", "linear:2")[0] == 0
     _, _, err = run(*arguments, "--model-args", "rope=linear:2")
     assert "0 evaluated now, 5 resumed from the journal" in err
@@ -83,7 +124,14 @@ def test_the_extension_is_the_same_run_whichever_way_it_is_given(make_nieh_set, 
 
 def test_what_fits_only_with_rope_is_reported_with_both_limits(make_nieh_set, tmp_path, short, run):
     data = make_nieh_set(n_frames=20)
-    arguments = ["--model", "qwen2.5-vl", "--model-args", f"pretrained={short},device=cpu", "--tasks", "nieh"]
+    arguments = [
+        "--model",
+        "qwen2.5-vl",
+        "--model-args",
+        f"pretrained={short},device=cpu",
+        "--tasks",
+        "nieh",
+    ]
     arguments += ["--data", data, "--output", tmp_path / "out"]
     code, _, err = run(*arguments, "--rope", "yarn:4")
     assert code == 0, err
@@ -100,8 +148,17 @@ def test_what_fits_only_with_rope_is_reported_with_both_limits(make_nieh_set, tm
 
 def test_an_extension_that_is_too_small_is_reported_as_refused(make_nieh_set, tmp_path, short, run):
     data = make_nieh_set(n_frames=20)
-    arguments = ["--model", "qwen2.5-vl", "--model-args", f"pretrained={short},device=cpu", "--rope", "linear:1.5"]
-    code, _, err = run(*arguments, "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out")
+    arguments = [
+        "--model",
+        "qwen2.5-vl",
+        "--model-args",
+        f"pretrained={short},device=cpu",
+        "--rope",
+        "linear:1.5",
+    ]
+    code, _, err = run(
+        *arguments, "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"
+    )
     assert code == 1
     full = line_of(err, "nieh_full: 2 contexts")
     assert "(limit 2,250, 1,500 before its extension): 2 of 2 contexts refused" in full
@@ -118,16 +175,31 @@ def test_a_context_that_is_cut_to_its_size_is_reported_as_truncated(make_nieh_se
     code, _, err = run(*arguments, "--output", tmp_path / "out")
     assert code == 0, err
     line = line_of(err, "nieh_truncate_head_8k: 2 contexts")
-    assert line.endswith("(limit 128,000): 1 of 2 contexts truncated: frames cut off to keep the context's size")
+    assert line.endswith(
+        "(limit 128,000): 1 of 2 contexts truncated: frames cut off to keep the context's size"
+    )
     assert n_frames(tmp_path / "out", "nieh_truncate_head_8k") == [67, 60]
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral"])
-def test_the_longest_request_is_reported_as_it_is_sent(make_nieh_set, tmp_path, run, records_in, family):
+def test_the_longest_request_is_reported_as_it_is_sent(
+    make_nieh_set, tmp_path, run, records_in, family
+):
     data = make_nieh_set()
-    arguments = ["--model", f"{family}-tiny", "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        f"{family}-tiny",
+        "--tasks",
+        "nieh_full",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     _, _, err = run(*arguments)
-    longest = max(record.tokens.context for record in records_in(tmp_path / "out")) + 50  # and the room for the reply
+    longest = (
+        max(record.tokens.context for record in records_in(tmp_path / "out")) + 50
+    )  # and the room for the reply
     assert f"the longest request {longest:,} tokens" in line_of(err, "nieh_full: 2 contexts")
 
 
@@ -137,20 +209,41 @@ BAD = [
     (["--model", "qwen2.5-vl-tiny,oracle", "--rope", "yarn:4"], "oracle has no option rope"),
     (["--model", "qwen2.5-vl-tiny", "--rope", "yarn"], "rope=yarn is not TYPE:FACTOR"),
     (["--model", "qwen2.5-vl-tiny", "--rope", "ntk:4"], "rope=ntk:4 is not TYPE:FACTOR"),
-    (["--model", "qwen2.5-vl-tiny", "--rope", "yarn:4", "--model-args", "rope=yarn:4"], "give one of them"),
-    (["--model", "oracle", "--k-tokens", "1000"], "no context of nieh_gt, nieh_full has a size in tokens"),
-    (["--model", "oracle", "--tokens-per-frame", "500"], "no context of nieh_gt, nieh_full has a size in tokens"),
-    (["--model", "oracle", "--tokens-per-frame", "0"], "--tokens-per-frame 0: a frame has one token at least"),
-    (["--model", "oracle", "--tokens-per-frame", "-3"], "--tokens-per-frame -3: a frame has one token at least"),
+    (
+        ["--model", "qwen2.5-vl-tiny", "--rope", "yarn:4", "--model-args", "rope=yarn:4"],
+        "give one of them",
+    ),
+    (
+        ["--model", "oracle", "--k-tokens", "1000"],
+        "no context of nieh_gt, nieh_full has a size in tokens",
+    ),
+    (
+        ["--model", "oracle", "--tokens-per-frame", "500"],
+        "no context of nieh_gt, nieh_full has a size in tokens",
+    ),
+    (
+        ["--model", "oracle", "--tokens-per-frame", "0"],
+        "--tokens-per-frame 0: a frame has one token at least",
+    ),
+    (
+        ["--model", "oracle", "--tokens-per-frame", "-3"],
+        "--tokens-per-frame -3: a frame has one token at least",
+    ),
     (["--model", "oracle", "--tokens-per-frame", "few"], "'few' is not a valid integer"),
     (["--model", "oracle", "--k-tokens", "1001"], "'1001' is not one of '1000', '1024'"),
 ]
 
 
-@pytest.mark.parametrize(("arguments", "said"), BAD, ids=[" ".join(arguments) for arguments, _ in BAD])
-def test_options_that_exclude_each_other_are_one_line(make_nieh_set, tmp_path, run, arguments, said):
+@pytest.mark.parametrize(
+    ("arguments", "said"), BAD, ids=[" ".join(arguments) for arguments, _ in BAD]
+)
+def test_options_that_exclude_each_other_are_one_line(
+    make_nieh_set, tmp_path, run, arguments, said
+):
     data = make_nieh_set(size=56)
-    code, out, err = run(*arguments, "--tasks", "nieh", "--data", data, "--output", tmp_path / "out")
+    code, out, err = run(
+        *arguments, "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
+    )
     assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
     assert said in err
     assert not (tmp_path / "out").exists()

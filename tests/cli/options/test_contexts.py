@@ -27,7 +27,10 @@ def only(folder, pattern):
 
 
 def docs(folder, task):
-    return [json.loads(line)["doc"] for line in only(folder, f"samples_{task}_*.jsonl").read_text().splitlines()]
+    return [
+        json.loads(line)["doc"]
+        for line in only(folder, f"samples_{task}_*.jsonl").read_text().splitlines()
+    ]
 
 
 @pytest.fixture
@@ -35,14 +38,18 @@ def data(make_nieh_set):
     return make_nieh_set(QUESTIONS, n_frames=45, size=56)
 
 
-def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(data, make_clip, tmp_path, run):
+def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(
+    data, make_clip, tmp_path, run
+):
     tasks, out = "nieh_clip_retrieval,nieh_memory_frames", tmp_path / "out"
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", tasks, "--data", data, "--output", out]
     first, second = make_clip(seed=0), make_clip(seed=1)
     code, _, err = run(*arguments, "--retriever", first)
     assert code == 0, err
     assert [len(doc["frames"]) for doc in docs(out, "nieh_clip_retrieval")] == [10] * 6
-    assert [(len(doc["frames"]), doc["frames"][-1]) for doc in docs(out, "nieh_memory_frames")] == [(21, 44)] * 6
+    assert [(len(doc["frames"]), doc["frames"][-1]) for doc in docs(out, "nieh_memory_frames")] == [
+        (21, 44)
+    ] * 6
     results = only(out, "results.json").read_bytes()
     code, _, err = run(*arguments, "--retriever", first)
     assert "0 evaluated now, 12 resumed" in err
@@ -50,7 +57,9 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(data, make_
     assert run(*arguments, "--retriever", second)[0] == 0
     identities = [read_header(path.parent).config for path in out.rglob("journal")]
     retrievers = {
-        each["tasks"][task]["sources"]["retriever"]["fingerprint"] for each in identities for task in each["tasks"]
+        each["tasks"][task]["sources"]["retriever"]["fingerprint"]
+        for each in identities
+        for task in each["tasks"]
     }
     assert (len(identities), len(retrievers)) == (2, 2)
 
@@ -76,19 +85,32 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
     folder.mkdir()
     actions = [{"api_action": {"action": "PickupObject", "objectId": "Mug|1|2|3"}}]
     trajectory = {"plan": {"low_actions": actions}, "sub_tasks": [{"task_desc": "get a mug"}]}
-    trajectory |= {"sub_trajs": [{"low_pddl_idx": [0, 1]}], "state_summary": {"0": "a mug in the hand"}}
+    trajectory |= {
+        "sub_trajs": [{"low_pddl_idx": [0, 1]}],
+        "state_summary": {"0": "a mug in the hand"},
+    }
     for traj_id in ("traj_a", "traj_b"):
         (folder / f"{traj_id}.json").write_text(json.dumps(trajectory))
         log = {"images": [{"low_idx": 0, "image_name": "000000007.png"}]}
         (data / "metadata" / traj_id / "expert_log.json").write_text(json.dumps(log))
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_interleaved,nieh_text_state", "--data", data]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_interleaved,nieh_text_state",
+        "--data",
+        data,
+    ]
     code, _, err = run(*arguments, "--output", out, "--trajectories", folder)
     assert code == 0, err
     assert [doc["frames"] for doc in docs(out, "nieh_interleaved")] == [[0, 7]] * 6
     assert [doc["frames"] for doc in docs(out, "nieh_text_state")] == [[44]] * 6
     code, _, err = run(*arguments, "--output", tmp_path / "none")
     assert code == 2
-    assert "can be asked (the trajectory's JSON is not in metadata/; give its folder with --trajectories)" in err
+    assert (
+        "can be asked (the trajectory's JSON is not in metadata/; give its folder with --trajectories)"
+        in err
+    )
     for tasks, given, said in (
         ("nieh_gt", folder, "--trajectories: no context of nieh_gt tells of the trajectory"),
         (
@@ -97,22 +119,39 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
             "no such folder; give the folder of the trajectories with --traj",
         ),
     ):
-        code, shown, err = run("--model", "oracle", "--tasks", tasks, "--data", data, "--trajectories", given)
+        code, shown, err = run(
+            "--model", "oracle", "--tasks", tasks, "--data", data, "--trajectories", given
+        )
         assert (code, shown, len(err.strip().splitlines())) == (2, "", 1)
         assert said in err
 
 
-def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(data, write_video, tmp_path, run):
+def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
+    data, write_video, tmp_path, run
+):
     metadata, out = data / "metadata", tmp_path / "out"
     write_video(metadata / "traj_a" / "traj_a_10fps.mp4", range(0, 250, 10))
     (metadata / "traj_b" / "traj_b_10fps.mp4").write_bytes(b"no video")
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_video", "--data", data, "--output", out]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_video",
+        "--data",
+        data,
+        "--output",
+        out,
+    ]
     code, _, err = run(*arguments)
     assert code == 0, err
     assert "nieh_video: 3 sample(s) skipped: " in err
     assert "traj_b_10fps.mp4: not a video that OpenCV can decode" in err
     results = json.loads(only(out, "results.json").read_text())["summary"]["tasks"]["nieh_video"]
-    assert (results["n"], results["skipped"]["n"], list(results["by_variant"])) == (3, 3, ["source=mp4"])
+    assert (results["n"], results["skipped"]["n"], list(results["by_variant"])) == (
+        3,
+        3,
+        ["source=mp4"],
+    )
     assert [len(doc["frames"]) for doc in docs(out, "nieh_video")] == [4] * 3
     assert "; the film is given as a video" in err
     (metadata / "traj_b" / "traj_b_10fps.mp4").unlink()
@@ -127,31 +166,53 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(data, write
     [
         ("qwen2.5-vl-tiny", "video", "<video>", "the film is given as a video"),
         ("llava-onevision-tiny", "video", "<video>", "the film is given as a video"),
-        ("pixtral-tiny", "images", "<image>" * 4, "pixtral-tiny has no video input, the film is given as images"),
+        (
+            "pixtral-tiny",
+            "images",
+            "<image>" * 4,
+            "pixtral-tiny has no video input, the film is given as images",
+        ),
     ],
 )
 def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
     data, tmp_path, run, model, film, placeholder, said
 ):
     out = tmp_path / "out"
-    code, _, err = run("--model", model, "--tasks", "nieh_video", "--data", data, "--output", out, "--limit", 1)
+    code, _, err = run(
+        "--model", model, "--tasks", "nieh_video", "--data", data, "--output", out, "--limit", 1
+    )
     assert code == 0, err
     assert said in err
     (folder,) = {path.parent for path in out.rglob("results.json")}
     assert read_header(folder).config["tasks"]["nieh_video"]["film"] == film
     sample = json.loads(only(out, "samples_nieh_video_*.jsonl").read_text())
-    assert sample["arguments"]["gen_args_0"]["arg_0"].startswith(f"{placeholder}\nAnswer the question given the video")
+    assert sample["arguments"]["gen_args_0"]["arg_0"].startswith(
+        f"{placeholder}\nAnswer the question given the video"
+    )
 
 
 def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_path):
     def start(output):
-        arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_memory_notes", "--data", data, "--output", output]
+        arguments = [
+            "--model",
+            "qwen2.5-vl-tiny",
+            "--tasks",
+            "nieh_memory_notes",
+            "--data",
+            data,
+            "--output",
+            output,
+        ]
         code = "from infthor_eval.cli import main; main()"
-        return subprocess.Popen([sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            [sys.executable, "-c", code, *map(str, arguments)], stderr=subprocess.PIPE, text=True
+        )
 
     killed = start(tmp_path / "killed")
     shards = (tmp_path / "killed").rglob
-    wait_until(lambda: any(path.read_bytes().count(b"\n") > 2 for path in shards("worker-0.jsonl")), killed)
+    wait_until(
+        lambda: any(path.read_bytes().count(b"\n") > 2 for path in shards("worker-0.jsonl")), killed
+    )
     os.kill(killed.pid, signal.SIGKILL)
     killed.communicate()
     journal = only(tmp_path / "killed", "worker-0.jsonl")
@@ -163,8 +224,13 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
         _, said = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, said
     assert journal.read_bytes().count(b'"type":"nieh_note"') == 6
-    assert journal.read_bytes().count(b'\n{"type":"artifact","') == 6 + 6  # and what was recalled for each question
+    assert (
+        journal.read_bytes().count(b'\n{"type":"artifact","') == 6 + 6
+    )  # and what was recalled for each question
     results = [only(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")]
     assert results[0] == results[1]
-    records = [read_run(only(tmp_path / name, "journal").parent, RECORDS)[1] for name in ("killed", "whole")]
+    records = [
+        read_run(only(tmp_path / name, "journal").parent, RECORDS)[1]
+        for name in ("killed", "whole")
+    ]
     assert [r.fingerprint for r in records[0]] == [r.fingerprint for r in records[1]]

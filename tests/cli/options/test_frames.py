@@ -24,18 +24,34 @@ def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run,
     code, shown, err = run(*arguments, "--frames", "shown,blank,shuffled,other")
     assert code == 0, err
     assert results(out).keys() == {"shown", "blank", "shuffled", "other"}
-    assert all(len(counts) == 1 for counts in tokens(out, records_in).values())  # blanks cost as much
+    assert all(
+        len(counts) == 1 for counts in tokens(out, records_in).values()
+    )  # blanks cost as much
     rows = [line.split() for line in shown.splitlines()]
     assert [TINY + ",", "blank", "frames", "nieh_full"] in [row[:4] for row in rows]
     assert "Gain over the same model's run on blank frames, in points" in shown
     _, shown, err = run(*arguments)
-    assert "0 evaluated now, 5 resumed" in err  # the run on true frames is the one without the option
+    assert (
+        "0 evaluated now, 5 resumed" in err
+    )  # the run on true frames is the one without the option
     assert "Gain over" not in shown
 
 
 def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run):
-    arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=8), "--output", tmp_path / "o"]
-    for given, said in (("none", "--frames none: there are shown, blank"), (",", "--frames is empty; give a name")):
+    arguments = [
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=8),
+        "--output",
+        tmp_path / "o",
+    ]
+    for given, said in (
+        ("none", "--frames none: there are shown, blank"),
+        (",", "--frames is empty; give a name"),
+    ):
         code, out, err = run(*arguments, "--frames", given)
         assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
         assert said in err

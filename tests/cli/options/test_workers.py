@@ -12,7 +12,9 @@ def results(folder):
 
 def exported(folder):
     """What lm-eval's files have of each sample."""
-    return {path.name.rpartition("_")[0]: path.read_bytes() for path in folder.rglob("samples_*.jsonl")}
+    return {
+        path.name.rpartition("_")[0]: path.read_bytes() for path in folder.rglob("samples_*.jsonl")
+    }
 
 
 @pytest.mark.parametrize(
@@ -24,7 +26,11 @@ def exported(folder):
     ],
 )
 def test_two_workers_have_the_results_of_one_process(run, make_nieh_set, tmp_path, model, task):
-    data = make_nieh_set(size=56) if task == "nieh_gt" else write(tmp_path / "data", cut(FORK, 3), cut(MUG, 4))
+    data = (
+        make_nieh_set(size=56)
+        if task == "nieh_gt"
+        else write(tmp_path / "data", cut(FORK, 3), cut(MUG, 4))
+    )
     words = ("--model", model, "--tasks", task, "--data", data)
     for workers in (1, 2):
         code, shown, err = run(*words, "--output", tmp_path / str(workers), "--workers", workers)
@@ -34,6 +40,8 @@ def test_two_workers_have_the_results_of_one_process(run, make_nieh_set, tmp_pat
     assert results(one) == results(two)
     assert exported(one) == exported(two)
     assert exported(one)
-    shards = [path for path in two.rglob("journal/worker-*.jsonl") if path.read_bytes().count(b"\n") > 1]
+    shards = [
+        path for path in two.rglob("journal/worker-*.jsonl") if path.read_bytes().count(b"\n") > 1
+    ]
     assert {path.name for path in shards} <= {"worker-1.jsonl", "worker-2.jsonl"}
     assert shards

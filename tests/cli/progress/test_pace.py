@@ -85,10 +85,21 @@ def test_where_there_is_no_terminal_no_bar_is_left():
 
 def test_a_run_in_a_pipe_prints_lines_without_colour(make_nieh_set, tmp_path, run, monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
-    arguments = ["--model", "oracle", "--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path]
+    arguments = [
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path,
+    ]
     _, out, err = run(*arguments)
     lines = err.splitlines()
-    assert [line.partition(")")[0] for line in lines[:-1]] == [f"oracle: {n} of 5 ({20 * n} %" for n in range(1, 5)]
+    assert [line.partition(")")[0] for line in lines[:-1]] == [
+        f"oracle: {n} of 5 ({20 * n} %" for n in range(1, 5)
+    ]
     assert lines[-1] == "oracle: 5 evaluated now, 0 resumed from the journal"
     assert "\x1b" not in out + err
 
@@ -97,11 +108,25 @@ def test_quiet_prints_only_failures(make_nieh_set, tmp_path, run):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"]
+    arguments = [
+        "--model",
+        "qwen2.5-vl-tiny",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+    ]
     code, _, err = run(*arguments, "--quiet")
     assert code == 1
     assert err.startswith("nieh_gt: 2 sample(s) failed")
 
 
 def test_a_duration_has_one_unit():
-    assert [format_duration(seconds) for seconds in (1.5, 119, 240, 7200)] == ["1.5 s", "119.0 s", "4 min", "2.0 h"]
+    assert [format_duration(seconds) for seconds in (1.5, 119, 240, 7200)] == [
+        "1.5 s",
+        "119.0 s",
+        "4 min",
+        "2.0 h",
+    ]

@@ -6,4 +6,6 @@ from . import files, models, runs, sets, simulator, texts, trajectories, yaml_fi
 __all__ = ["READERS"]
 
 _MODULES = (trajectories, sets, files, yaml_files, runs, models, texts, simulator)
-READERS: dict[str, Reader] = {reader.name: reader for module in _MODULES for reader in module.READERS}
+READERS: dict[str, Reader] = {
+    reader.name: reader for module in _MODULES for reader in module.READERS
+}

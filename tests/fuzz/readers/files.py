@@ -19,8 +19,8 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.plan_logs import is_plan_log, read_plan_log
 from infthor_eval.formats.video import read_video
 from infthor_eval.generation.bundle import read_manifest
-from infthor_eval.nieh.imported_replies import import_logs
-from infthor_eval.plans.imported_counts import import_counts
+from infthor_eval.nieh.published.imported_replies import import_logs
+from infthor_eval.plans.published.imported_counts import import_counts
 
 from ..damage import Form
 from ..reader import Reader
@@ -111,7 +111,9 @@ def _make_plan_log(folder: Path) -> Path:
     for name in ("goto", "pick", "put"):
         metric |= {f"{name}_count": 2, f"{name}_success": 1}
     path = folder / "eval_longhrz_checkpoints_some-model_step-5-hf_yarn_4.0.log"
-    path.write_text("".join(json.dumps({"traj_id": f"t{n}", "metric": metric}) + "\n" for n in range(3)))
+    path.write_text(
+        "".join(json.dumps({"traj_id": f"t{n}", "metric": metric}) + "\n" for n in range(3))
+    )
     return path
 
 
@@ -123,7 +125,9 @@ def _read_plan_log(folder: Path) -> None:
 
 def _make_manifest(folder: Path) -> Path:
     recipe = {"scene": "kitchen-1", "seed": 0, "min_steps": 1}
-    (folder / "manifest.json").write_text(json.dumps({"name": "x", "trajectories": [recipe], "files": {"a": "b"}}))
+    (folder / "manifest.json").write_text(
+        json.dumps({"name": "x", "trajectories": [recipe], "files": {"a": "b"}})
+    )
     return folder / "manifest.json"
 
 
@@ -135,5 +139,10 @@ READERS = (
     Reader("packed archive", Form.BYTES, partial(_make_archive, "w:gz"), _unpack),
     Reader("reply log", Form.JSON_LINES, _make_replies, _import),
     Reader("plan log", Form.JSON_LINES, _make_plan_log, _read_plan_log),
-    Reader("manifest", Form.JSON, _make_manifest, lambda folder: read_manifest(folder / "manifest.json")),
+    Reader(
+        "manifest",
+        Form.JSON,
+        _make_manifest,
+        lambda folder: read_manifest(folder / "manifest.json"),
+    ),
 )

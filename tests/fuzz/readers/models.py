@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.hf.card import read_card_words
+from model_adapters.hf.loading.card import read_card_words
 from model_adapters.openai.completions import read_completion
 from model_adapters.options.policies import VlaHttpOptions
 from model_adapters.policies.checkpoint import PolicyCheckpoint
@@ -30,7 +30,13 @@ _COMPLETION = {
     }],
     "usage": {"prompt_tokens": 9, "completion_tokens": 2, "prompt_tokens_details": {"cached_tokens": 4}},
 }  # fmt: skip
-_BOUNDS = {"q01": [-1.0] * 7, "q99": [1.0] * 7, "mask": [True] * 6 + [False], "mean": [0.0] * 7, "std": [1.0] * 7}
+_BOUNDS = {
+    "q01": [-1.0] * 7,
+    "q99": [1.0] * 7,
+    "mask": [True] * 6 + [False],
+    "mean": [0.0] * 7,
+    "std": [1.0] * 7,
+}
 _CARD = "---\nlicense: mit\nwords: natural\ntags:\n- a\ndate: 2024-01-01\n---\n# A model\n"
 
 
@@ -60,7 +66,11 @@ def _act(folder: Path) -> None:
     if not frame.exists():
         Image.new("RGB", (8, 8)).save(frame)
     for delta in policy.act(FrameRef(frame), "pick it up"):
-        assert all(np.isfinite(value) for value in msgspec.to_builtins(delta).values() if isinstance(value, float))
+        assert all(
+            np.isfinite(value)
+            for value in msgspec.to_builtins(delta).values()
+            if isinstance(value, float)
+        )
 
 
 def _statistics(folder: Path) -> None:
@@ -82,7 +92,11 @@ READERS = (
     Reader(
         "policy statistics",
         Form.JSON,
-        partial(_make, "config.json", {"model_type": "openvla", "norm_stats": {"a": {"action": _BOUNDS}}}),
+        partial(
+            _make,
+            "config.json",
+            {"model_type": "openvla", "norm_stats": {"a": {"action": _BOUNDS}}},
+        ),
         _statistics,
     ),
     Reader("model card", Form.TEXT, partial(_make, "README.md", _CARD), read_card_words),

@@ -15,7 +15,7 @@ from infthor_eval.cli import main
 from infthor_eval.cli.results import read_run_results
 from infthor_eval.generation.replay_set import replay_set, select
 from infthor_eval.report.runs import read_report_runs
-from infthor_eval.runs.run_search import StoredRun, find_runs
+from infthor_eval.runs.stored.search import StoredRun, find_runs
 from infthor_eval.suites import find_presenter, find_suite
 
 from ..damage import Form
@@ -70,7 +70,9 @@ def _make_plans(folder: Path) -> Path:
 
 def _find(folder: Path) -> None:
     runs = list(find_runs(folder))
-    assert any(isinstance(run, StoredRun) and run.folder.name == "sound" for run in runs), "the good run is not listed"
+    assert any(isinstance(run, StoredRun) and run.folder.name == "sound" for run in runs), (
+        "the good run is not listed"
+    )
 
 
 def _show(folder: Path) -> None:
@@ -83,7 +85,12 @@ def _report(folder: Path) -> None:
     list(presenter.sections(runs))
     list(presenter.charts(runs))
     for record in runs[0].records:
-        presenter.describe(record), presenter.details(record), presenter.reply(record), list(presenter.steps(record))
+        (
+            presenter.describe(record),
+            presenter.details(record),
+            presenter.reply(record),
+            list(presenter.steps(record)),
+        )
 
 
 def _make_replayed(folder: Path) -> Path:
@@ -93,7 +100,12 @@ def _make_replayed(folder: Path) -> Path:
     report.parent.mkdir(parents=True)
     refusal = {"step": 0, "action": "pick up the mug", "error": "no"}
     overlap = {"step": 0, "action": "PickupObject", "type": "Mug", "iou": 0.5}
-    document = {"traj_id": "t", "digest": "x", "floor_plan": "bedroom-1", "accepted": {"MoveAhead": 1}}
+    document = {
+        "traj_id": "t",
+        "digest": "x",
+        "floor_plan": "bedroom-1",
+        "accepted": {"MoveAhead": 1},
+    }
     report.write_text(json.dumps(document | {"refusals": [refusal], "overlaps": [overlap]}))
     return report
 

@@ -5,12 +5,12 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import sequence_text
+from infthor_eval.storage.packaged import packaged_folder
 
 __all__ = ["GOOD", "make_set", "trajectory_document"]
 
@@ -29,7 +29,9 @@ def trajectory_document(traj_id: str, n_actions: int = _N_FRAMES - 1) -> dict[st
     plan["low_actions"] = [item | {"high_idx": 0} for item in plan["low_actions"][:n_actions]]
     plan["high_pddl"] = plan["high_pddl"][:1]
     document["sub_tasks"], document["images"] = document["sub_tasks"][:1], []
-    document["sub_trajs"] = [{"sub_traj_idx": 0, "high_pddl_idx": [0, 1], "low_pddl_idx": [0, n_actions]}]
+    document["sub_trajs"] = [
+        {"sub_traj_idx": 0, "high_pddl_idx": [0, 1], "low_pddl_idx": [0, n_actions]}
+    ]
     document["scene"]["object_poses"] = document["scene"]["object_poses"][:4]
     document["long_horizon_task"] = {}
     return document | {"traj_id": traj_id, "object_log": []}
@@ -49,12 +51,19 @@ def make_set(folder: Path, n_frames: int = _N_FRAMES) -> Path:
         (place / "expert_log.json").write_text(json.dumps({"images": images}))
         shutil.copy(_bundled() / "state_summary.json", place)
         trajectory = next(iter_trajectories(place / "traj_data.json"))
-        (place / "traj.txt").write_text(sequence_text(trajectory, read_steps(place)[:_N_FRAMES]) + "\n")
+        (place / "traj.txt").write_text(
+            sequence_text(trajectory, read_steps(place)[:_N_FRAMES]) + "\n"
+        )
     questions = [
         Question(traj_id, text, clues, answers, question_type="presence")
         for traj_id in ("bad", GOOD)
-        for text, clues, answers in (("Is there any bed in this room?", (1,), ("yes",)), ("Where?", (0, 2), ("Bed", 3)))
+        for text, clues, answers in (
+            ("Is there any bed in this room?", (1,), ("yes",)),
+            ("Where?", (0, 2), ("Bed", 3)),
+        )
     ]
     write_questions(folder / "qa_set.csv", questions)
-    (folder / "set.json").write_text(json.dumps({"format": 1, "simulator": "embedded", "infthor_eval": "0.1.0"}))
+    (folder / "set.json").write_text(
+        json.dumps({"format": 1, "simulator": "embedded", "infthor_eval": "0.1.0"})
+    )
     return folder

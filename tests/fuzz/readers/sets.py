@@ -6,9 +6,9 @@ from pathlib import Path
 from infthor_eval.errors import InfthorError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.generation.questions.generate import generate_questions
-from infthor_eval.nieh.recalling import recall_all
+from infthor_eval.nieh.asking.recalling import recall_all
 from infthor_eval.nieh.samples import find_samples, open_set
-from infthor_eval.nieh.validation import read_decisions
+from infthor_eval.nieh.validation.cross_validation import read_decisions
 
 from ..damage import Form
 from ..reader import Reader
@@ -17,7 +17,15 @@ from .samples import GOOD, make_set
 __all__ = ["READERS"]
 
 _SETTINGS = {"tokens_per_frame": 100, "ctx_size": 0.3, "seed": 0}
-_CONTEXTS = ("clues", "trajectory", "truncate_head", "haystack", "interleaved", "interleaved_plans", "text_state")
+_CONTEXTS = (
+    "clues",
+    "trajectory",
+    "truncate_head",
+    "haystack",
+    "interleaved",
+    "interleaved_plans",
+    "text_state",
+)
 
 
 def _make(file: str, folder: Path, n_frames: int = 4) -> Path:
@@ -45,14 +53,18 @@ def _ask(folder: Path) -> None:
 def _recall(folder: Path) -> None:
     for memory in ("last", "text-log", "oracle"):
         open_set.cache_clear()
-        found = find_samples({"context": "memory", "memory": memory, "budget": 200, "data": str(folder), **_SETTINGS})
+        found = find_samples(
+            {"context": "memory", "memory": memory, "budget": 200, "data": str(folder), **_SETTINGS}
+        )
         for sample in recall_all(found):
             found.request(sample)
 
 
 def _generate(folder: Path) -> None:
     made = generate_questions(folder, seed=0, per_trajectory=20, further=True)
-    assert any(question.traj_id == GOOD for question in made.questions), "no question on the good one"
+    assert any(question.traj_id == GOOD for question in made.questions), (
+        "no question on the good one"
+    )
 
 
 def _questions(folder: Path) -> None:
@@ -63,7 +75,9 @@ def _questions(folder: Path) -> None:
 
 def _make_decisions(folder: Path) -> Path:
     path = folder / "inspection.csv"
-    path.write_text("question_id,traj_id,question,clues,answers,replies,decision\na,t,q,[1],['b'],m: x,keep\nb,,,,,,\n")
+    path.write_text(
+        "question_id,traj_id,question,clues,answers,replies,decision\na,t,q,[1],['b'],m: x,keep\nb,,,,,,\n"
+    )
     return path
 
 
@@ -75,8 +89,20 @@ READERS = (
     Reader("set action log", Form.JSON, partial(_make, f"{_BAD}/expert_log.json"), _ask),
     Reader("set states", Form.JSON, partial(_make, f"{_BAD}/state_summary.json"), _ask),
     Reader("set text", Form.TEXT, partial(_make, f"{_BAD}/traj.txt"), _ask),
-    Reader("set info", Form.JSON, partial(_make, "set.json"), lambda folder: NiehSet(folder).questions),
+    Reader(
+        "set info", Form.JSON, partial(_make, "set.json"), lambda folder: NiehSet(folder).questions
+    ),
     Reader("memory step log", Form.JSON, partial(_make, f"{_BAD}/metadata.json"), _recall),
-    Reader("generated questions", Form.JSON, partial(_make, f"{_BAD}/metadata.json", n_frames=24), _generate),
-    Reader("decisions", Form.CSV, _make_decisions, lambda folder: read_decisions(folder / "inspection.csv")),
+    Reader(
+        "generated questions",
+        Form.JSON,
+        partial(_make, f"{_BAD}/metadata.json", n_frames=24),
+        _generate,
+    ),
+    Reader(
+        "decisions",
+        Form.CSV,
+        _make_decisions,
+        lambda folder: read_decisions(folder / "inspection.csv"),
+    ),
 )

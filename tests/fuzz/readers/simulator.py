@@ -8,12 +8,12 @@ from typing import Any
 
 from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.floor_plans import write_floor_plan
-from infthor_eval.sim.fifo import FieldType, parse_action
-from infthor_eval.sim.scenes.catalogue import Catalogue
 from infthor_eval.thor.view import view_of
+from infthor_sim.player.fifo import FieldType, parse_action
+from infthor_sim.scenes.catalogue import Catalogue
 
-from ...sim.harness import Bench
-from ...sim.test_houses import house
+from ...infthor_sim.harness import Bench
+from ...infthor_sim.test_houses import house
 from ..damage import Form
 from ..reader import Reader
 
@@ -57,7 +57,9 @@ def _messages() -> list[dict[str, Any]]:
 
 
 def _make_messages(folder: Path) -> Path:
-    (folder / "sent.jsonl").write_text("".join(json.dumps(message) + "\n" for message in _messages()))
+    (folder / "sent.jsonl").write_text(
+        "".join(json.dumps(message) + "\n" for message in _messages())
+    )
     return folder / "sent.jsonl"
 
 
@@ -116,7 +118,11 @@ def _load(folder: Path) -> None:
 
 def _make_supplement(folder: Path) -> Path:
     _make_floor_plan(folder)
-    added = {"cells": [[0.0, 0.25], [0.25, 0.25]], "floor_y": 0.9, "objects": ["Fridge|+00.50|+00.00|+01.00", "Sink|a"]}
+    added = {
+        "cells": [[0.0, 0.25], [0.25, 0.25]],
+        "floor_y": 0.9,
+        "objects": ["Fridge|+00.50|+00.00|+01.00", "Sink|a"],
+    }
     return _make({_SCENE: added}, folder)
 
 
@@ -136,7 +142,9 @@ def _view(folder: Path) -> None:
     except (ValueError, RecursionError):
         return
     if isinstance(metadata, dict):  # else ai2thor's client refuses it before
-        event = SimpleNamespace(metadata=metadata, frame=None, depth_frame=None, instance_segmentation_frame=None)
+        event = SimpleNamespace(
+            metadata=metadata, frame=None, depth_frame=None, instance_segmentation_frame=None
+        )
         view_of(event)
 
 

@@ -63,7 +63,12 @@ def _remember(folder: Path) -> None:
 
 
 READERS = (
-    Reader("answer", Form.TEXT, partial(_make, "<think>\nso\n</think>\nThe answer is: 2 SideTables, yes.\n"), _score),
+    Reader(
+        "answer",
+        Form.TEXT,
+        partial(_make, "<think>\nso\n</think>\nThe answer is: 2 SideTables, yes.\n"),
+        _score,
+    ),
     Reader("action", Form.TEXT, partial(_make, "PutObject Apple Fridge"), _act),
     Reader("options of a memory", Form.TEXT, partial(_make, "window=20,tokens=64"), _remember),
 )

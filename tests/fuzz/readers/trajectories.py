@@ -33,7 +33,11 @@ def _make(folder: Path) -> Path:
 
 def _make_lines(folder: Path) -> Path:
     path = folder / "a.jsonl.gz"
-    path.write_bytes(gzip.compress("".join(json.dumps(trajectory_document(f"t{n}")) + "\n" for n in range(2)).encode()))
+    path.write_bytes(
+        gzip.compress(
+            "".join(json.dumps(trajectory_document(f"t{n}")) + "\n" for n in range(2)).encode()
+        )
+    )
     return path
 
 
@@ -67,7 +71,9 @@ def _replay(folder: Path) -> None:
     shutil.rmtree(out, ignore_errors=True)
     n_restarts = simulator.restarts
     replayed = replay_set(select([folder]), simulator, out)
-    assert any(report.traj_id == GOOD for report in replayed.reports), "the good one is not replayed"
+    assert any(report.traj_id == GOOD for report in replayed.reports), (
+        "the good one is not replayed"
+    )
     assert simulator.restarts == n_restarts, "the simulator died"
     _hold_lines(failure.message for failure in replayed.failures)
 

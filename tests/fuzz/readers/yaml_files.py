@@ -9,10 +9,10 @@ from typing import Any
 import click
 
 from infthor_eval.cli.commands.run import command as run_command
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.yaml_files import read_yaml
 from infthor_eval.report.figures.curve_tables import read_panels
 from infthor_eval.runs.catalog import Catalog
+from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.suites import find_suite
 from infthor_eval.training.recipe import read_recipe
 
@@ -35,14 +35,25 @@ def _make(name: str, document: Any, folder: Path) -> Path:
 
 
 def _make_recipe(name: str, folder: Path) -> Path:
-    return _make("a.yaml", read_yaml(packaged_folder("training/recipes") / f"{name}.yaml", ""), folder)
+    return _make(
+        "a.yaml", read_yaml(packaged_folder("training/recipes") / f"{name}.yaml", ""), folder
+    )
 
 
 def _make_task(name: str, folder: Path) -> Path:
     settings = read_yaml(packaged_folder("tasks") / f"{name}.yaml", "")
-    more = {"generation_kwargs": {"max_gen_toks": 16, "until": ["\n"], "do_sample": False, "temperature": 0.0}}
+    more = {
+        "generation_kwargs": {
+            "max_gen_toks": 16,
+            "until": ["\n"],
+            "do_sample": False,
+            "temperature": 0.0,
+        }
+    }
     return _make(
-        "a.yaml", more | settings | {"task": "mine", "include": settings["include"].rpartition("/")[2]}, folder
+        "a.yaml",
+        more | settings | {"task": "mine", "include": settings["include"].rpartition("/")[2]},
+        folder,
     )
 
 
@@ -62,7 +73,12 @@ _CURVES: Any = SimpleNamespace(runs=[SimpleNamespace(label="A"), SimpleNamespace
 _PANELS = {"one": ["A", "B"], "two": ["A"]}
 READERS = (
     *(
-        Reader(f"task file {name.rpartition('/')[2]}", Form.JSON, partial(_make_task, name), _check_task)
+        Reader(
+            f"task file {name.rpartition('/')[2]}",
+            Form.JSON,
+            partial(_make_task, name),
+            _check_task,
+        )
         for name in _TASKS
     ),
     *(

@@ -20,9 +20,13 @@ def history(start, *events, boxes=None):
     """
     steps, ids = [], list(start)
     told = ObjectLog(visible=[key.partition("|")[0] for key in ids], pickupable=list(LOOSE))
-    for number, (action, target, receptacle, changes) in enumerate([(None, None, None, start), *events]):
+    for number, (action, target, receptacle, changes) in enumerate(
+        [(None, None, None, start), *events]
+    ):
         shown = {key: ObjectInFrame(400, (100, 100, 120, 120), True) for key in ids}
-        shown |= {key: ObjectInFrame(400, box, True) for key, box in (boxes or {}).get(number, {}).items()}
+        shown |= {
+            key: ObjectInFrame(400, box, True) for key, box in (boxes or {}).get(number, {}).items()
+        }
         steps.append(
             Step(
                 number,

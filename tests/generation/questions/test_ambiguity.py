@@ -5,7 +5,14 @@ import random
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.generation.questions import contents, counting, final_state, location, open_state, presence
+from infthor_eval.generation.questions import (
+    contents,
+    counting,
+    final_state,
+    location,
+    open_state,
+    presence,
+)
 from infthor_eval.generation.questions.checker import Checker
 from infthor_eval.generation.questions.history import DEFAULT_SHARE, TrajectoryHistory
 from infthor_eval.generation.questions.rooms import rooms_of
@@ -28,12 +35,16 @@ def texts(candidates):
 def check(log, candidates):
     found = list(candidates)
     for candidate in found:
-        assert Checker(log.steps, DEFAULT_SHARE).verdict(candidate.question("made")).sound, candidate
+        assert Checker(log.steps, DEFAULT_SHARE).verdict(candidate.question("made")).sound, (
+            candidate
+        )
     return {candidate.text: candidate.answers for candidate in found}
 
 
 def test_contents_are_asked_of_what_never_changes():
-    log = history({**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, TABLE), BOOK: state(BOOK, DESK)})
+    log = history(
+        {**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, TABLE), BOOK: state(BOOK, DESK)}
+    )
     assert check(log, contents.contents(log)) == {
         "What objects were on the dining table?": ("apple", "mug"),
         "What objects were on the desk?": ("book",),
@@ -59,11 +70,16 @@ def test_contents_are_asked_where_every_reading_gives_the_same(more, asked):
 
 
 def test_further_contents_say_what_counts_and_count_it_so():
-    lamp, loose = "DeskLamp|1", {PAN: state(PAN, TABLE), EGG: state(EGG, PAN), MUG: state(MUG, TABLE)}
+    lamp, loose = (
+        "DeskLamp|1",
+        {PAN: state(PAN, TABLE), EGG: state(EGG, PAN), MUG: state(MUG, TABLE)},
+    )
     start = {**PLACES, **loose, BOOK: state(BOOK, TABLE), lamp: state(lamp, TABLE)}
     log = history(start, *moved(BOOK, TABLE, DESK))
     ((text, answers),) = check(log, contents.at_pickup(log)).items()
-    assert text.startswith("Which other things that can be picked up were directly on the dining table when you picked")
+    assert text.startswith(
+        "Which other things that can be picked up were directly on the dining table when you picked"
+    )
     assert answers == ("mug", "pan")
 
 
@@ -87,9 +103,13 @@ def test_which_pickup_is_meant_is_clear():
         "Where did you move the apple from the dining table?": ("fridge",),
         "Where is the apple now?": ("fridge",),
     }
-    assert "Where was the apple before you picked it up?" in check(once, location.further_locations(once))
+    assert "Where was the apple before you picked it up?" in check(
+        once, location.further_locations(once)
+    )
     held = history(start, *moved(APPLE, TABLE, FRIDGE), moved(APPLE, FRIDGE, DESK)[0])
-    assert not [text for text in texts(location.locations(held)) if "move the" in text or "now" in text]
+    assert not [
+        text for text in texts(location.locations(held)) if "move the" in text or "now" in text
+    ]
     further = texts(location.further_locations(held))
     assert "Where was the apple before you picked it up?" not in further
     assert "Where did you move the apple to?" not in further
@@ -104,13 +124,20 @@ def test_of_several_moves_only_those_at_the_ends_are_asked_about():
         "Where did you move the apple from the fridge?": ("desk",),
         "Where is the apple now?": ("desk",),
     }
-    back = history(start, *moved(APPLE, TABLE, FRIDGE), *moved(APPLE, FRIDGE, DESK), *moved(APPLE, DESK, FRIDGE))
+    back = history(
+        start,
+        *moved(APPLE, TABLE, FRIDGE),
+        *moved(APPLE, FRIDGE, DESK),
+        *moved(APPLE, DESK, FRIDGE),
+    )
     assert not [text for text in texts(location.locations(back)) if "before you put" in text]
 
 
 def test_moves_are_counted_of_what_was_moved_more_than_once():
     start = {**PLACES, APPLE: state(APPLE, TABLE), MUG: state(MUG, TABLE)}
-    log = history(start, *moved(APPLE, TABLE, FRIDGE), *moved(MUG, TABLE, DESK), *moved(APPLE, FRIDGE, DESK))
+    log = history(
+        start, *moved(APPLE, TABLE, FRIDGE), *moved(MUG, TABLE, DESK), *moved(APPLE, FRIDGE, DESK)
+    )
     assert check(log, counting.counts(log)) == {"How many times did you move the apple?": ("2",)}
 
 
@@ -129,7 +156,10 @@ def test_no_room_is_meant_in_a_house_of_several():
         (rooms, {"Have you seen"}),
     ):
         log = history({**PLACES, **floors, MUG: state(MUG, TABLE)})
-        asked = [*presence.yes_questions(log), *presence.no_questions(log, frozenset({"Toaster"}), random.Random(0))]
+        asked = [
+            *presence.yes_questions(log),
+            *presence.no_questions(log, frozenset({"Toaster"}), random.Random(0)),
+        ]
         assert {" ".join(candidate.text.split()[:3]) for candidate in asked} == forms
         assert {candidate.answers for candidate in asked} == {("yes",), ("no",)}
 
@@ -144,12 +174,16 @@ def test_what_no_frame_shows_was_not_seen_but_is_in_the_room():
     assert texts_on_mugs == {"Have you seen a mug?"}
     checker = Checker(log.steps, DEFAULT_SHARE)
     assert all(checker.verdict(candidate.question("made")).sound for candidate in asked)
-    assert not checker.verdict(Question("made", "Is there any mug in this room?", (0,), ("no",))).right
+    assert not checker.verdict(
+        Question("made", "Is there any mug in this room?", (0,), ("no",))
+    ).right
 
 
 def test_absences_are_of_what_rooms_of_the_kind_have():
     bathroom = history({"Toilet|1": state("Toilet|1"), "Sink|1": state("Sink|1")})
-    asked = {item.subjects[0] for item in presence.no_questions(bathroom, frozenset(), random.Random(0))}
+    asked = {
+        item.subjects[0] for item in presence.no_questions(bathroom, frozenset(), random.Random(0))
+    }
     assert "Plunger" in asked and not asked & {"Toaster", "Bed", "Toilet"}
 
 
@@ -178,9 +212,17 @@ def test_the_rules_know_a_house_by_its_floors():
 def test_a_view_well_inside_the_frame_is_preferred():
     start = {**PLACES, FRIDGE: state(FRIDGE, is_open=False)}
     look = ("LookUp", None, None, {})
-    log = history(start, look, look, boxes={0: {FRIDGE: (0, 0, 20, 20)}, 1: {FRIDGE: (10, 50, 30, 70)}})
+    log = history(
+        start, look, look, boxes={0: {FRIDGE: (0, 0, 20, 20)}, 1: {FRIDGE: (10, 50, 30, 70)}}
+    )
     (candidate,) = open_state.open_states(log)
-    assert (candidate.text, candidate.answers, candidate.clues) == ("Was the fridge open?", ("no",), (2,))
-    opened = history(start, ("OpenObject", FRIDGE, None, {FRIDGE: state(FRIDGE, is_open=True)}), look)
+    assert (candidate.text, candidate.answers, candidate.clues) == (
+        "Was the fridge open?",
+        ("no",),
+        (2,),
+    )
+    opened = history(
+        start, ("OpenObject", FRIDGE, None, {FRIDGE: state(FRIDGE, is_open=True)}), look
+    )
     (candidate,) = open_state.open_states(opened)
     assert (candidate.answers, candidate.clues) == (("yes",), (1,))

@@ -10,7 +10,11 @@ from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.choosing import Chooser
 
 OBJECTS = ("Mug", "Fridge", "Sofa", "Bed")
-FORMS = {"presence": ("yes", "no"), "counting": ("1", "2", "3", "4"), "location": ("sink", "table", "desk")}
+FORMS = {
+    "presence": ("yes", "no"),
+    "counting": ("1", "2", "3", "4"),
+    "location": ("sink", "table", "desk"),
+}
 
 
 @st.composite
@@ -19,11 +23,15 @@ def candidates(draw):
     for at in range(draw(st.integers(0, 25))):
         form = draw(st.sampled_from(sorted(FORMS)))
         thing, answer = draw(st.sampled_from(OBJECTS)), draw(st.sampled_from(FORMS[form]))
-        found.append(Candidate(form, f"{form} {{}}?", (f"{thing} {at}",), (at,), (answer,), (thing,)))
+        found.append(
+            Candidate(form, f"{form} {{}}?", (f"{thing} {at}",), (at,), (answer,), (thing,))
+        )
     return found
 
 
-TRAJECTORIES = st.lists(st.tuples(st.sampled_from(["Kitchen", "Bedroom"]), candidates()), max_size=6)
+TRAJECTORIES = st.lists(
+    st.tuples(st.sampled_from(["Kitchen", "Bedroom"]), candidates()), max_size=6
+)
 
 
 def counted(trajectories, **options):
@@ -56,11 +64,15 @@ def test_without_subjects_yes_no_and_numbers_alone_are_held(trajectories):
 
 def test_an_answer_that_always_holds_of_an_object_is_asked_for_once_in_each_kind_of_room():
     def always(number):
-        return [Candidate("presence", "Is there {}?", ("a fridge",), (number,), ("yes",), ("Fridge",))]
+        return [
+            Candidate("presence", "Is there {}?", ("a fridge",), (number,), ("yes",), ("Fridge",))
+        ]
 
     chooser = Chooser()
     rooms = ["Kitchen", "Bedroom", "Kitchen", "Kitchen", "Bedroom"]
-    chosen = [chooser.choose(always(at), 5, random.Random(at), room) for at, room in enumerate(rooms)]
+    chosen = [
+        chooser.choose(always(at), 5, random.Random(at), room) for at, room in enumerate(rooms)
+    ]
     assert sum(map(len, chosen)) == 1  # the form has no other answer yet
     no = Candidate("presence", "Is there {}?", ("a mug",), (0,), ("no",), ("Mug",))
     assert chooser.choose([no], 5, random.Random(0), "Kitchen") == [no]

@@ -8,20 +8,30 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.formats.question_forms import type_of
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.generation.questions.candidates import Candidate
-from infthor_eval.generation.questions.generate import candidates_of, further_candidates_of, generate_questions
+from infthor_eval.generation.questions.generate import (
+    candidates_of,
+    further_candidates_of,
+    generate_questions,
+)
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.published_words import in_published_words
 from infthor_eval.household.wording import noun, object_type
-from infthor_eval.sim.object_types import OBJECT_TYPES
+from infthor_eval.storage.packaged import packaged_folder
+from infthor_sim.object_types import OBJECT_TYPES
 
 PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 # One published question of each form and its answer, and the same in our form, names and answers.
 WORDS = [
-    ("Is there any Window in this room?", "Yes", "Is there any {} in this room?", ("window",), "yes"),
+    (
+        "Is there any Window in this room?",
+        "Yes",
+        "Is there any {} in this room?",
+        ("window",),
+        "yes",
+    ),
     ("Have you seen an Apple?", "Yes", "Have you seen {}?", ("an apple",), "yes"),
     ("Have you seen a TVStand?", "Yes", "Have you seen {}?", ("a TV stand",), "yes"),
     ("Was Box open?", "Yes", "Was {} open?", ("the box",), "yes"),
@@ -56,15 +66,41 @@ WORDS = [
         ("in the drawer",),
         "keychain",
     ),
-    ("What objects are on the SideTable?", "Pen", "What objects are {}?", ("on the side table",), "pen"),
-    ("How many objects were on the Fridge?", 2, "How many objects were {}?", ("in the fridge",), "2"),
+    (
+        "What objects are on the SideTable?",
+        "Pen",
+        "What objects are {}?",
+        ("on the side table",),
+        "pen",
+    ),
+    (
+        "How many objects were on the Fridge?",
+        2,
+        "How many objects were {}?",
+        ("in the fridge",),
+        "2",
+    ),
     ("Is KeyChain in the Drawer?", "No", "Is {} {}?", ("the key chain", "in the drawer"), "no"),
-    ("Is RemoteControl on the DiningTable?", "Yes", "Is {} {}?", ("the remote control", "on the dining table"), "yes"),
-    ("How many times did you move Newspaper?", 2, "How many times did you move {}?", ("the newspaper",), "2"),
+    (
+        "Is RemoteControl on the DiningTable?",
+        "Yes",
+        "Is {} {}?",
+        ("the remote control", "on the dining table"),
+        "yes",
+    ),
+    (
+        "How many times did you move Newspaper?",
+        2,
+        "How many times did you move {}?",
+        ("the newspaper",),
+        "2",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("text", "answer", "form", "names", "ours"), WORDS, ids=[words[0] for words in WORDS])
+@pytest.mark.parametrize(
+    ("text", "answer", "form", "names", "ours"), WORDS, ids=[words[0] for words in WORDS]
+)
 def test_each_form_has_the_published_words(text, answer, form, names, ours):
     subjects = (str(answer), "Mug")
     candidate = Candidate(type_of(text), form, names, (3, 7), (ours,), subjects)
@@ -89,7 +125,12 @@ def test_all_candidates_of_table_3_are_the_same_questions_in_both_words():
         for candidate in candidates_of(history, frozenset({"Apple", "Statue"}), random.Random(0)):
             ours, published = candidate.question("a"), in_published_words(candidate, "a")
             assert (published.clues, published.absence) == (ours.clues, ours.absence)
-            assert published.question_type == ours.question_type == type_of(ours.text) == type_of(published.text)
+            assert (
+                published.question_type
+                == ours.question_type
+                == type_of(ours.text)
+                == type_of(published.text)
+            )
             assert [str(answer).lower() for answer in published.answers] == list(ours.answers)
             n += 1
     assert n > 80
@@ -99,18 +140,34 @@ def test_further_forms_have_no_published_words():
     history = next(histories())
     with pytest.raises(ValueError, match="has no published words"):
         in_published_words(further_candidates_of(history, random.Random(0))[0], "a")
-    with pytest.raises(UsageError, match="--further adds forms that have no published words; leave it out"):
+    with pytest.raises(
+        UsageError, match="--further adds forms that have no published words; leave it out"
+    ):
         generate_questions(packaged_folder("sets/nieh_mini"), further=True, published_words=True)
 
 
-@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data")
+@pytest.mark.skipif(
+    not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
+)
 def test_every_published_question_is_in_words_that_we_write():
     patterns = {
-        re.sub(r"(?<![A-Za-z])[A-Z][A-Za-z]*(?= |\?)", r"[A-Z][A-Za-z]*", text[1:]): text[0] for text, *_ in WORDS
+        re.sub(r"(?<![A-Za-z])[A-Z][A-Za-z]*(?= |\?)", r"[A-Z][A-Za-z]*", text[1:]): text[0]
+        for text, *_ in WORDS
     }
     patterns = [re.compile(first + rest.replace("?", r"\?")) for rest, first in patterns.items()]
-    rows = [row for file in PUBLISHED.glob("qa_set*.csv") for row in csv.DictReader(file.open(encoding="utf-8"))]
+    rows = [
+        row
+        for file in PUBLISHED.glob("qa_set*.csv")
+        for row in csv.DictReader(file.open(encoding="utf-8"))
+    ]
     assert len(rows) == 1303
-    unlike = [row["question"] for row in rows if not any(pattern.fullmatch(row["question"]) for pattern in patterns)]
+    unlike = [
+        row["question"]
+        for row in rows
+        if not any(pattern.fullmatch(row["question"]) for pattern in patterns)
+    ]
     assert unlike == ["Is Knife in the agent?"]
-    assert all(re.fullmatch(r"\['(Yes|No)'\]|\[\d+\]|\[('[A-Z]\w+'(, )?)+\]", row["answer"]) for row in rows)
+    assert all(
+        re.fullmatch(r"\['(Yes|No)'\]|\[\d+\]|\[('[A-Z]\w+'(, )?)+\]", row["answer"])
+        for row in rows
+    )

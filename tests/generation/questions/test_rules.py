@@ -46,7 +46,9 @@ CLOSED = (
     r"Is the .+ open now\?",
     r"Is the .+ (in|on) the .+\?",
 )
-RARE = {"container_content"}  # of what is the only one of its type and never changes; `test_readings` has some
+RARE = {
+    "container_content"
+}  # of what is the only one of its type and never changes; `test_readings` has some
 TABLE_3 = {
     "object_presence": (r"Is there any .+ in this room\?", r"Have you seen .+\?"),
     "open_state": (r"Was the .+ open\?",),
@@ -55,7 +57,10 @@ TABLE_3 = {
         r"Where did you move the .+ from the .+\?",
         r"Where is the .+ now\?",
     ),
-    "slicing": (r"What did you slice\?", r"What objects were (in|on) the .+ when you slice the .+\?"),
+    "slicing": (
+        r"What did you slice\?",
+        r"What objects were (in|on) the .+ when you slice the .+\?",
+    ),
     "container_content": (r"What objects were (in|on) the .+\?",),
     "put_action": (r"What object did you put (in|on) the .+\?",),
     "final_state": (
@@ -70,10 +75,15 @@ TABLE_3 = {
 @pytest.fixture(scope="module")
 def replayed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("set")
-    jobs = [TrajectorySettings(f"kitchen-{number}", seed, 110, 1) for number, seed in ((2, 2), (3, 4), (5, 4))]
+    jobs = [
+        TrajectorySettings(f"kitchen-{number}", seed, 110, 1)
+        for number, seed in ((2, 2), (3, 4), (5, 4))
+    ]
     with Simulator(embedded_launch()) as simulator:
         generate_set(jobs, simulator, folder / "trajectories")
-        assert summarise(replay_set(select([folder / "trajectories"]), simulator, folder)).complete == len(jobs)
+        assert summarise(
+            replay_set(select([folder / "trajectories"]), simulator, folder)
+        ).complete == len(jobs)
     return folder
 
 
@@ -84,7 +94,9 @@ def everything(replayed):
 
 def test_the_checker_agrees_with_every_question(everything):
     assert not everything.unconfirmed and not everything.skipped
-    assert {question.question_type for question in everything.questions} >= (QUESTION_TYPES | FURTHER_TYPES) - RARE
+    assert {question.question_type for question in everything.questions} >= (
+        QUESTION_TYPES | FURTHER_TYPES
+    ) - RARE
     assert all(everything.by_clues().values())
 
 
@@ -96,30 +108,53 @@ def test_without_further_forms_all_are_in_the_words_of_table_3(replayed, everyth
         assert any(re.fullmatch(form, question.text) for form in forms), question
     for question in everything.questions:
         if question.question_type in FURTHER_TYPES:
-            assert not any(re.fullmatch(form, question.text) for forms in TABLE_3.values() for form in forms), question
+            assert not any(
+                re.fullmatch(form, question.text) for forms in TABLE_3.values() for form in forms
+            ), question
 
 
 def test_a_put_has_two_clues_that_follow_each_other(everything):
-    puts = [question.clues for question in everything.questions if question.question_type == "put_action"]
+    puts = [
+        question.clues
+        for question in everything.questions
+        if question.question_type == "put_action"
+    ]
     assert puts and all(len(clues) == 2 and clues[1] == clues[0] + 1 for clues in puts)
 
 
 def test_what_was_moved_once_is_not_counted(everything):
-    counted = [question for question in everything.questions if question.question_type == "movement_counting"]
-    assert counted and all(int(question.answers[0]) == len(question.clues) > 1 for question in counted)
+    counted = [
+        question
+        for question in everything.questions
+        if question.question_type == "movement_counting"
+    ]
+    assert counted and all(
+        int(question.answers[0]) == len(question.clues) > 1 for question in counted
+    )
 
 
 def test_the_number_of_frames_tells_nothing_about_further_counts(everything):
-    counted = [question for question in everything.questions if question.question_type == "movement_counting_further"]
+    counted = [
+        question
+        for question in everything.questions
+        if question.question_type == "movement_counting_further"
+    ]
     assert len({question.answers for question in counted if len(question.clues) == 8}) > 2
     for question in counted:
         count, number = int(question.answers[0]), len(question.clues)
-        assert count < number and (number == 8 or (number % 8 == 0 and count >= number / 2)), question
+        assert count < number and (number == 8 or (number % 8 == 0 and count >= number / 2)), (
+            question
+        )
 
 
 def test_a_frame_shows_the_moment_that_a_question_asks_about(everything, replayed):
     logs = {folder.name: read_steps(folder) for folder in (replayed / "metadata").iterdir()}
-    verbs = {"first opened": "OpenObject", "picked up": "PickupObject", "put": "PutObject", "sliced": "SliceObject"}
+    verbs = {
+        "first opened": "OpenObject",
+        "picked up": "PickupObject",
+        "put": "PutObject",
+        "sliced": "SliceObject",
+    }
     verbs["turned on"] = "ToggleObjectOn"
     asked = [question for question in everything.questions if " when you " in question.text]
     asked = [question for question in asked if question.question_type.endswith("_further")]
@@ -128,19 +163,29 @@ def test_a_frame_shows_the_moment_that_a_question_asks_about(everything, replaye
         moment = question.text.partition(" when you ")[2]
         action = next(action for words, action in verbs.items() if moment.startswith(words))
         steps = [logs[question.traj_id][clue] for clue in question.clues]
-        assert [step for step in steps if step.success and (step.action or "").startswith(action)], question
+        assert [
+            step for step in steps if step.success and (step.action or "").startswith(action)
+        ], question
 
 
 def test_gold_answers_score_full_marks(everything):
     for question in everything.questions:
         said = ", ".join(str(answer) for answer in question.answers)
         for scorer in ("reference", "strict"):
-            assert score(said, question.answers, scorer=scorer) == 1.0, (question.text, question.answers)
+            assert score(said, question.answers, scorer=scorer) == 1.0, (
+                question.text,
+                question.answers,
+            )
 
 
 def test_the_checker_notices_what_is_wrong(everything, replayed):
-    checkers = {folder.name: Checker(read_steps(folder), DEFAULT_SHARE) for folder in (replayed / "metadata").iterdir()}
-    presence = [question for question in everything.questions if question.question_type != "object_presence"]
+    checkers = {
+        folder.name: Checker(read_steps(folder), DEFAULT_SHARE)
+        for folder in (replayed / "metadata").iterdir()
+    }
+    presence = [
+        question for question in everything.questions if question.question_type != "object_presence"
+    ]
     for question in presence:
         if question.question_type == "movement_counting_further":
             continue  # one frame more or less without an occasion does no harm
@@ -164,10 +209,14 @@ def test_choice_is_balanced_and_seeded(replayed):
 
 
 def test_absences_are_flagged_and_look_like_presences(everything):
-    presence = [question for question in everything.questions if question.question_type == "object_presence"]
+    presence = [
+        question for question in everything.questions if question.question_type == "object_presence"
+    ]
     assert {question.absence for question in presence} == {True, False}
     for question in everything.questions:
-        assert question.absence == (question.question_type == "object_presence" and question.answers == ("no",))
+        assert question.absence == (
+            question.question_type == "object_presence" and question.answers == ("no",)
+        )
     assert {len(question.clues) for question in presence} == {1}
 
 
@@ -187,12 +236,18 @@ def test_no_answer_follows_from_the_form_or_the_object_of_a_question(replayed):
             on_object[re.sub(r"Is there any|Have you seen an?|in this room|\W", "", question.text)][
                 question.answers
             ] += 1
-    assert on_object and all(abs(counts["yes",] - counts["no",]) <= 1 for counts in on_object.values())
+    assert on_object and all(
+        abs(counts["yes",] - counts["no",]) <= 1 for counts in on_object.values()
+    )
 
 
 def _form(text):
     words = text.split()
-    return " ".join(words[:5]) if words[0] == "How" else next(form for form in CLOSED if re.fullmatch(form, text))
+    return (
+        " ".join(words[:5])
+        if words[0] == "How"
+        else next(form for form in CLOSED if re.fullmatch(form, text))
+    )
 
 
 def test_texts_are_english(everything):
@@ -206,7 +261,9 @@ def test_no_answer_is_in_its_question(everything):
     for question in everything.questions:
         if question.answers[0] not in {"yes", "no"} and "when you slice" not in question.text:
             words = question.text.lower().replace(" ", "")
-            assert not [answer for answer in question.answers if len(answer) > 2 and answer in words], question
+            assert not [
+                answer for answer in question.answers if len(answer) > 2 and answer in words
+            ], question
 
 
 def test_a_log_without_what_frames_show_is_skipped(replayed, tmp_path):
@@ -216,7 +273,9 @@ def test_a_log_without_what_frames_show_is_skipped(replayed, tmp_path):
         generate_questions(tmp_path)
 
 
-def test_a_log_that_contradicts_itself_is_skipped_and_the_others_are_asked_about(replayed, tmp_path):
+def test_a_log_that_contradicts_itself_is_skipped_and_the_others_are_asked_about(
+    replayed, tmp_path
+):
     shutil.copytree(replayed, tmp_path / "set")
     path = tmp_path / "set/metadata/kitchen-3-seed4/metadata.json"
     steps = json.loads(path.read_text())
@@ -225,5 +284,10 @@ def test_a_log_that_contradicts_itself_is_skipped_and_the_others_are_asked_about
     path.write_text(json.dumps(steps))
     made = generate_questions(tmp_path / "set", per_trajectory=10)
     (line,) = made.skipped
-    assert "kitchen-3-seed4: its log is inconsistent (no 'Mug|+09.00|+09.00|+09.00'); replay" in line
-    assert {question.traj_id for question in made.questions} == {"kitchen-2-seed2", "kitchen-5-seed4"}
+    assert (
+        "kitchen-3-seed4: its log is inconsistent (no 'Mug|+09.00|+09.00|+09.00'); replay" in line
+    )
+    assert {question.traj_id for question in made.questions} == {
+        "kitchen-2-seed2",
+        "kitchen-5-seed4",
+    }

@@ -21,7 +21,11 @@ PLACES = ("in the sink", "in the bin", "on the table", "on the table top", "on")
 def ways(checkpoints: dict[str, Path]) -> dict[str, Any]:
     """One checkpoint in every way it can be run."""
     given = {"pretrained": str(checkpoints["llava"]), "device": "cpu", "dtype": "float32"}
-    options = {"shared": {"chunk_tokens": "20"}, "batched": {"batch_size": "4"}, "uncached": {"share_prefix": "false"}}
+    options = {
+        "shared": {"chunk_tokens": "20"},
+        "batched": {"batch_size": "4"},
+        "uncached": {"share_prefix": "false"},
+    }
     return {way: load("hf-vlm", {**given, **chosen}, seed=0) for way, chosen in options.items()}
 
 
@@ -80,10 +84,16 @@ def test_choices_are_those_that_generate_makes_under_the_same_constraint(
 
     def allowed(_: int, ids: Any) -> list[int]:
         begun = ids[n_context:].tolist()
-        results = {ids[len(begun)] for ids in spelled if ids[: len(begun)] == begun and len(ids) > len(begun)}
+        results = {
+            ids[len(begun)]
+            for ids in spelled
+            if ids[: len(begun)] == begun and len(ids) > len(begun)
+        }
         return sorted(results | (loaded.generation.end_ids if begun in spelled else set()))
 
-    output = loaded.model.generate(**inputs, do_sample=False, max_new_tokens=20, prefix_allowed_tokens_fn=allowed)
+    output = loaded.model.generate(
+        **inputs, do_sample=False, max_new_tokens=20, prefix_allowed_tokens_fn=allowed
+    )
     expected = loaded.tokenizer.decode(output[0, n_context:], skip_special_tokens=True)
     assert talk.reply(up_to(20, choices=choices)).text == expected
     assert expected in choices
@@ -91,7 +101,11 @@ def test_choices_are_those_that_generate_makes_under_the_same_constraint(
 
 def test_what_is_said_in_choices_depends_on_what_is_asked(frames: list[FrameRef]) -> None:
     model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
-    heard = [reply for frame in frames for reply in _replies(model, [frame] * 4, up_to(12, choices=PLACES))]
+    heard = [
+        reply
+        for frame in frames
+        for reply in _replies(model, [frame] * 4, up_to(12, choices=PLACES))
+    ]
     results = {text for text, _ in heard}
     assert results <= set(PLACES)
     assert len(results) > 1
@@ -103,11 +117,15 @@ def test_a_stop_string_cuts_no_choice(ways: dict[str, Any], frames: list[FrameRe
     assert talk.reply(up_to(12, choices=("on the table",), stop=("the",))).text == "on the table"
 
 
-def test_a_choice_that_cannot_be_said_in_so_few_tokens_is_refused(ways: dict[str, Any], frames: list[FrameRef]) -> None:
+def test_a_choice_that_cannot_be_said_in_so_few_tokens_is_refused(
+    ways: dict[str, Any], frames: list[FrameRef]
+) -> None:
     for model in ways.values():
         talk = model.conversation()
         talk.append(frames[0])
-        with pytest.raises(ModelError, match=r"the choice 'on the table top' has \d+ tokens and a reply may have 3"):
+        with pytest.raises(
+            ModelError, match=r"the choice 'on the table top' has \d+ tokens and a reply may have 3"
+        ):
             talk.reply(up_to(3, choices=("on", "on the table top")))
 
 

@@ -14,7 +14,7 @@ from PIL import Image
 from infthor_eval.errors import DataError, ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Part, check_adapter, load
-from model_adapters.hf.prompt import token_ids
+from model_adapters.hf.prompting.prompt import token_ids
 
 from ..asking import up_to, user
 
@@ -24,7 +24,9 @@ NEW = 6
 def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
     """What transformers' processor makes of it: placeholders expanded in the text, then tokenised as a whole."""
     loaded = model._loaded
-    content = [{"type": "text", "text": p} if isinstance(p, str) else {"type": "image"} for p in parts]
+    content = [
+        {"type": "text", "text": p} if isinstance(p, str) else {"type": "image"} for p in parts
+    ]
     text = loaded.tokenizer.apply_chat_template(
         [{"role": "user", "content": content}],
         chat_template=loaded.template,
@@ -38,15 +40,30 @@ def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
     counts = [int(grid.prod()) // 4 for grid in inputs.get("image_grid_thw", [])]
     for index, count in enumerate(counts):
         pieces[index] += "<|image_pad|>" * count
-    ids = loaded.tokenizer("".join(pieces), add_special_tokens=False, return_tensors="pt")["input_ids"]
+    ids = loaded.tokenizer("".join(pieces), add_special_tokens=False, return_tensors="pt")[
+        "input_ids"
+    ]
     token_types = (ids == loaded.model.config.image_token_id).int()
-    return inputs | {"input_ids": ids, "attention_mask": torch.ones_like(ids), "mm_token_type_ids": token_types}
+    return inputs | {
+        "input_ids": ids,
+        "attention_mask": torch.ones_like(ids),
+        "mm_token_type_ids": token_types,
+    }
 
 
 def _parts(frames: Sequence[FrameRef]) -> list[list[Part]]:
     return [
         [*frames[:4], "\nDid you see a mug?"],
-        ["Goal: wash the cup.", frames[0], "RotateLeft", frames[1], frames[1], "MoveAhead", frames[2], "\nWhat now?"],
+        [
+            "Goal: wash the cup.",
+            frames[0],
+            "RotateLeft",
+            frames[1],
+            frames[1],
+            "MoveAhead",
+            frames[2],
+            "\nWhat now?",
+        ],
         ["no frame at all"],
         [frames[0]],
         ["Prägung — 漢字 \n\n  <|im_end|> x", frames[3]],
@@ -54,7 +71,9 @@ def _parts(frames: Sequence[FrameRef]) -> list[list[Part]]:
 
 
 @pytest.mark.parametrize("case", range(5))
-def test_ids_are_those_of_the_chat_template_on_the_whole(tiny: Any, frames: list[FrameRef], case: int) -> None:
+def test_ids_are_those_of_the_chat_template_on_the_whole(
+    tiny: Any, frames: list[FrameRef], case: int
+) -> None:
     parts = _parts(frames)[case]
     talk = tiny.conversation()
     talk.append(*parts)
@@ -97,16 +116,23 @@ def test_a_penalised_reply_is_that_of_generate(frames: list[FrameRef]) -> None:
     config.repetition_penalty = 1.3
     output = model._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=12)
 
-    model._loaded = replace(model._loaded, generation=replace(model._loaded.generation, repetition_penalty=1.3))
+    model._loaded = replace(
+        model._loaded, generation=replace(model._loaded.generation, repetition_penalty=1.3)
+    )
     talk = model.conversation()
     talk.append(*parts)
-    assert list(talk.reply(up_to(12)).token_ids) == output[0, inputs["input_ids"].shape[1] :].tolist()
+    assert (
+        list(talk.reply(up_to(12)).token_ids) == output[0, inputs["input_ids"].shape[1] :].tolist()
+    )
     assert model.identity()["generation"]["repetition_penalty"] == 1.3
 
 
 STEPS = st.lists(
     st.one_of(
-        st.tuples(st.just("text"), st.sampled_from(["mug", " on", " the table", "\nQuestion: ", "Mo", "veAhead"])),
+        st.tuples(
+            st.just("text"),
+            st.sampled_from(["mug", " on", " the table", "\nQuestion: ", "Mo", "veAhead"]),
+        ),
         st.tuples(st.just("frame"), st.integers(0, 5)),
         st.tuples(st.just("answer"), st.sampled_from(["mug", " table.", "MoveAhead\n"])),
         st.tuples(st.just("mark"), st.just(0)),
@@ -121,7 +147,9 @@ STEPS = st.lists(
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(steps=STEPS)
-def test_sharing_changes_no_reply(tiny: Any, plain: Any, frames: list[FrameRef], steps: list[Any]) -> None:
+def test_sharing_changes_no_reply(
+    tiny: Any, plain: Any, frames: list[FrameRef], steps: list[Any]
+) -> None:
     def play(model: Any) -> list[Any]:
         talk, marks, heard = model.conversation(), [], []
         for step, value in [*steps, ("reply", 3)]:
@@ -174,7 +202,9 @@ def test_without_sharing_nothing_is_cached(plain: Any, frames: list[FrameRef]) -
     assert [talk.reply(up_to(1)).n_cached_tokens for _ in range(2)] == [0, 0]
 
 
-def test_features_are_computed_once_per_frame(frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_features_are_computed_once_per_frame(
+    frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
+) -> None:
     model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
     decoded: list[Path] = []
     whole = FrameRef.load
@@ -192,7 +222,9 @@ def test_features_are_computed_once_per_frame(frames: list[FrameRef], monkeypatc
 
 
 @pytest.mark.parametrize("megabytes", ["0", "1"])
-def test_any_size_of_the_feature_cache_gives_the_same_reply(plain: Any, frames: list[FrameRef], megabytes: str) -> None:
+def test_any_size_of_the_feature_cache_gives_the_same_reply(
+    plain: Any, frames: list[FrameRef], megabytes: str
+) -> None:
     model: Any = load("qwen2.5-vl-tiny", {"feature_cache_mb": megabytes}, seed=0)
     replies = []
     for each in (model, plain):
@@ -220,7 +252,9 @@ def test_too_long_a_context_gives_tokens_and_limit(frames: list[FrameRef]) -> No
     talk.append(frames[0])
     talk.reply(up_to(4))
     talk.append(*frames)
-    with pytest.raises(ModelError, match=f"context of {talk.n_tokens} tokens and 4 new ones .* 60 tokens"):
+    with pytest.raises(
+        ModelError, match=f"context of {talk.n_tokens} tokens and 4 new ones .* 60 tokens"
+    ):
         talk.reply(up_to(4))
 
 
@@ -312,7 +346,9 @@ def test_a_frame_that_cannot_be_read_is_a_data_error_and_the_model_goes_on(
     assert talk.reply(up_to(NEW)).token_ids == before.token_ids
 
 
-def test_a_frame_cut_off_in_the_middle_is_a_data_error(tiny: Any, frames: list[FrameRef], tmp_path: Path) -> None:
+def test_a_frame_cut_off_in_the_middle_is_a_data_error(
+    tiny: Any, frames: list[FrameRef], tmp_path: Path
+) -> None:
     path = tmp_path / "cut.png"
     path.write_bytes(frames[0].path.read_bytes()[:-200])
     talk = tiny.conversation()

@@ -36,7 +36,14 @@ def model(family: str, checkpoints: dict[str, Path]) -> Iterator[Any]:
 
 
 def _parts(scene: Sequence[FrameRef]) -> list[Part]:
-    return ["Goal: wash the cup. ", scene[0], scene[1], "MoveAhead", scene[2], "\nWhat do you see now?"]
+    return [
+        "Goal: wash the cup. ",
+        scene[0],
+        scene[1],
+        "MoveAhead",
+        scene[2],
+        "\nWhat do you see now?",
+    ]
 
 
 def _ask(model: Any, parts: Sequence[Part]) -> Any:
@@ -45,7 +52,9 @@ def _ask(model: Any, parts: Sequence[Part]) -> Any:
     return talk.reply(up_to(NEW))
 
 
-def test_a_frame_takes_the_published_number_of_tokens(family: str, model: Any, scene: list[FrameRef]) -> None:
+def test_a_frame_takes_the_published_number_of_tokens(
+    family: str, model: Any, scene: list[FrameRef]
+) -> None:
     sizes = []
     for count in (1, 2):
         talk = model.conversation()
@@ -55,13 +64,17 @@ def test_a_frame_takes_the_published_number_of_tokens(family: str, model: Any, s
     assert model.tokens_per_frame(scene[0]) == TOKENS[family] - (2 if family == "qwen2.5-vl" else 0)
 
 
-def test_the_tiny_model_is_the_saved_one_and_keeps_its_contract(family: str, model: Any, scene: list[FrameRef]) -> None:
+def test_the_tiny_model_is_the_saved_one_and_keeps_its_contract(
+    family: str, model: Any, scene: list[FrameRef]
+) -> None:
     tiny: Any = load(f"{family}-tiny", {}, seed=0)
     assert _ask(tiny, _parts(scene)).token_ids == _ask(model, _parts(scene)).token_ids
     check_adapter(tiny, frame_size=(200, 300))
 
 
-def test_half_precision_works(family: str, checkpoints: dict[str, Path], scene: list[FrameRef]) -> None:
+def test_half_precision_works(
+    family: str, checkpoints: dict[str, Path], scene: list[FrameRef]
+) -> None:
     options = {"pretrained": str(checkpoints[family]), "dtype": "bfloat16", "device": "cpu"}
     model: Any = load(family, options, seed=0)
     pieces = model.pieces(user(scene[0], "?"))
@@ -87,11 +100,15 @@ def test_pixtral_refuses_another_llava(checkpoints: dict[str, Path], tmp_path: P
         pixtral.family(model, pixtral.image_processor(), tokenizer)
 
 
-def test_frames_stay_between_texts_though_the_template_writes_images_first(frames: list[FrameRef]) -> None:
+def test_frames_stay_between_texts_though_the_template_writes_images_first(
+    frames: list[FrameRef],
+) -> None:
     model = load("llava-onevision-tiny", {}, seed=0)
     pieces = model.pieces(user("Goal: wash. ", frames[0], "MoveAhead. ", frames[1], "What now?"))
     ids = [
-        piece if isinstance(piece, int) else model._loaded.tokenizer.convert_tokens_to_ids("<image>")
+        piece
+        if isinstance(piece, int)
+        else model._loaded.tokenizer.convert_tokens_to_ids("<image>")
         for piece in pieces
     ]
     written = model._loaded.tokenizer.decode(ids)

@@ -14,7 +14,7 @@ import model_adapters
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import load
-from model_adapters.hf.kv_cache import BufferedLayer
+from model_adapters.hf.cached.kv_cache import BufferedLayer
 
 from ..asking import up_to, user
 from ..checkpoints import FAMILIES
@@ -34,7 +34,10 @@ def _asked(model: Any, frames: Sequence[FrameRef], new: int = 5, **decoding: Any
     """Replies to all questions on some frames."""
     talk = model.conversation()
     talk.append(*frames)
-    return [reply.token_ids for reply in talk.replies([[text] for text in QUESTIONS], up_to(new, **decoding))]
+    return [
+        reply.token_ids
+        for reply in talk.replies([[text] for text in QUESTIONS], up_to(new, **decoding))
+    ]
 
 
 def _tiny(family: str, options: Mapping[str, str]) -> Any:
@@ -67,7 +70,9 @@ def test_half_precision_answers_the_same_every_time(
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_model_on_another_device_leaves_nothing_on_the_cpu(family: str, mode: str, frames: list[FrameRef]) -> None:
+def test_a_model_on_another_device_leaves_nothing_on_the_cpu(
+    family: str, mode: str, frames: list[FrameRef]
+) -> None:
     model = _tiny(family, {"chunk_tokens": "40"} | MODES[mode])
     here = _asked(model, frames[:2])
     _forget(model)
@@ -80,7 +85,9 @@ def test_a_model_on_another_device_leaves_nothing_on_the_cpu(family: str, mode: 
     assert seen.brought.total() > 0
 
 
-def _step(model: Any, seen: Seen, frames: Sequence[FrameRef], **decoding: Any) -> tuple[float, float, float]:
+def _step(
+    model: Any, seen: Seen, frames: Sequence[FrameRef], **decoding: Any
+) -> tuple[float, float, float]:
     """Of one decoded token on top of what is encoded: reads, tensors brought to the device, bytes allocated there."""
     few, more = 2, 8
     counts = []
@@ -93,7 +100,9 @@ def _step(model: Any, seen: Seen, frames: Sequence[FrameRef], **decoding: Any) -
             assert {len(ids) for ids in replies} == {new}
             counts.append((seen.reads.total(), seen.brought.total(), seen.allocated.total()))
     n_steps = (more - few) * (1 if model.capabilities.batch_size > 1 else len(QUESTIONS))
-    reads, brought, allocated = ((after - before) / n_steps for before, after in zip(*counts, strict=True))
+    reads, brought, allocated = (
+        (after - before) / n_steps for before, after in zip(*counts, strict=True)
+    )
     return reads, brought, allocated
 
 
@@ -107,7 +116,9 @@ def _talkative(family: str, options: Mapping[str, str], penalty: float = 1.0) ->
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_token_is_read_once_and_copies_nothing_of_the_context(family: str, frames: list[FrameRef]) -> None:
+def test_a_token_is_read_once_and_copies_nothing_of_the_context(
+    family: str, frames: list[FrameRef]
+) -> None:
     model, seen = _talkative(family, {"batch_size": "1"}, penalty=1.05)  # as Qwen2.5-VL's
     reads, brought, allocated = _step(model, seen, frames[:2])
     assert reads == 1
@@ -141,12 +152,22 @@ def test_nothing_names_a_device_but_what_chooses_it() -> None:
     named = set()
     for path in Path(model_adapters.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Constant) and str(node.value).split(":")[0] in ("cuda", "mps", "xpu"):
+            if isinstance(node, ast.Constant) and str(node.value).split(":")[0] in (
+                "cuda",
+                "mps",
+                "xpu",
+            ):
                 named.add((path.name, node.value))
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Attribute) and node.value.attr == "cuda":
+            if (
+                isinstance(node, ast.Attribute)
+                and isinstance(node.value, ast.Attribute)
+                and node.value.attr == "cuda"
+            ):
                 assert node.attr in ("is_available", "empty_cache"), f"{path}:{node.lineno}"
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                assert node.func.attr not in ("cuda", "synchronize", "pin_memory"), f"{path}:{node.lineno}"
+                assert node.func.attr not in ("cuda", "synchronize", "pin_memory"), (
+                    f"{path}:{node.lineno}"
+                )
     assert named == allowed
 
 
@@ -194,10 +215,16 @@ def test_memory_that_runs_out_is_free_for_the_next_request(
         if where == "in a frame's features":
             patched.setattr(family, "features", _failing_after(family.features, 0))
         else:
-            patched.setattr(bare, "forward", _failing_after(bare.forward, 2 if where == "in a question" else 5))
-        with pytest.raises(ModelError, match=r"out of memory on a context of \d+ tokens .* kv_offload=true") as caught:
+            patched.setattr(
+                bare, "forward", _failing_after(bare.forward, 2 if where == "in a question" else 5)
+            )
+        with pytest.raises(
+            ModelError, match=r"out of memory on a context of \d+ tokens .* kv_offload=true"
+        ) as caught:
             _asked(model, frames)
     assert "\n" not in str(caught.value)
     assert len(buffers) > 0
-    assert [created for created in buffers if created() is not None] == []  # though the error is still there
+    assert [
+        created for created in buffers if created() is not None
+    ] == []  # though the error is still there
     assert _asked(model, frames) == _asked(_tiny("qwen2.5-vl", {}), frames)

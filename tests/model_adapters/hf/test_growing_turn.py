@@ -24,7 +24,9 @@ ACTIONS = ("MoveAhead", "RotateLeft", "PickupObject", "LookDown", "mug")
 GOAL = "<|goal|>Your main goal: put a mug in the sink<|goal|>"
 PLAN = "<|plan|>Plan: pick up the mug<|plan|><|act|>"
 STEPS = 60
-EVERY = 15  # steps, of which the last is also asked of a model that encodes all of them for its reply
+EVERY = (
+    15  # steps, of which the last is also asked of a model that encodes all of them for its reply
+)
 TAIL = 24  # tokens that a chat template writes behind the user's words, and those at the joint of two texts
 CASES = {"greedy": up_to(10, stop=STOP), "drawn": up_to(10, stop=STOP, temperature=1.0, seed=5)}
 
@@ -36,7 +38,9 @@ def _steps(frames: Sequence[FrameRef], n: int) -> Iterator[list[Part]]:
         yield [f"{ACTIONS[step % 5]}<|act|>", frames[step % len(frames)], "<|act|>"]
 
 
-def _small_vision(config: Callable[[Mapping[str, int], int], Any]) -> Callable[[Mapping[str, int], int], Any]:
+def _small_vision(
+    config: Callable[[Mapping[str, int], int], Any],
+) -> Callable[[Mapping[str, int], int], Any]:
     def smaller(ids: Mapping[str, int], vocab_size: int) -> Any:
         small_config = config(ids, vocab_size)
         small_config.vision_config.image_size = 56
@@ -83,11 +87,18 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], P
 
 
 def _load(folders: Mapping[tuple[str, str], Path], family: str, tokens: str, **options: str) -> Any:
-    given = {"pretrained": str(folders[family, tokens]), "device": "cpu", "dtype": "float32", "max_tokens": "0"}
+    given = {
+        "pretrained": str(folders[family, tokens]),
+        "device": "cpu",
+        "dtype": "float32",
+        "max_tokens": "0",
+    }
     return load(family, {**given, **options}, seed=0)
 
 
-def _play(model: Any, frames: Sequence[FrameRef], n: int, decoding: Any, every: int = 1) -> list[Any]:
+def _play(
+    model: Any, frames: Sequence[FrameRef], n: int, decoding: Any, every: int = 1
+) -> list[Any]:
     """The replies after every so many of n steps, the last one among them."""
     talk, replies = model.conversation(), []
     for step, parts in enumerate(_steps(frames, n), start=1):
@@ -102,20 +113,35 @@ def _play(model: Any, frames: Sequence[FrameRef], n: int, decoding: Any, every: 
 @pytest.mark.parametrize("tokens", ["usual", "added"])
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision"])
 def test_replies_are_those_of_a_model_that_shares_nothing(
-    folders: dict[tuple[str, str], Path], frames: list[FrameRef], family: str, tokens: str, prompt: str, decoding: str
+    folders: dict[tuple[str, str], Path],
+    frames: list[FrameRef],
+    family: str,
+    tokens: str,
+    prompt: str,
+    decoding: str,
 ) -> None:
     shared, alone = (
-        _play(_load(folders, family, tokens, prompt=prompt, share_prefix=share), frames, STEPS, CASES[decoding], every)
+        _play(
+            _load(folders, family, tokens, prompt=prompt, share_prefix=share),
+            frames,
+            STEPS,
+            CASES[decoding],
+            every,
+        )
         for share, every in (("true", 1), ("false", EVERY))
     )
     asked_both = shared[EVERY - 1 :: EVERY]
-    assert [(reply.text, reply.token_ids) for reply in asked_both] == [(reply.text, reply.token_ids) for reply in alone]
+    assert [(reply.text, reply.token_ids) for reply in asked_both] == [
+        (reply.text, reply.token_ids) for reply in alone
+    ]
     for before, after in pairwise(shared):
         assert after.n_cached_tokens >= before.n_context_tokens - TAIL
     assert all(reply.n_cached_tokens == 0 for reply in alone)
     assert not any("<|" in reply.text for reply in shared)
     if tokens == "added":
-        act = AutoTokenizer.from_pretrained(folders[family, tokens]).convert_tokens_to_ids("<|act|>")
+        act = AutoTokenizer.from_pretrained(folders[family, tokens]).convert_tokens_to_ids(
+            "<|act|>"
+        )
         ended = [reply for reply in shared if act in reply.token_ids]
         assert len({reply.text for reply in ended}) > 1
         assert all(reply.token_ids.index(act) == len(reply.token_ids) - 1 for reply in ended)

@@ -14,8 +14,8 @@ from transformers import LlamaConfig, Qwen2VLConfig
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
-from model_adapters.hf.model import TransformersModel
-from model_adapters.hf.prompt import token_ids
+from model_adapters.hf.cached.model import TransformersModel
+from model_adapters.hf.prompting.prompt import token_ids
 from model_adapters.hf.uncached import UncachedModel, process_turns
 from model_adapters.tiny.pixtral import PixtralTiny
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny, save_tiny_checkpoint
@@ -56,14 +56,20 @@ def test_an_architecture_that_would_be_run_wrongly_is_refused(checkpoints: dict[
         _load(checkpoints["gemma3"])
 
 
-def test_what_is_refused_runs_without_sharing(checkpoints: dict[str, Path], frames: list[FrameRef]) -> None:
+def test_what_is_refused_runs_without_sharing(
+    checkpoints: dict[str, Path], frames: list[FrameRef]
+) -> None:
     model = _load(checkpoints["gemma3"], share_prefix="false")
     parts = (frames[0], "\nWhat is it?")
     talk = model.conversation()
     talk.append(*parts)
     inputs = process_turns(model._processor, model._loaded.template, talk.turns)
     output = model._loaded.model.generate(**inputs, do_sample=False, max_new_tokens=6)
-    expected = [token for token in output[0, talk.n_tokens :].tolist() if token not in model._loaded.generation.end_ids]
+    expected = [
+        token
+        for token in output[0, talk.n_tokens :].tolist()
+        if token not in model._loaded.generation.end_ids
+    ]
     reply = talk.reply(up_to(6))
     assert list(reply.token_ids) == expected
     assert reply.n_cached_tokens == 0
@@ -103,21 +109,33 @@ def _qwen2_vl_config(ids: Mapping[str, int], vocab_size: int) -> Qwen2VLConfig:
     names = ("image_token_id", "video_token_id", "vision_start_token_id", "vision_end_token_id")
     return Qwen2VLConfig(
         text_config=text,
-        vision_config={"depth": 2, "embed_dim": 32, "hidden_size": HIDDEN, "num_heads": 2, "mlp_ratio": 2},
+        vision_config={
+            "depth": 2,
+            "embed_dim": 32,
+            "hidden_size": HIDDEN,
+            "num_heads": 2,
+            "mlp_ratio": 2,
+        },
         **{name: getattr(newer, name) for name in names},
     )
 
 
-def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(tmp_path: Path, frames: list[FrameRef]) -> None:
+def test_qwen2_vl_runs_as_its_successor_and_as_transformers_has_it(
+    tmp_path: Path, frames: list[FrameRef]
+) -> None:
     replace(Qwen25VLTiny.twin, config=_qwen2_vl_config).save(tmp_path, seed=0)
     model = _load(tmp_path, chunk_tokens="30")
     parts = ("Goal.", *frames[:3], "\nWhat is it?")
     pieces = model.pieces(user(*parts))
     ids = torch.tensor([list(token_ids(pieces))])
-    pixels = model._loaded.family._image_processor(images=[ref.load() for ref in frames[:3]], return_tensors="pt")
+    pixels = model._loaded.family._image_processor(
+        images=[ref.load() for ref in frames[:3]], return_tensors="pt"
+    )
     bare = model._loaded.model
     with torch.inference_mode():
-        plain = bare(input_ids=ids, mm_token_type_ids=(ids == bare.config.image_token_id).int(), **pixels)
+        plain = bare(
+            input_ids=ids, mm_token_type_ids=(ids == bare.config.image_token_id).int(), **pixels
+        )
     torch.testing.assert_close(model.encode(pieces), plain.logits[0, -1], atol=1e-4, rtol=1e-4)
     assert type(bare).__name__ == "Qwen2VLForConditionalGeneration"
 
@@ -133,18 +151,25 @@ def test_a_model_without_images_is_refused(tmp_path: Path) -> None:
         _load(tmp_path)
 
 
-def test_a_processor_that_disagrees_with_the_model_is_refused(checkpoints: dict[str, Path], tmp_path: Path) -> None:
+def test_a_processor_that_disagrees_with_the_model_is_refused(
+    checkpoints: dict[str, Path], tmp_path: Path
+) -> None:
     folder = shutil.copytree(checkpoints["llava"], tmp_path / "llava")
     file = folder / "processor_config.json"
     settings = json.loads(file.read_text())
     file.write_text(json.dumps(settings | {"patch_size": 28}))
-    with pytest.raises(ModelError, match=r"image tokens of .* frames and the model .* do not belong"):
+    with pytest.raises(
+        ModelError, match=r"image tokens of .* frames and the model .* do not belong"
+    ):
         _load(folder)
 
 
 @pytest.mark.parametrize(
     ("piece", "complaint"),
-    [("'<image>'", "0 image placeholders for 3 frames"), ("part.text", "drops the text 'The first view:'")],
+    [
+        ("'<image>'", "0 image placeholders for 3 frames"),
+        ("part.text", "drops the text 'The first view:'"),
+    ],
 )
 def test_a_template_without_images_or_texts_is_refused(
     checkpoints: dict[str, Path], tmp_path: Path, piece: str, complaint: str

@@ -55,19 +55,33 @@ def test_a_published_frame_takes_121_tokens_and_two_markers(
     assert talk.n_tokens - before == 121 + 2
 
 
-def test_replies_differ_between_frames_and_between_questions(tiny: Any, frames: list[FrameRef]) -> None:
+def test_replies_differ_between_frames_and_between_questions(
+    tiny: Any, frames: list[FrameRef]
+) -> None:
     assert len({_ask(tiny, [frame]).text for frame in frames}) > 3
-    assert len({_ask(tiny, frames[:1], f"\nIs the {thing} here?").text for thing in ("mug", "pan", "bed")}) > 1
+    assert (
+        len(
+            {
+                _ask(tiny, frames[:1], f"\nIs the {thing} here?").text
+                for thing in ("mug", "pan", "bed")
+            }
+        )
+        > 1
+    )
 
 
-def test_weights_and_tokenizer_are_the_same_for_a_seed_in_every_process(checkpoint: Path, tmp_path: Path) -> None:
+def test_weights_and_tokenizer_are_the_same_for_a_seed_in_every_process(
+    checkpoint: Path, tmp_path: Path
+) -> None:
     code = (
         "import pathlib, sys; from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint;"
         "save_tiny_checkpoint(pathlib.Path(sys.argv[1]), 0)"
     )
     again = tmp_path / "again"
     environment = os.environ | {"PYTHONHASHSEED": "1"}
-    subprocess.run([sys.executable, "-c", code, str(again)], check=True, env=environment, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-c", code, str(again)], check=True, env=environment, capture_output=True
+    )
     for name in ("model.safetensors", "tokenizer.json"):
         assert (again / name).read_bytes() == (checkpoint / name).read_bytes()
 
@@ -82,7 +96,9 @@ def test_seeds_give_different_models_and_leave_torchs_own_alone(frames: list[Fra
     assert _ask(one, frames).token_ids != _ask(other, frames).token_ids
 
 
-def test_a_saved_checkpoint_answers_as_the_tiny_model(checkpoint: Path, tiny: Any, frames: list[FrameRef]) -> None:
+def test_a_saved_checkpoint_answers_as_the_tiny_model(
+    checkpoint: Path, tiny: Any, frames: list[FrameRef]
+) -> None:
     loaded = _load(checkpoint)
     assert _ask(loaded, frames).token_ids == _ask(tiny, frames).token_ids
     check_adapter(loaded, frame_size=(56, 56))
@@ -108,7 +124,9 @@ def test_identity_follows_the_content_not_the_place(checkpoint: Path, copy: Path
     assert _load(copy).identity() != _load(checkpoint).identity()
 
 
-def test_max_pixels_makes_frames_cheaper(checkpoint: Path, make_frames: Callable[..., list[FrameRef]]) -> None:
+def test_max_pixels_makes_frames_cheaper(
+    checkpoint: Path, make_frames: Callable[..., list[FrameRef]]
+) -> None:
     frame = make_frames(1, 300, 300)[0]
     sizes = []
     for options in ({}, {"max_pixels": str(120 * 120)}):
@@ -125,7 +143,9 @@ def test_dtype_and_device_are_taken(checkpoint: Path, frames: list[FrameRef]) ->
 
 
 @pytest.mark.parametrize("attention", ["eager", "sdpa"])
-def test_attention_implementations_agree(checkpoint: Path, tiny: Any, frames: list[FrameRef], attention: str) -> None:
+def test_attention_implementations_agree(
+    checkpoint: Path, tiny: Any, frames: list[FrameRef], attention: str
+) -> None:
     model = _load(checkpoint, attn_implementation=attention, chunk_tokens="20")
     assert _ask(model, frames).token_ids == _ask(tiny, frames).token_ids
 
@@ -186,7 +206,9 @@ def test_the_template_may_lie_in_the_old_json_file_or_the_tokenizer(copy: Path, 
     assert _load(copy).identity()["chat_template"] == tiny.identity()["chat_template"]
 
 
-def test_keys_and_values_can_lie_in_cpu_memory(checkpoint: Path, tiny: Any, frames: list[FrameRef]) -> None:
+def test_keys_and_values_can_lie_in_cpu_memory(
+    checkpoint: Path, tiny: Any, frames: list[FrameRef]
+) -> None:
     model = _load(checkpoint, kv_offload="true")
     assert _ask(model, frames).token_ids == _ask(tiny, frames).token_ids
     assert model.identity() == _load(checkpoint).identity()
@@ -196,7 +218,9 @@ def test_keys_and_values_can_lie_in_cpu_memory(checkpoint: Path, tiny: Any, fram
 def test_quantisation_without_its_library_is_one_line(checkpoint: Path, value: str) -> None:
     if importlib.util.find_spec("bitsandbytes") is not None:
         pytest.skip("bitsandbytes is installed")
-    with pytest.raises(ModelError, match=r"cannot be loaded \(.*(bitsandbytes|accelerate)") as caught:
+    with pytest.raises(
+        ModelError, match=r"cannot be loaded \(.*(bitsandbytes|accelerate)"
+    ) as caught:
         _load(checkpoint, quantization=value)
     _one_line(caught.value)
 
@@ -207,6 +231,8 @@ def test_an_unknown_quantisation_is_a_usage_error(checkpoint: Path) -> None:
 
 
 @pytest.mark.parametrize(("option", "value"), [("dtype", "float33"), ("device", "abacus")])
-def test_an_unknown_dtype_or_device_is_a_usage_error(checkpoint: Path, option: str, value: str) -> None:
+def test_an_unknown_dtype_or_device_is_a_usage_error(
+    checkpoint: Path, option: str, value: str
+) -> None:
     with pytest.raises(UsageError, match=f"{option}={value}"):
         _load(checkpoint, **{option: value})

@@ -11,13 +11,15 @@ from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Conversation, Part, Transcript, Turn, load
-from model_adapters.hf.prompt import token_ids
+from model_adapters.hf.prompting.prompt import token_ids
 
 from ..asking import up_to, user
 from ..checkpoints import FAMILIES
 
 NEW = 5
-ADAPTERS = {family: family for family in FAMILIES} | dict.fromkeys(("llava", "idefics3", "deepseek-vl-1.3b"), "hf-vlm")
+ADAPTERS = {family: family for family in FAMILIES} | dict.fromkeys(
+    ("llava", "idefics3", "deepseek-vl-1.3b"), "hf-vlm"
+)
 MODES: dict[str, dict[str, str]] = {
     "shared": {"batch_size": "1"},
     "chunked": {"batch_size": "1", "chunk_tokens": "50"},
@@ -39,15 +41,22 @@ def shapes(make_frames: Callable[..., list[FrameRef]]) -> dict[str, list[Shape]]
     """In the order in which a run comes to them: each is left for the next with its prefix still encoded."""
     frames = make_frames(7, seed=3)
     steps = [part for frame in frames[:3] for part in (frame, "<|act|>MoveAhead<|act|>")]
-    asked = ("\nIs there a mug?", "\nWhere was the mug before you put it there?", "\nHow many plates did you see?")
+    asked = (
+        "\nIs there a mug?",
+        "\nWhere was the mug before you put it there?",
+        "\nHow many plates did you see?",
+    )
     return {
         "clues": [Shape((frames[4],)), Shape((frames[0], frames[4]), asked[:2])],
         "trajectory": [Shape(tuple(frames), asked)],
         "interleaved": [Shape(("Your main goal: wash the cup.", *steps, frames[5]), asked[:2])],
         "truncated": [Shape(tuple(frames[-4:]), asked[:2])],
         # The window moves back over the trajectory; then two windows that begin alike.
-        "haystack": [Shape(tuple(frames[at : at + 3])) for at in (4, 2, 0)] + [Shape(tuple(frames[:5]))],
-        "published size": [Shape(("Goal: wash the cup. ", *make_frames(2, 300, 300, seed=4), "RotateLeft"))],
+        "haystack": [Shape(tuple(frames[at : at + 3])) for at in (4, 2, 0)]
+        + [Shape(tuple(frames[:5]))],
+        "published size": [
+            Shape(("Goal: wash the cup. ", *make_frames(2, 300, 300, seed=4), "RotateLeft"))
+        ],
     }
 
 
@@ -59,7 +68,12 @@ def family(request: pytest.FixtureRequest) -> str:
 @pytest.fixture(scope="module")
 def build(family: str, checkpoints: dict[str, Path]) -> Callable[[Mapping[str, str]], Any]:
     def build(options: Mapping[str, str]) -> Any:
-        given = {"pretrained": str(checkpoints[family]), "device": "cpu", "dtype": "float32", "max_tokens": "0"}
+        given = {
+            "pretrained": str(checkpoints[family]),
+            "device": "cpu",
+            "dtype": "float32",
+            "max_tokens": "0",
+        }
         return load(ADAPTERS[family], {**given, **options}, seed=0)
 
     return build
@@ -104,7 +118,10 @@ def _ask(model: Any, talk: Any, shapes: Sequence[Shape]) -> list[Any]:
 
 @pytest.mark.parametrize("mode", MODES)
 def test_replies_are_those_of_encoding_everything_for_each(
-    build: Callable[[Mapping[str, str]], Any], shapes: dict[str, list[Shape]], expected: dict[str, list[Any]], mode: str
+    build: Callable[[Mapping[str, str]], Any],
+    shapes: dict[str, list[Shape]],
+    expected: dict[str, list[Any]],
+    mode: str,
 ) -> None:
     model = build(MODES[mode])
     talk = model.conversation()
@@ -118,7 +135,9 @@ def test_replies_depend_on_the_request(expected: dict[str, list[Any]]) -> None:
 
 
 @pytest.fixture(scope="module")
-def plainly(checkpoints: dict[str, Path], shapes: dict[str, list[Shape]], answer_plainly: Any) -> dict[Path, list[Any]]:
+def plainly(
+    checkpoints: dict[str, Path], shapes: dict[str, list[Shape]], answer_plainly: Any
+) -> dict[Path, list[Any]]:
     """What transformers makes of the first question of each shape."""
     prompts = [_prompt(listed[0]) for listed in shapes.values()]
     return answer_plainly({checkpoints[name]: prompts for name in ADAPTERS}, NEW)
@@ -146,7 +165,9 @@ def _received(model: Any, talk: Conversation) -> tuple[int, int, int]:
     """Of one reply: the tokens that had been encoded before, and the tokens and positions that reach the text model."""
     fed: list[dict[str, Any]] = []
     text_model = model._loaded.model.get_decoder()
-    hook = text_model.register_forward_pre_hook(lambda _, args, kwargs: fed.append(kwargs), with_kwargs=True)
+    hook = text_model.register_forward_pre_hook(
+        lambda _, args, kwargs: fed.append(kwargs), with_kwargs=True
+    )
     reply = talk.reply(up_to(1))
     hook.remove()
     n_positions = sum(call["position_ids"].shape[-1] for call in fed)

@@ -26,7 +26,8 @@ def two_threads() -> Iterator[None]:
 def _threads_of(network: torch.nn.Module, use: Any) -> set[int]:
     counts = set()
     hooks = [
-        part.register_forward_pre_hook(lambda *_: counts.add(torch.get_num_threads())) for part in network.modules()
+        part.register_forward_pre_hook(lambda *_: counts.add(torch.get_num_threads()))
+        for part in network.modules()
     ]
     use()
     for hook in hooks:
@@ -62,9 +63,12 @@ def test_a_model_computes_on_its_threads(
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "expected"), [("openvla-tiny", {}, 1), ("spatialvla-tiny", {"threads": "2"}, 2)]
+    ("name", "given", "expected"),
+    [("openvla-tiny", {}, 1), ("spatialvla-tiny", {"threads": "2"}, 2)],
 )
-def test_a_policy_acts_on_its_threads(name: str, given: dict[str, str], expected: int, frames: list[FrameRef]) -> None:
+def test_a_policy_acts_on_its_threads(
+    name: str, given: dict[str, str], expected: int, frames: list[FrameRef]
+) -> None:
     policy: Any = load(name, given, seed=0)
     threads = _threads_of(policy._network.weights, lambda: policy.act(frames[0], "pick up the mug"))
     assert threads == {expected}

@@ -14,7 +14,9 @@ from ..asking import require_same, talk_of, up_to
 from ..checkpoints import FAMILIES
 
 NEW = 6
-ADAPTERS = {family: family for family in FAMILIES} | dict.fromkeys(("llava", "idefics3", "deepseek-vl-1.3b"), "hf-vlm")
+ADAPTERS = {family: family for family in FAMILIES} | dict.fromkeys(
+    ("llava", "idefics3", "deepseek-vl-1.3b"), "hf-vlm"
+)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +46,12 @@ def plainly(
 
 
 def _load(name: str, checkpoints: Mapping[str, Path], **options: str) -> Any:
-    given = {"pretrained": str(checkpoints[name]), "device": "cpu", "dtype": "float32", "max_tokens": "0"}
+    given = {
+        "pretrained": str(checkpoints[name]),
+        "device": "cpu",
+        "dtype": "float32",
+        "max_tokens": "0",
+    }
     return load(ADAPTERS[name], {**given, **options}, seed=0)
 
 
@@ -69,7 +76,9 @@ def test_every_round_encodes_what_is_new_in_it_only(family: str, frames: list[Fr
     alone: Any = load(f"{family}-tiny", {"share_prefix": "false"}, seed=0)
     talk, other = shared.conversation(), alone.conversation()
     n_context, cached = 0, []
-    for frame, action in zip(frames, ("RotateLeft", "MoveAhead", "PickUp", "LookDown"), strict=False):
+    for frame, action in zip(
+        frames, ("RotateLeft", "MoveAhead", "PickUp", "LookDown"), strict=False
+    ):
         for each in (talk, other):
             each.append("Goal: wash. ", frame, "\nWhat next?")
         reply = talk.reply(up_to(NEW))
@@ -88,7 +97,9 @@ def test_batches_go_on_from_several_turns(conversations: list[tuple[Turn, ...]])
     results = []
     for size in ("1", "3"):
         talk = talk_of(load("qwen2.5-vl-tiny", {"batch_size": size}, seed=0), conversations[1][:-1])
-        replies = talk.replies([["What?"], [*conversations[1][-1].parts], ["\nWhy not?"]], up_to(NEW))
+        replies = talk.replies(
+            [["What?"], [*conversations[1][-1].parts], ["\nWhy not?"]], up_to(NEW)
+        )
         results.append([(reply.text, reply.token_ids, reply.n_context_tokens) for reply in replies])
     assert results[0] == results[1]
 
@@ -97,7 +108,9 @@ def test_batches_go_on_from_several_turns(conversations: list[tuple[Turn, ...]])
 def test_only_a_users_turn_is_replied_to(tiny: Any, role: Any) -> None:
     talk = tiny.conversation()
     for _ in range(2):
-        with pytest.raises(ModelError, match=r"qwen2\.5-vl-tiny has nothing to reply to: .*; append a user turn"):
+        with pytest.raises(
+            ModelError, match=r"qwen2\.5-vl-tiny has nothing to reply to: .*; append a user turn"
+        ):
             talk.reply(up_to(NEW))
         with pytest.raises(ModelError, match="append a user turn"):
             assert talk.n_tokens

@@ -66,7 +66,9 @@ def test_a_film_takes_the_published_number_of_tokens_whatever_its_length(
 
 
 @pytest.mark.skipif(not LOGS.is_dir(), reason="the published logs are not at ../shared/data")
-def test_every_published_trajectory_takes_its_number_of_tokens(tokens_of_sampled: dict[int, int]) -> None:
+def test_every_published_trajectory_takes_its_number_of_tokens(
+    tokens_of_sampled: dict[int, int],
+) -> None:
     n_frames = {}
     for log in LOGS.glob("*_full_traj.log.gz"):
         with gzip.open(log, "rt") as lines:
@@ -75,12 +77,18 @@ def test_every_published_trajectory_takes_its_number_of_tokens(tokens_of_sampled
     assert (len(n_frames), min(n_frames.values()), max(n_frames.values())) == (208, 570, 1223)
     for traj_id, n in n_frames.items():
         for fps in (1, 2):
-            assert tokens_of_sampled[len(sample_positions(n, FILM_FPS, fps))] == published_tokens(n, fps), traj_id
+            assert tokens_of_sampled[len(sample_positions(n, FILM_FPS, fps))] == published_tokens(
+                n, fps
+            ), traj_id
 
 
 def test_a_frame_of_a_video_takes_196_tokens_of_llava_onevision(published: FrameRef) -> None:
     model: Any = load("llava-onevision-tiny", {}, seed=0)
-    assert [vision_tokens(model, Video((published,) * n, 1.0)) for n in (1, 2, 56)] == [197, 393, 56 * 196 + 1]
+    assert [vision_tokens(model, Video((published,) * n, 1.0)) for n in (1, 2, 56)] == [
+        197,
+        393,
+        56 * 196 + 1,
+    ]
     model.close()
 
 
@@ -97,7 +105,13 @@ def test_replies_are_those_of_the_whole_processor_and_generate(
         frames = make_frames(5, side, side, seed=3)
         asked[family] = [
             user(Video(tuple(frames[:4]), 8.0), QUESTION),
-            user("Before: ", Video(tuple(frames[:3]), 8.0), " after: ", Video(tuple(frames[2:]), 8.0), QUESTION),
+            user(
+                "Before: ",
+                Video(tuple(frames[:3]), 8.0),
+                " after: ",
+                Video(tuple(frames[2:]), 8.0),
+                QUESTION,
+            ),
         ]
     answers = answer_plainly({checkpoints[family]: turns for family, turns in asked.items()}, new)
     for family, turns in asked.items():
@@ -107,11 +121,16 @@ def test_replies_are_those_of_the_whole_processor_and_generate(
         model.close()
 
 
-def test_sharing_and_chunks_change_no_reply(tiny: Any, plain: Any, make_frames: Callable[..., list[FrameRef]]) -> None:
+def test_sharing_and_chunks_change_no_reply(
+    tiny: Any, plain: Any, make_frames: Callable[..., list[FrameRef]]
+) -> None:
     frames = make_frames(4, 300, 300)
     films = [Video(tuple(frames), 1.0), Video(tuple(frames[:2]), 1.0), Video(tuple(frames), 0.5)]
     requests = [(video, f"\nIs there a {name}?") for video in films for name in ("mug", "bed")]
-    requests += [(films[0], "Then ", frames[0], "\nWhat now?"), (frames[1], films[1], "\nWhat now?")]
+    requests += [
+        (films[0], "Then ", frames[0], "\nWhat now?"),
+        (frames[1], films[1], "\nWhat now?"),
+    ]
     for parts in requests:
         replies = []
         for model in (tiny, plain):
@@ -125,8 +144,14 @@ def test_sharing_and_chunks_change_no_reply(tiny: Any, plain: Any, make_frames: 
     assert two.n_cached_tokens >= 2 * 144
 
 
-def test_the_rate_and_the_order_of_frames_change_the_prompt(tiny: Any, frames: list[FrameRef]) -> None:
-    shown = [Video(tuple(frames), 1.0), Video(tuple(frames), 2.0), Video(tuple(reversed(frames)), 1.0)]
+def test_the_rate_and_the_order_of_frames_change_the_prompt(
+    tiny: Any, frames: list[FrameRef]
+) -> None:
+    shown = [
+        Video(tuple(frames), 1.0),
+        Video(tuple(frames), 2.0),
+        Video(tuple(reversed(frames)), 1.0),
+    ]
     first, *others = [tiny.pieces(user(video, QUESTION)) for video in shown]
     assert first not in others
 
@@ -164,7 +189,9 @@ def test_models_without_a_video_input_refuse_videos(frames: list[FrameRef]) -> N
         model: Any = load(name, {}, seed=0)
         talk = model.conversation()
         talk.append(Video(tuple(frames), 1.0), QUESTION)
-        with pytest.raises(ModelError, match=f"{name} has no video input; give it the video's frames as images"):
+        with pytest.raises(
+            ModelError, match=f"{name} has no video input; give it the video's frames as images"
+        ):
             talk.reply(up_to(1))
         model.close()
 
@@ -177,7 +204,9 @@ def test_a_plain_prompt_has_videos_too(frames: list[FrameRef]) -> None:
 
 
 def test_a_text_with_the_token_of_a_video_is_refused(tiny: Any) -> None:
-    with pytest.raises(ModelError, match=r"1 video placeholders for 0 videos; a text must not contain .*video_pad"):
+    with pytest.raises(
+        ModelError, match=r"1 video placeholders for 0 videos; a text must not contain .*video_pad"
+    ):
         tiny.pieces(user("<|video_pad|> what?"))
 
 
@@ -186,7 +215,8 @@ def test_frames_of_a_video_have_one_size(
 ) -> None:
     (other,) = make_frames(1, 200, 300)
     with pytest.raises(
-        DataError, match=r"\.png: has another size than the video's first frame; give frames of one size"
+        DataError,
+        match=r"\.png: has another size than the video's first frame; give frames of one size",
     ):
         tiny.pieces(user(Video((published, other), 1.0), "?"))
 
@@ -195,4 +225,7 @@ def test_the_pixels_of_long_videos_are_shared_by_their_frames(tiny: Any) -> None
     """By hand from qwen-vl-utils: of 768 frames, each has 128000 * 28 * 28 * 0.9 * 2 / 768 pixels: 300 tokens."""
     large = (1400, 1400)
     tokens = [tiny._loaded.family.video.n_tokens(ClipShape(large, 0, n, 1.0)) for n in (2, 384)]
-    assert tokens == [27 * 27, 17 * 17]  # 768 tokens and 300 are the most, in whole rows and columns
+    assert tokens == [
+        27 * 27,
+        17 * 17,
+    ]  # 768 tokens and 300 are the most, in whole rows and columns

@@ -24,7 +24,12 @@ HOSTILE = "Is </script><img src=x onerror='document.title=\"hacked\"'> here?"
 KEY = ("yes", "no", "Fridge", "3", "SideTable, Desk")
 # Ten questions on two trajectories, told apart by their texts.
 QUESTIONS = tuple(
-    Question(f"room-{number % 2}", HOSTILE if number == 9 else f"What is number {number}?", (1,), (KEY[number % 5],))
+    Question(
+        f"room-{number % 2}",
+        HOSTILE if number == 9 else f"What is number {number}?",
+        (1,),
+        (KEY[number % 5],),
+    )
     for number in range(10)
 )
 ANSWERS = {question.text: str(question.answers[0]) for question in QUESTIONS}
@@ -37,7 +42,10 @@ class Session:
         model = () if "--model" in words else ("--model", "human:browser=false")
         command = ["-c", OURS, *model, "--output", output, *words]
         self.process = subprocess.Popen(
-            [sys.executable, *map(str, command)], stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+            [sys.executable, *map(str, command)],
+            stderr=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            text=True,
         )
         self.address = self._address()
         self.errors: list[str] = []
@@ -106,7 +114,9 @@ def by_text(tmp_path: Path) -> dict[str, NiehAnswer]:
     return {record.payload.question: record.payload for record in records(tmp_path)}
 
 
-def test_ten_questions_by_keyboard_alone(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
+def test_ten_questions_by_keyboard_alone(
+    session: Callable[..., Session], data: Path, tmp_path: Path
+) -> None:
     one = session("--tasks", "nieh_full", "--data", data)
     keyboard, unknown = one.tab.keyboard, ""
     for number in range(10):
@@ -128,13 +138,21 @@ def test_ten_questions_by_keyboard_alone(session: Callable[..., Session], data: 
     assert one.end() == 0
     assert one.errors == []
     found = by_text(tmp_path)
-    assert {text: answer.reply for text, answer in found.items()} == ANSWERS | {unknown: "I do not know"}
+    assert {text: answer.reply for text, answer in found.items()} == ANSWERS | {
+        unknown: "I do not know"
+    }
     assert all(answer.scores["strict"] == (text != unknown) for text, answer in found.items())
-    assert all(answer.n_watched is not None and 1 <= answer.n_watched <= 3 for answer in found.values())
-    assert all(record.seconds >= 0.15 and record.tokens.context is None for record in records(tmp_path))
+    assert all(
+        answer.n_watched is not None and 1 <= answer.n_watched <= 3 for answer in found.values()
+    )
+    assert all(
+        record.seconds >= 0.15 and record.tokens.context is None for record in records(tmp_path)
+    )
 
 
-def test_ten_questions_by_mouse(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
+def test_ten_questions_by_mouse(
+    session: Callable[..., Session], data: Path, tmp_path: Path
+) -> None:
     one = session("--tasks", "nieh_gt", "--data", data)
     for number in range(10):
         one.await_answered(number)
@@ -159,7 +177,9 @@ def test_ten_questions_by_mouse(session: Callable[..., Session], data: Path, tmp
     assert {text: answer.reply for text, answer in by_text(tmp_path).items()} == ANSWERS
 
 
-def test_exactly_the_frames_are_shown_that_a_model_is_given(session: Callable[..., Session], data: Path) -> None:
+def test_exactly_the_frames_are_shown_that_a_model_is_given(
+    session: Callable[..., Session], data: Path
+) -> None:
     one = session("--tasks", "nieh_gt", "--data", data, "--frames", "blank")
     one.await_answered(0)
     assert one.tab.locator("#place").inner_text() == "1 of 1"  # the clue frame
@@ -183,7 +203,9 @@ def test_two_tabs_answer_one_question_once(
     one = session("--tasks", "nieh_gt", "--data", data, "--limit", 2)
     one.await_answered(0)
     other = one.new_tab(browser)
-    other.route("**/state.json*", lambda route: route.abort())  # it does not learn that the question was answered
+    other.route(
+        "**/state.json*", lambda route: route.abort()
+    )  # it does not learn that the question was answered
     first = one.question
     one.tab.locator("#text").fill("first")
     one.tab.keyboard.press("Enter")
@@ -197,7 +219,9 @@ def test_two_tabs_answer_one_question_once(
     assert by_text(tmp_path)[first].reply == "first"
 
 
-def test_what_is_no_answer_is_refused_with_the_reason(session: Callable[..., Session], data: Path) -> None:
+def test_what_is_no_answer_is_refused_with_the_reason(
+    session: Callable[..., Session], data: Path
+) -> None:
     one = session("--tasks", "nieh_gt", "--data", data, "--limit", 1)
     one.await_answered(0)
     one.tab.locator("#text").fill("   ")
@@ -215,7 +239,9 @@ def test_what_is_no_answer_is_refused_with_the_reason(session: Callable[..., Ses
 
     given = json.dumps({"number": 1, "text": "yes"}).encode()
     assert post(f"{one.address}answer", b"[]") == 400
-    assert post(f"{one.address}answer", json.dumps({"number": 1, "text": "a" * 2001}).encode()) == 400
+    assert (
+        post(f"{one.address}answer", json.dumps({"number": 1, "text": "a" * 2001}).encode()) == 400
+    )
     assert post(f"{one.address}answer", given, Origin="http://elsewhere.example") == 403
     token = one.address.rstrip("/").rpartition("/")[2]
     assert post(f"{one.address.replace(token, 'x' * len(token))}answer", given) == 403
@@ -224,7 +250,9 @@ def test_what_is_no_answer_is_refused_with_the_reason(session: Callable[..., Ses
     assert one.end() == 0
 
 
-def test_a_run_that_is_killed_goes_on_where_it_was(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
+def test_a_run_that_is_killed_goes_on_where_it_was(
+    session: Callable[..., Session], data: Path, tmp_path: Path
+) -> None:
     words = ("--tasks", "nieh_gt", "--data", data, "--limit", 3)
     one = session(*words)
     one.await_answered(0)
@@ -243,9 +271,9 @@ def test_a_run_that_is_killed_goes_on_where_it_was(session: Callable[..., Sessio
     assert again.end() == 0
     assert first not in asked
     found = by_text(tmp_path)
-    assert {text: answer.reply for text, answer in found.items()} == {first: "mine"} | dict.fromkeys(
-        asked, "I do not know"
-    )
+    assert {text: answer.reply for text, answer in found.items()} == {
+        first: "mine"
+    } | dict.fromkeys(asked, "I do not know")
 
 
 def test_a_run_is_stopped_from_the_page(session: Callable[..., Session], data: Path) -> None:
@@ -260,10 +288,18 @@ def test_a_plan_is_acted_out(session: Callable[..., Session], tmp_path: Path, by
     document = cut(FORK, 1)
     data = write(tmp_path / "data", document)
     one = session("--tasks", "infthor_plans", "--data", data)
-    keys = {"MoveAhead": "ArrowUp", "RotateLeft": "ArrowLeft", "RotateRight": "ArrowRight", "LookUp": "PageUp"}
+    keys = {
+        "MoveAhead": "ArrowUp",
+        "RotateLeft": "ArrowLeft",
+        "RotateRight": "ArrowRight",
+        "LookUp": "PageUp",
+    }
     keys["LookDown"] = "PageDown"
     actions = [low["api_action"]["action"] for low in document["plan"]["low_actions"]]
-    assert one.tab.locator("#title").inner_text() == f"Plan 1 of 1: {one.tab.locator('#title').inner_text()[13:]}"
+    assert (
+        one.tab.locator("#title").inner_text()
+        == f"Plan 1 of 1: {one.tab.locator('#title').inner_text()[13:]}"
+    )
     assert "goal" in one.tab.locator("#facts").inner_text()
     for number, action in enumerate(actions, 1):
         if by == "keyboard":
@@ -284,8 +320,19 @@ def test_a_plan_is_acted_out(session: Callable[..., Session], tmp_path: Path, by
 
 
 def test_people_are_told_apart(session: Callable[..., Session], data: Path, tmp_path: Path) -> None:
-    command = ["-c", OURS, "--model", "human:reader=../x", "--tasks", "nieh_gt", "--data", str(data)]
-    refused = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False)
+    command = [
+        "-c",
+        OURS,
+        "--model",
+        "human:reader=../x",
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        str(data),
+    ]
+    refused = subprocess.run(
+        [sys.executable, *command], capture_output=True, text=True, check=False
+    )
     assert refused.returncode == 2
     assert "reader is '../x'; write a name" in refused.stderr
     for reader in ("ann", "ben"):
@@ -295,4 +342,7 @@ def test_people_are_told_apart(session: Callable[..., Session], data: Path, tmp_
         one.tab.locator("#unknown").click()
         assert one.end() == 0
     folders = list((tmp_path / "out/human").iterdir())
-    assert {read_run(folder, RECORDS)[0].config["model"]["reader"] for folder in folders} == {"ann", "ben"}
+    assert {read_run(folder, RECORDS)[0].config["model"]["reader"] for folder in folders} == {
+        "ann",
+        "ben",
+    }

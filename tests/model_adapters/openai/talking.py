@@ -23,7 +23,11 @@ def completion(text: str | None = "yes", usage: Any = (10, 2), **choice: Any) ->
     """What a server answers: the text, and tokens read, written and (third, if there) cached."""
     counts = None
     if usage is not None:
-        counts = {"prompt_tokens": usage[0], "completion_tokens": usage[1], "total_tokens": usage[0] + usage[1]}
+        counts = {
+            "prompt_tokens": usage[0],
+            "completion_tokens": usage[1],
+            "total_tokens": usage[0] + usage[1],
+        }
         counts |= {"prompt_tokens_details": {"cached_tokens": usage[2]}} if len(usage) > 2 else {}
     message = {"role": "assistant", "content": text} | choice.pop("message", {})
     return {
@@ -40,7 +44,9 @@ def talkative(request: dict[str, Any], _handler: BaseHTTPRequestHandler) -> dict
     """Words that follow from everything that a reply may depend on, as many as it may have."""
     depends = {name: request.get(name) for name in ("messages", "temperature", "seed")}
     drawn = hashlib.sha256(repr(depends).encode()).digest()
-    words = [("mug", "fridge", "table", "sink")[byte % 4] for byte in drawn][: request["max_tokens"]]
+    words = [("mug", "fridge", "table", "sink")[byte % 4] for byte in drawn][
+        : request["max_tokens"]
+    ]
     n_read = len(repr(request["messages"])) // 1000 + 1
     return completion(" ".join(words), (n_read, len(words), n_read // 2))
 
@@ -72,7 +78,10 @@ def opened(answer: Answer = talkative, **options: object) -> Iterator[Any]:
 def images_in(request: dict[str, Any]) -> list[Image.Image]:
     """The frames in a request, decoded."""
     parts = [
-        part for message in request["messages"] if isinstance(message["content"], list) for part in message["content"]
+        part
+        for message in request["messages"]
+        if isinstance(message["content"], list)
+        for part in message["content"]
     ]
     urls = [part["image_url"]["url"] for part in parts if part["type"] == "image_url"]
     return [Image.open(BytesIO(base64.b64decode(url.partition(",")[2]))) for url in urls]
@@ -82,7 +91,9 @@ def kept(asked: list[dict[str, Any]], answer: Callable[..., Any] = talkative) ->
     """Answers likewise, and keeps what was asked, with its head under "headers" (names in lower case)."""
 
     def keep(request: dict[str, Any], handler: BaseHTTPRequestHandler) -> Any:
-        asked.append(request | {"headers": {name.lower(): value for name, value in handler.headers.items()}})
+        asked.append(
+            request | {"headers": {name.lower(): value for name, value in handler.headers.items()}}
+        )
         return answer(request, handler)
 
     return keep

@@ -21,7 +21,9 @@ from model_adapters.openai.completions import read_completion
 from ..policies.servers import Answer, send
 from .talking import completion, opened, says, talkative
 
-endpoint = pytest.importorskip("model_adapters.openai.endpoint", reason="the client library is not installed")
+endpoint = pytest.importorskip(
+    "model_adapters.openai.endpoint", reason="the client library is not installed"
+)
 wire = pytest.importorskip("model_adapters.openai.wire")
 
 KEY = "sk-0123456789abcdef0123456789"
@@ -67,51 +69,111 @@ def _with_usage(**changes: Any) -> dict[str, Any]:
 
 
 SHAPES: dict[str, tuple[Answer, str]] = {
-    "nothing": (_sends(200, b""), "does not answer with a chat completion (Input data was truncated)"),
+    "nothing": (
+        _sends(200, b""),
+        "does not answer with a chat completion (Input data was truncated)",
+    ),
     "no content": (_sends(204, b""), "does not answer with a chat completion"),
-    "no JSON": (_sends(200, b"<html>hello</html>", {"Content-Type": "text/html"}), "with a chat completion (JSON is"),
+    "no JSON": (
+        _sends(200, b"<html>hello</html>", {"Content-Type": "text/html"}),
+        "with a chat completion (JSON is",
+    ),
     "no text": (_sends(200, b"\xff\xfe\x00" * 9), "does not answer with a chat completion"),
     "deep": (_sends(200, b"[" * 200_000), "does not answer with a chat completion"),
-    "half": (_sends(200, json.dumps(completion()).encode()[:-20]), "does not answer with a chat completion"),
+    "half": (
+        _sends(200, json.dumps(completion()).encode()[:-20]),
+        "does not answer with a chat completion",
+    ),
     "a list": (_answers([completion()]), "(Expected `object`, got `array`)"),
     "a stream": (
         _sends(200, b"data: {}\n\ndata: [DONE]\n\n", {"Content-Type": "text/event-stream"}),
         "does not answer with a chat completion",
     ),
     "another object": (_answers({"detail": "hello"}), "(Object missing required field `choices`)"),
-    "choices of another type": (_answers(completion() | {"choices": "yes"}), "(Expected `array`, got `str` - at"),
+    "choices of another type": (
+        _answers(completion() | {"choices": "yes"}),
+        "(Expected `array`, got `str` - at",
+    ),
     "no choices": (_answers(completion() | {"choices": []}), "answers without choices"),
-    "choices that are none": (_answers(completion() | {"choices": [None]}), "(Expected `object`, got `null` - at"),
-    "a choice without a message": (_answers(completion() | {"choices": [{"text": "yes"}]}), "field `message` - at"),
-    "content of another type": (_answers(completion(message={"content": 7})), "(Expected `str | null`, got `int` - at"),
-    "half a pair": (_sends(200, json.dumps(completion("\ud800")).encode()), "does not answer with a chat completion"),
+    "choices that are none": (
+        _answers(completion() | {"choices": [None]}),
+        "(Expected `object`, got `null` - at",
+    ),
+    "a choice without a message": (
+        _answers(completion() | {"choices": [{"text": "yes"}]}),
+        "field `message` - at",
+    ),
+    "content of another type": (
+        _answers(completion(message={"content": 7})),
+        "(Expected `str | null`, got `int` - at",
+    ),
+    "half a pair": (
+        _sends(200, json.dumps(completion("\ud800")).encode()),
+        "does not answer with a chat completion",
+    ),
     "no words": (_answers(completion(None)), "gives no text; see its log"),
-    "no words, strange reason": (_answers(completion(None, finish_reason="x\ny")), "gives no text; see its log"),
+    "no words, strange reason": (
+        _answers(completion(None, finish_reason="x\ny")),
+        "gives no text; see its log",
+    ),
     "no words, too long": (
         _answers(completion(None, finish_reason="length")),
         "the token limit was reached before any text",
     ),
-    "filtered": (_answers(completion("", finish_reason="content_filter")), "the server's content filter blocked it"),
-    "tools": (_answers(completion(None, finish_reason="tool_calls")), "it calls a tool, though none was offered"),
-    "tokens below 0": (_answers(_with_usage(prompt_tokens=-1)), "(Expected `int` >= 0 - at `$.usage.prompt_tokens`)"),
-    "tokens in words": (_answers(_with_usage(completion_tokens="2")), "(Expected `int`, got `str` - at"),
-    "tokens without end": (_answers(_with_usage(prompt_tokens=10**40)), "does not answer with a chat completion"),
+    "filtered": (
+        _answers(completion("", finish_reason="content_filter")),
+        "the server's content filter blocked it",
+    ),
+    "tools": (
+        _answers(completion(None, finish_reason="tool_calls")),
+        "it calls a tool, though none was offered",
+    ),
+    "tokens below 0": (
+        _answers(_with_usage(prompt_tokens=-1)),
+        "(Expected `int` >= 0 - at `$.usage.prompt_tokens`)",
+    ),
+    "tokens in words": (
+        _answers(_with_usage(completion_tokens="2")),
+        "(Expected `int`, got `str` - at",
+    ),
+    "tokens without end": (
+        _answers(_with_usage(prompt_tokens=10**40)),
+        "does not answer with a chat completion",
+    ),
     "a redirect": (
         _sends(307, b"", {"Location": "http://127.0.0.1:1/v1"}),
         "answers 307 Temporary Redirect: nothing; r",
     ),
     "a redirect for good": (_sends(301, b"", {"Location": "/v1"}), "redirects are not followed"),
-    "no such model": (_sends(404, b'{"error": {"message": "no m"}}'), 'answers 404 Not Found: \'{"error": {"message"'),
-    "a bad request": (_sends(400, b"top_p\nis not taken"), "answers 400 Bad Request: 'top_p is not taken'; check"),
+    "no such model": (
+        _sends(404, b'{"error": {"message": "no m"}}'),
+        'answers 404 Not Found: \'{"error": {"message"',
+    ),
+    "a bad request": (
+        _sends(400, b"top_p\nis not taken"),
+        "answers 400 Bad Request: 'top_p is not taken'; check",
+    ),
     "too many frames for vLLM": (
         _sends(400, b"At most 2 image(s) may be provided in one prompt."),
         "in one prompt.'; start the server with a higher --limit-mm-per-prompt",
     ),
-    "a key that is not taken": (_sends(401, b"who?"), "answers 401 Unauthorized: 'who?'; set the environment variable"),
+    "a key that is not taken": (
+        _sends(401, b"who?"),
+        "answers 401 Unauthorized: 'who?'; set the environment variable",
+    ),
     "another status": (_sends(499, b""), "answers 499: nothing; check"),
-    "no money": (_sends(429, b'{"error": {"code": "insufficient_quota"}}'), "answers 429 Too Many Requests"),
-    "packed": (_sends(200, b"\x1f\x8b", {"Content-Encoding": "gzip"}), "answers in an encoding that was not requested"),
-    "strange letters": (_sends(418, b"\xff\xfe", {"Content-Type": "text/plain; charset=none-such"}), "answers 418"),
+    "no money": (
+        _sends(429, b'{"error": {"code": "insufficient_quota"}}'),
+        "answers 429 Too Many Requests",
+    ),
+    "packed": (
+        _sends(200, b"\x1f\x8b", {"Content-Encoding": "gzip"}),
+        "answers in an encoding that was not requested",
+    ),
+    "strange letters": (
+        _sends(418, b"\xff\xfe", {"Content-Type": "text/plain; charset=none-such"}),
+        "answers 418",
+    ),
 }
 
 
@@ -139,7 +201,9 @@ def test_no_bytes_are_a_traceback(content: bytes) -> None:
 
 _VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=5), inner, max_size=2),
+    lambda inner: (
+        st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=5), inner, max_size=2)
+    ),
     max_leaves=4,
 )
 
@@ -148,7 +212,9 @@ _VALUES = st.recursive(
 @given(st.data())
 def test_no_document_is_a_traceback(data: st.DataObject) -> None:
     document = completion()
-    place = data.draw(st.sampled_from([(), ("choices",), ("usage",), ("choices", 0), ("choices", 0, "message")]))
+    place = data.draw(
+        st.sampled_from([(), ("choices",), ("usage",), ("choices", 0), ("choices", 0, "message")])
+    )
     within: Any = document
     for step in place:
         within = within[step]
@@ -171,7 +237,11 @@ def test_no_document_is_a_traceback(data: st.DataObject) -> None:
         (completion("", finish_reason="stop"), ""),
         (completion("", finish_reason="length"), ""),
         (completion("yes", usage=None), "yes"),
-        (completion("yes") | {"choices": [*completion("yes")["choices"], *completion("no")["choices"]]}, "yes"),
+        (
+            completion("yes")
+            | {"choices": [*completion("yes")["choices"], *completion("no")["choices"]]},
+            "yes",
+        ),
         (completion("yes") | {"extra": [1, {"more": None}]}, "yes"),
     ],
 )
@@ -197,9 +267,15 @@ def _babbles(_request: Any, handler: Handler) -> None:
 
 
 PASSING: dict[str, tuple[Answer, str]] = {
-    "500": (_sends(500, b"CUDA out\nof memory"), "answers 500 Internal Server Error: 'CUDA out of memory'"),
+    "500": (
+        _sends(500, b"CUDA out\nof memory"),
+        "answers 500 Internal Server Error: 'CUDA out of memory'",
+    ),
     "503": (_sends(503, b"", {"Retry-After": "0"}), "answers 503 Service Unavailable: nothing"),
-    "429": (_sends(429, b"slow down", {"Retry-After": "0"}), "answers 429 Too Many Requests: 'slow down'"),
+    "429": (
+        _sends(429, b"slow down", {"Retry-After": "0"}),
+        "answers 429 Too Many Requests: 'slow down'",
+    ),
     "429 until": (_sends(429, b"", {"Retry-After": formatdate(0, usegmt=True)}), "answers 429"),
     "429 in words": (_sends(429, b"", {"Retry-After": "soon"}), "answers 429"),
     "408": (_sends(408, b""), "answers 408 Request Timeout: nothing"),
@@ -264,7 +340,9 @@ def test_a_server_that_is_only_busy_is_asked_as_patiently_by_every_unit() -> Non
 
     with opened(answer, retries=2) as model:
         for n_expected in (3, 6):
-            with pytest.raises(ModelError, match="answers 429 Too Many Requests: 'slow down', in 3 attempts; lower"):
+            with pytest.raises(
+                ModelError, match="answers 429 Too Many Requests: 'slow down', in 3 attempts; lower"
+            ):
                 _ask(model)
             assert n_asked == n_expected
 
@@ -273,7 +351,10 @@ def test_a_server_that_is_not_there_is_one_line() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         where = f"http://127.0.0.1:{taken.getsockname()[1]}/v1"
-        with opened(talkative, base_url=where, retries=1) as model, pytest.raises(ModelError) as caught:
+        with (
+            opened(talkative, base_url=where, retries=1) as model,
+            pytest.raises(ModelError) as caught,
+        ):
             _ask(model)
     assert str(caught.value).startswith(f"{where} cannot be reached (")
     assert str(caught.value).endswith("in 2 attempts; is the server up?")
@@ -322,7 +403,9 @@ def test_no_head_is_a_traceback(name: str, value: str) -> None:
     assert waited is None or waited >= 0
 
 
-@pytest.mark.parametrize("slow", ["before it answers", "in the head", "in the body", "in the body of an error"])
+@pytest.mark.parametrize(
+    "slow", ["before it answers", "in the head", "in the body", "in the body of an error"]
+)
 def test_a_server_that_takes_too_long_is_given_up_in_the_end(slow: str) -> None:
     done = threading.Event()
 
@@ -375,7 +458,9 @@ def test_a_head_without_end_is_not_read() -> None:
 
 
 @pytest.mark.parametrize("status", [200, 400, 401, 429, 500])
-def test_a_server_that_says_the_key_again_does_not_have_it_told(status: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_that_says_the_key_again_does_not_have_it_told(
+    status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     heard = []
 

@@ -15,7 +15,9 @@ from model_adapters.openai.messages import EncodedFrames, to_messages
 
 
 def _pixels(address: str) -> np.ndarray:
-    return np.asarray(Image.open(BytesIO(base64.b64decode(address.partition(",")[2]))).convert("RGB"))
+    return np.asarray(
+        Image.open(BytesIO(base64.b64decode(address.partition(",")[2]))).convert("RGB")
+    )
 
 
 def test_texts_and_frames_keep_their_order(frames: list[FrameRef]) -> None:
@@ -27,13 +29,19 @@ def test_texts_and_frames_keep_their_order(frames: list[FrameRef]) -> None:
         Turn("user", ("Where?",)),
     )
     first, second = (
-        {"type": "image_url", "image_url": {"url": encoded.url(frame), "detail": "low"}} for frame in frames[:2]
+        {"type": "image_url", "image_url": {"url": encoded.url(frame), "detail": "low"}}
+        for frame in frames[:2]
     )
     assert to_messages("m", turns, encoded, "low") == [
         {"role": "system", "content": "Be brief."},
         {
             "role": "user",
-            "content": [{"type": "text", "text": "Look: "}, first, {"type": "text", "text": "and"}, second],
+            "content": [
+                {"type": "text", "text": "Look: "},
+                first,
+                {"type": "text", "text": "and"},
+                second,
+            ],
         },
         {"role": "assistant", "content": "A mug."},
         {"role": "user", "content": "Where?"},
@@ -42,11 +50,15 @@ def test_texts_and_frames_keep_their_order(frames: list[FrameRef]) -> None:
 
 @pytest.mark.parametrize("role", ["system", "assistant"])
 def test_frames_are_the_users_alone(role, frames: list[FrameRef]) -> None:
-    with pytest.raises(ModelError, match=f"m accepts frames in user turns only, not in a turn of the {role}"):
+    with pytest.raises(
+        ModelError, match=f"m accepts frames in user turns only, not in a turn of the {role}"
+    ):
         to_messages("m", (Turn(role, (frames[0],)),), EncodedFrames("png"), None)
 
 
-def test_png_loses_nothing_and_jpeg_little_and_both_are_the_same_bytes_each_time(frames: list[FrameRef]) -> None:
+def test_png_loses_nothing_and_jpeg_little_and_both_are_the_same_bytes_each_time(
+    frames: list[FrameRef],
+) -> None:
     seen = np.asarray(frames[0].load())
     png, jpeg = EncodedFrames("png").url(frames[0]), EncodedFrames("jpeg").url(frames[0])
     assert png.startswith("data:image/png;base64,")
@@ -57,7 +69,9 @@ def test_png_loses_nothing_and_jpeg_little_and_both_are_the_same_bytes_each_time
     assert EncodedFrames("jpeg").url(frames[0]) == jpeg
 
 
-def test_a_frame_is_encoded_once_by_its_content(tmp_path: Path, frames: list[FrameRef], monkeypatch) -> None:
+def test_a_frame_is_encoded_once_by_its_content(
+    tmp_path: Path, frames: list[FrameRef], monkeypatch
+) -> None:
     twin = FrameRef(tmp_path / "twin.png")
     twin.path.write_bytes(frames[0].path.read_bytes())
     loaded, load = [], FrameRef.load
@@ -74,7 +88,12 @@ def test_no_more_is_kept_than_there_is_room_for(frames: list[FrameRef], monkeypa
     monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame) or load(frame))
     for frame in (frames[0], frames[1], frames[0], frames[2], frames[0], frames[1]):
         encoded.url(frame)
-    assert loaded == [frames[0], frames[1], frames[2], frames[1]]  # what was used longest ago made place
+    assert loaded == [
+        frames[0],
+        frames[1],
+        frames[2],
+        frames[1],
+    ]  # what was used longest ago made place
 
 
 def test_a_frame_that_cannot_be_read_is_a_fault_of_the_data(tmp_path: Path) -> None:

@@ -17,7 +17,9 @@ from model_adapters import Decoding, check_adapter, load
 from ..asking import up_to
 from .talking import chatting, completion, images_in, kept, opened, says, talkative
 
-served = pytest.importorskip("model_adapters.openai.model", reason="the client library is not installed")
+served = pytest.importorskip(
+    "model_adapters.openai.model", reason="the client library is not installed"
+)
 
 KEY = "sk-0123456789abcdef0123456789"
 
@@ -54,10 +56,20 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
         talk.append("Where?")
         talk.reply(up_to(7, temperature=0.5, top_p=0.9, seed=2**63 + 5, stop=tuple("abcdef")))
     first, second = asked
-    assert {name for name in first if name != "headers"} == {"model", "messages", "max_tokens", "temperature"}
+    assert {name for name in first if name != "headers"} == {
+        "model",
+        "messages",
+        "max_tokens",
+        "temperature",
+    }
     assert (first["model"], first["max_tokens"], first["temperature"]) == ("m", 5, 0)
     assert [message["role"] for message in first["messages"]] == ["system", "user"]
-    assert [part["type"] for part in first["messages"][1]["content"]] == ["text", "image_url", "image_url", "text"]
+    assert [part["type"] for part in first["messages"][1]["content"]] == [
+        "text",
+        "image_url",
+        "image_url",
+        "text",
+    ]
     for shown, frame in zip(images_in(first), frames, strict=False):
         assert (np.asarray(shown) == np.asarray(frame.load())).all()
     assert second["messages"][:2] == first["messages"]
@@ -66,16 +78,34 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
         {"role": "user", "content": "Where?"},
     ]
     assert (second["temperature"], second["top_p"], second["seed"]) == (0.5, 0.9, 5)
-    assert second["stop"] == ["a", "b", "c", "d"]  # more are not taken; the reply is cut here in any case
+    assert second["stop"] == [
+        "a",
+        "b",
+        "c",
+        "d",
+    ]  # more are not taken; the reply is cut here in any case
     assert "authorization" not in first["headers"]
 
 
 def test_what_a_server_does_not_take_is_not_sent() -> None:
     asked: list[dict[str, Any]] = []
-    without = {"send_seed": False, "send_stop": False, "send_temperature": False, "send_repetition_penalty": False}
-    with opened(kept(asked, says("x")), max_tokens_field="max_completion_tokens", **without) as model:
-        _ask(model, "What?", decoding=up_to(5, temperature=0.5, stop=("b",), repetition_penalty=1.0))
-    assert {name for name in asked[0] if name != "headers"} == {"model", "messages", "max_completion_tokens"}
+    without = {
+        "send_seed": False,
+        "send_stop": False,
+        "send_temperature": False,
+        "send_repetition_penalty": False,
+    }
+    with opened(
+        kept(asked, says("x")), max_tokens_field="max_completion_tokens", **without
+    ) as model:
+        _ask(
+            model, "What?", decoding=up_to(5, temperature=0.5, stop=("b",), repetition_penalty=1.0)
+        )
+    assert {name for name in asked[0] if name != "headers"} == {
+        "model",
+        "messages",
+        "max_completion_tokens",
+    }
 
 
 def test_a_penalty_is_sent_where_one_is_asked_for() -> None:
@@ -87,7 +117,9 @@ def test_a_penalty_is_sent_where_one_is_asked_for() -> None:
 
 
 @pytest.mark.parametrize(("sent", "expected"), [(True, [False, None]), (False, [None, None])])
-def test_special_tokens_are_asked_for_where_one_may_stop_a_reply(sent: bool, expected: list[bool | None]) -> None:
+def test_special_tokens_are_asked_for_where_one_may_stop_a_reply(
+    sent: bool, expected: list[bool | None]
+) -> None:
     asked: list[dict[str, Any]] = []
     with opened(kept(asked, says("x")), send_skip_special_tokens=sent) as model:
         for stop in (("<|act|>",), ()):
@@ -110,7 +142,9 @@ def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> No
 @pytest.mark.parametrize("value", ["", "  ", "two words", "schlüssel-schlüssel"])
 def test_a_missing_or_broken_key_is_one_line(value: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MY_KEY", value)
-    with pytest.raises(ModelError, match="the environment variable that api_key_env names holds no key") as caught:
+    with pytest.raises(
+        ModelError, match="the environment variable that api_key_env names holds no key"
+    ) as caught:
         load("openai", {"model": "m", "api_key_env": "MY_KEY"}, 0)
     assert "MY_KEY" not in str(caught.value)  # it may be the key, put in the wrong place
 
@@ -129,7 +163,9 @@ def test_tokens_and_cost_are_told_with_the_reply() -> None:
     with opened(lambda *_: completion("yes", (1000, 10))) as model:
         reply = _ask(model, "What?")
     assert (reply.n_context_tokens, reply.n_cached_tokens, reply.cost) == (1000, None, None)
-    with opened(lambda *_: completion("yes", None), price_per_m_input=1, price_per_m_output=1) as model:
+    with opened(
+        lambda *_: completion("yes", None), price_per_m_input=1, price_per_m_output=1
+    ) as model:
         reply = _ask(model, "What?")
     assert (reply.n_context_tokens, reply.n_reply_tokens, reply.cost) == (None, None, None)
 
@@ -144,11 +180,16 @@ def test_a_reply_that_cannot_be_used_is_paid_for_all_the_same() -> None:
 
 
 def test_a_server_that_does_not_hold_to_choices_is_found_out() -> None:
-    with opened(says("perhaps"), guided="vllm") as model, pytest.raises(ModelError, match="leave out guided"):
+    with (
+        opened(says("perhaps"), guided="vllm") as model,
+        pytest.raises(ModelError, match="leave out guided"),
+    ):
         _ask(model, "What?", decoding=up_to(5, choices=("yes", "no")))
 
 
-def test_as_many_requests_are_in_flight_as_there_are_threads_and_conversations_are_independent() -> None:
+def test_as_many_requests_are_in_flight_as_there_are_threads_and_conversations_are_independent() -> (
+    None
+):
     together, most, lock = 0, 0, threading.Lock()
     all_there = threading.Barrier(4, timeout=600)
 
@@ -196,7 +237,9 @@ def test_what_is_in_flight_ends_when_the_model_is_closed() -> None:
         done.set()
 
 
-def test_a_server_on_this_machine_is_asked_without_the_environments_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_on_this_machine_is_asked_without_the_environments_proxy(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for name in ("HTTP_PROXY", "http_proxy", "ALL_PROXY", "all_proxy"):
         monkeypatch.setenv(name, "http://127.0.0.1:1")
     for name in ("NO_PROXY", "no_proxy"):
@@ -206,13 +249,17 @@ def test_a_server_on_this_machine_is_asked_without_the_environments_proxy(monkey
 
 
 def test_what_is_no_encryption_is_found_out() -> None:
-    refused = pytest.raises(ModelError, match=r"^https://127.0.0.1:\d+/v1 cannot be reached \(.*SSL")
+    refused = pytest.raises(
+        ModelError, match=r"^https://127.0.0.1:\d+/v1 cannot be reached \(.*SSL"
+    )
     with chatting() as url, opened(base_url=url.replace("http:", "https:")) as model, refused:
         _ask(model, "What?")
 
 
 def test_tokens_a_minute_are_kept_by_the_size_of_the_last_request(waits: list[float]) -> None:
-    with opened(lambda *_: completion("yes", (90, 10)), tokens_per_minute=1000, requests_per_minute=10) as model:
+    with opened(
+        lambda *_: completion("yes", (90, 10)), tokens_per_minute=1000, requests_per_minute=10
+    ) as model:
         for _ in range(2):
             _ask(model, "What?")
     assert waits == [0, 1.0, 100, 1.0]  # tokens, then the request itself
@@ -220,7 +267,11 @@ def test_tokens_a_minute_are_kept_by_the_size_of_the_last_request(waits: list[fl
 
 def test_the_identity_is_whom_is_asked_and_how() -> None:
     with opened(
-        says("x"), base_url="https://host:1/v1/", max_cost=1, price_per_m_input=1, price_per_m_output=1
+        says("x"),
+        base_url="https://host:1/v1/",
+        max_cost=1,
+        price_per_m_input=1,
+        price_per_m_output=1,
     ) as model:
         assert model.identity() == {
             "adapter": "openai",
@@ -245,26 +296,39 @@ def test_listing_and_checking_options_does_not_import_the_client() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_without_the_client_library_one_line_names_the_mend(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_client_library_one_line_names_the_mend(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for name in [name for name in sys.modules if name.startswith("model_adapters.openai.")]:
         if name.rpartition(".")[2] not in ("adapter", "options", "secret"):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "openai", None)
-    with pytest.raises(ModelError, match=r"openai needs the package openai, 3 or newer \(.*\); pip install 'infthor-e"):
+    with pytest.raises(
+        ModelError,
+        match=r"openai needs the package openai, 3 or newer \(.*\); pip install 'infthor-e",
+    ):
         load("openai", {"model": "m", "base_url": "http://127.0.0.1:1"}, 0)
 
 
 @pytest.mark.parametrize("field", ["reasoning_content", "reasoning"])
-def test_thoughts_that_the_server_tells_apart_are_kept_apart(field: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_thoughts_that_the_server_tells_apart_are_kept_apart(
+    field: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("MY_KEY", KEY)
     answer = completion("a cup", message={field: f"A mug? {KEY}"})
     with opened(lambda *_: answer, api_key_env="MY_KEY") as model:
         reply = _ask(model, "What?")
-    assert reply.text == "a cup" and reply.thinking.startswith("A mug?") and KEY not in reply.thinking
-    with opened(lambda *_: completion(None, message={field: "A mug?"}, finish_reason="length")) as model:
+    assert (
+        reply.text == "a cup" and reply.thinking.startswith("A mug?") and KEY not in reply.thinking
+    )
+    with opened(
+        lambda *_: completion(None, message={field: "A mug?"}, finish_reason="length")
+    ) as model:
         assert _ask(model, "What?").text == ""
     with (
-        opened(lambda *_: completion(None, message={field: "A mug?"}, finish_reason="stop")) as model,
+        opened(
+            lambda *_: completion(None, message={field: "A mug?"}, finish_reason="stop")
+        ) as model,
         pytest.raises(ModelError, match="gives no text"),
     ):
         _ask(model, "What?")

@@ -34,12 +34,20 @@ ASKED = {"model": "m"}
         ({"retries": "-1"}, "retries=-1 is not from 0 to 20"),
         ({"requests_per_minute": "0"}, "requests_per_minute=0.0 is not above 0"),
         ({"max_tokens_total": "0"}, "max_tokens_total=0 is not above 0"),
-        ({"price_per_m_input": "-1", "price_per_m_output": "1"}, "price_per_m_input=-1.0 is below 0"),
+        (
+            {"price_per_m_input": "-1", "price_per_m_output": "1"},
+            "price_per_m_input=-1.0 is below 0",
+        ),
         ({"max_cost": "1"}, "max_cost needs price_per_m_input and price_per_m_output; give both"),
-        ({"price_per_m_cached": "1", "price_per_m_input": "1"}, "price_per_m_input needs price_per_m_input and"),
+        (
+            {"price_per_m_cached": "1", "price_per_m_input": "1"},
+            "price_per_m_input needs price_per_m_input and",
+        ),
     ],
 )
-def test_misuse_is_refused_in_one_line_that_tells_no_secret(given: dict[str, str], message: str) -> None:
+def test_misuse_is_refused_in_one_line_that_tells_no_secret(
+    given: dict[str, str], message: str
+) -> None:
     with pytest.raises(UsageError) as caught:
         check_options("openai", ASKED | given)
     assert message in str(caught.value)
@@ -71,6 +79,8 @@ def test_options_are_listed_with_their_defaults() -> None:
     assert "max_cost=none" in listed
 
 
-@pytest.mark.parametrize(("model", "named"), [("gpt-x", "gpt-x"), ("org/name-7b", "name-7b"), ("/a/folder", "folder")])
+@pytest.mark.parametrize(
+    ("model", "named"), [("gpt-x", "gpt-x"), ("org/name-7b", "name-7b"), ("/a/folder", "folder")]
+)
 def test_a_run_is_called_by_the_servers_model(model: str, named: str) -> None:
     assert label("openai", {"model": model, "base_url": "https://host/v1"}) == named

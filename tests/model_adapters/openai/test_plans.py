@@ -28,12 +28,25 @@ def _moves(request: dict[str, Any], _handler: Any = None) -> dict[str, Any]:
 def played(task_files: Path, tmp_path: Path, run: Any) -> Any:
     """Plays plans of at most four actions; gives exit code, records and results."""
     task = task_files / "plans" / "infthor_plans.yaml"
-    task.write_text("include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 4}\n")
+    task.write_text(
+        "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 4}\n"
+    )
 
-    def played(url: str, data: Path, name: str = "m", **more: object) -> tuple[int, list[UnitRecord[Any]], Any]:
+    def played(
+        url: str, data: Path, name: str = "m", **more: object
+    ) -> tuple[int, list[UnitRecord[Any]], Any]:
         given = {"base_url": url, "model": "m", "retries": 0, **more}
         typed = ",".join(f"{option}={value}" for option, value in given.items())
-        arguments = ["--model", "openai", "--model-args", typed, "--tasks", "infthor_plans", "--data", data]
+        arguments = [
+            "--model",
+            "openai",
+            "--model-args",
+            typed,
+            "--tasks",
+            "infthor_plans",
+            "--data",
+            data,
+        ]
         code, _, err = run(*arguments, "--greedy", "--name", name, "--output", tmp_path / "out")
         assert "Traceback" not in err
         (results,) = (tmp_path / "out" / name).rglob("results.json")
@@ -46,14 +59,22 @@ def test_episodes_at_once_find_what_one_after_the_other_finds(played: Any, tmp_p
     data = write(tmp_path / "data", cut(FORK, 1), cut(MUG, 1), cut(CANDLE, 1))
     with chatting(_moves) as url:
         runs = [played(url, data, f"with-{number}", max_in_flight=number) for number in (3, 1)]
-    together, alone = ([msgspec.structs.replace(record, seconds=0.0) for record in records] for _, records, _ in runs)
+    together, alone = (
+        [msgspec.structs.replace(record, seconds=0.0) for record in records]
+        for _, records, _ in runs
+    )
     assert together == alone
     assert len({record.cluster for record in together}) == 3
     assert all(step.action in MOVES for record in together for step in record.payload.steps)
     n_steps = sum(len(record.payload.steps) for record in together)
     for code, _, results in runs:
         assert code == 0
-        assert results["usage"] == {"requests": n_steps, "context": 100 * n_steps, "reply": 3 * n_steps, "cost": None}
+        assert results["usage"] == {
+            "requests": n_steps,
+            "context": 100 * n_steps,
+            "reply": 3 * n_steps,
+            "cost": None,
+        }
 
 
 def test_a_plan_that_fails_in_the_middle_says_what_it_took_and_the_next_one_is_played(
@@ -91,12 +112,16 @@ def test_a_survived_fault_stands_in_the_plans_record(played: Any, tmp_path: Path
     assert "answers 503 Service Unavailable: 'busy'" in fault
 
 
-def test_plans_beyond_the_cap_are_not_asked_and_are_played_by_the_next_run(played: Any, tmp_path: Path) -> None:
+def test_plans_beyond_the_cap_are_not_asked_and_are_played_by_the_next_run(
+    played: Any, tmp_path: Path
+) -> None:
     data = write(tmp_path / "data", cut(FORK, 2))
     with chatting(lambda *_: completion("RotateLeft", (95, 5))) as url:
         code, (first, second), _ = played(url, data, max_tokens_total=400)
         assert (code, first.failure, first.usage.requests) == (1, None, 4)
-        assert second.failure.startswith("not asked: 400 tokens reach max_tokens_total=400; raise it")
+        assert second.failure.startswith(
+            "not asked: 400 tokens reach max_tokens_total=400; raise it"
+        )
         code, (first, second), results = played(url, data, max_tokens_total=800)
     assert (code, first.attempt, second.attempt, second.failure) == (0, 1, 2, None)
     assert results["usage"]["requests"] == 8

@@ -29,7 +29,16 @@ def ask(make_nieh_set: Any, tmp_path: Path, run: Any) -> Any:
     def ask(url: str, *options: object, **model_args: object) -> tuple[int, str, str]:
         given = {"base_url": url, "model": "m", "retries": 0, **model_args}
         typed = ",".join(f"{name}={value}" for name, value in given.items())
-        arguments = ["--model", "openai", "--model-args", typed, "--tasks", "nieh_gt", "--data", data]
+        arguments = [
+            "--model",
+            "openai",
+            "--model-args",
+            typed,
+            "--tasks",
+            "nieh_gt",
+            "--data",
+            data,
+        ]
         return run(*arguments, "--output", tmp_path / "out", *options)
 
     return ask
@@ -41,7 +50,9 @@ def _run(folder: Path) -> tuple[list[Any], dict[str, Any]]:
     return read_run(results.parent, RECORDS)[1], json.loads(results.read_text())
 
 
-def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(ask: Any, tmp_path: Path) -> None:
+def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(
+    ask: Any, tmp_path: Path
+) -> None:
     prices = {"price_per_m_input": 2, "price_per_m_cached": 1, "price_per_m_output": 10}
     with chatting(lambda *_: completion("yes", (1000, 10, 200))) as url:
         code, out, err = ask(url, **prices)
@@ -51,9 +62,15 @@ def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(ask
     each = (800 * 2 + 200 * 1 + 10 * 10) / 1e6
     assert [record.payload.reply for record in records] == ["yes"] * 5
     assert [record.usage.cost for record in records] == pytest.approx([each] * 5)
-    assert results["usage"] == {"requests": 5, "context": 5000, "reply": 50, "cost": pytest.approx(5 * each)}
+    assert results["usage"] == {
+        "requests": 5,
+        "context": 5000,
+        "reply": 50,
+        "cost": pytest.approx(5 * each),
+    }
     assert (
-        f"m: 5 requests, 5,000 tokens read (1,000 of them cached, 20.0 %), 50 written, {5 * each:.4f} US dollars" in out
+        f"m: 5 requests, 5,000 tokens read (1,000 of them cached, 20.0 %), 50 written, {5 * each:.4f} US dollars"
+        in out
     )
 
 
@@ -62,7 +79,10 @@ def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path
     with chatting(kept(asked, lambda *_: completion("yes", (95, 5)))) as url:
         code, _, err = ask(url, "--max-tokens-total", 250)
         assert code == 1
-        assert "2 sample(s) failed, counted as wrong: not asked: 300 tokens reach max_tokens_total=250; raise" in err
+        assert (
+            "2 sample(s) failed, counted as wrong: not asked: 300 tokens reach max_tokens_total=250; raise"
+            in err
+        )
         assert len(asked) == 3
         code, _, err = ask(url, "--max-tokens-total", 10_000, max_in_flight=1, timeout_s=90)
         assert code == 0, err
@@ -85,8 +105,16 @@ def test_money_is_capped_likewise(ask: Any) -> None:
 @pytest.mark.parametrize(
     ("options", "given", "message"),
     [
-        (("--max-cost", 1), {}, "max_cost needs price_per_m_input and price_per_m_output; give both"),
-        (("--max-cost", 1), {"max_cost": 2}, "--max-cost and max_cost= in --model-args are the same option"),
+        (
+            ("--max-cost", 1),
+            {},
+            "max_cost needs price_per_m_input and price_per_m_output; give both",
+        ),
+        (
+            ("--max-cost", 1),
+            {"max_cost": 2},
+            "--max-cost and max_cost= in --model-args are the same option",
+        ),
         (("--max-cost", 0), {}, "--max-cost"),
         (("--max-tokens-total", 0), {}, "--max-tokens-total"),
         ((), {"base_url": "http://10.1.2.3/v1"}, "base_url leads to 10.1.2.3 without encryption"),
@@ -103,9 +131,20 @@ def test_misuse_is_one_line_before_anything_is_read(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_cap_is_not_for_models_that_cost_nothing(run: Any, make_nieh_set: Any, tmp_path: Path) -> None:
+def test_a_cap_is_not_for_models_that_cost_nothing(
+    run: Any, make_nieh_set: Any, tmp_path: Path
+) -> None:
     data = make_nieh_set(size=56)
-    arguments = ["--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out", "--max-cost", 1]
+    arguments = [
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        data,
+        "--output",
+        tmp_path / "out",
+        "--max-cost",
+        1,
+    ]
     for model in ("qwen2.5-vl-tiny", "oracle"):
         code, _, err = run("--model", model, *arguments)
         assert code == 2
@@ -151,7 +190,9 @@ def _echoes(request: Any, handler: Any) -> Any:
         handler.send_response(401, f"no {key}")
         handler.send_header("X-Key", key)
         handler.end_headers()
-        handler.wfile.write(f'{{"error": {{"message": "Incorrect API key provided: {key}"}}}}'.encode())
+        handler.wfile.write(
+            f'{{"error": {{"message": "Incorrect API key provided: {key}"}}}}'.encode()
+        )
         return None
     if "sink" in text:
         return completion(None, finish_reason=key)
@@ -182,7 +223,9 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
 
 
 @pytest.mark.parametrize("in_flight", [1, 4])
-def test_a_run_interrupted_twice_ends_at_once_in_one_line(make_nieh_set: Any, tmp_path: Path, in_flight: int) -> None:
+def test_a_run_interrupted_twice_ends_at_once_in_one_line(
+    make_nieh_set: Any, tmp_path: Path, in_flight: int
+) -> None:
     asked, done = threading.Event(), threading.Event()
 
     def answer(_request: Any, _handler: Any) -> None:
@@ -192,10 +235,27 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(make_nieh_set: Any, tm
     data = make_nieh_set(size=56)
     with chatting(answer) as url:
         given = f"base_url={url},model=m,max_in_flight={in_flight}"
-        arguments = ["--model", "openai", "--model-args", given, "--tasks", "nieh_full", "--data", data]
-        command = [sys.executable, "-c", "from infthor_eval.cli import main; main()", *map(str, arguments)]
+        arguments = [
+            "--model",
+            "openai",
+            "--model-args",
+            given,
+            "--tasks",
+            "nieh_full",
+            "--data",
+            data,
+        ]
+        command = [
+            sys.executable,
+            "-c",
+            "from infthor_eval.cli import main; main()",
+            *map(str, arguments),
+        ]
         stopped = subprocess.Popen(
-            [*command, "--output", tmp_path / "out"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*command, "--output", tmp_path / "out"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
         )
         try:
             assert asked.wait(600)
@@ -217,22 +277,49 @@ def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run: Any) ->
     data = make_nieh_set(size=56)
     with chatting(lambda *_: completion("a note", (100, 10))) as url:
         given = f"base_url={url},model=m,price_per_m_input=1,price_per_m_output=10"
-        arguments = ["--model", "openai", "--model-args", given, "--tasks", "nieh_memory_notes", "--data", data]
+        arguments = [
+            "--model",
+            "openai",
+            "--model-args",
+            given,
+            "--tasks",
+            "nieh_memory_notes",
+            "--data",
+            data,
+        ]
         code, out, err = run(*arguments, "--output", tmp_path / "out")
     assert code == 0, err
     _, results = _run(tmp_path / "out")
-    assert results["usage"] == {"requests": 7, "context": 700, "reply": 70, "cost": pytest.approx(7 * 200 / 1e6)}
+    assert results["usage"] == {
+        "requests": 7,
+        "context": 700,
+        "reply": 70,
+        "cost": pytest.approx(7 * 200 / 1e6),
+    }
     assert "7 requests" in out
 
 
-def test_in_process_models_and_baselines_tell_what_they_read(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
-    arguments = ["--tasks", "nieh_gt", "--data", make_nieh_set(size=56), "--output", tmp_path / "out"]
+def test_in_process_models_and_baselines_tell_what_they_read(
+    make_nieh_set: Any, tmp_path: Path, run: Any
+) -> None:
+    arguments = [
+        "--tasks",
+        "nieh_gt",
+        "--data",
+        make_nieh_set(size=56),
+        "--output",
+        tmp_path / "out",
+    ]
     assert "requests" not in run("--model", "oracle", *arguments)[1]
-    assert "qwen2.5-vl-tiny: 5 requests, " in (out := run("--model", "qwen2.5-vl-tiny", *arguments)[1])
+    assert "qwen2.5-vl-tiny: 5 requests, " in (
+        out := run("--model", "qwen2.5-vl-tiny", *arguments)[1]
+    )
     assert "US dollars" not in out
 
 
-def test_several_trajectories_are_asked_about_at_once(make_nieh_set: Any, tmp_path: Path, run: Any) -> None:
+def test_several_trajectories_are_asked_about_at_once(
+    make_nieh_set: Any, tmp_path: Path, run: Any
+) -> None:
     both = threading.Barrier(2, timeout=600)
     seen: set[int] = set()
 
@@ -245,7 +332,16 @@ def test_several_trajectories_are_asked_about_at_once(make_nieh_set: Any, tmp_pa
     data = make_nieh_set(size=56)
     with chatting(answer) as url:
         given = f"base_url={url},model=m"
-        arguments = ["--model", "openai", "--model-args", given, "--tasks", "nieh_full", "--data", data]
+        arguments = [
+            "--model",
+            "openai",
+            "--model-args",
+            given,
+            "--tasks",
+            "nieh_full",
+            "--data",
+            data,
+        ]
         code, _, err = run(*arguments, "--output", tmp_path / "out")
     assert code == 0, err
 

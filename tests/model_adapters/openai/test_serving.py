@@ -25,7 +25,9 @@ from ..checkpoints import save
 from ..serving import free_port, records_in, wait_for_server
 
 for package in ("openai", "fastapi", "uvicorn", "multipart"):
-    pytest.importorskip(package, reason="what `transformers serve` needs is not installed (pip install -e '.[dev]')")
+    pytest.importorskip(
+        package, reason="what `transformers serve` needs is not installed (pip install -e '.[dev]')"
+    )
 
 SERVE = "from transformers.cli.transformers import main; main()"
 WITHOUT_STOP = {"send_stop": "false"}  # this server fails on stop strings for models with images
@@ -48,14 +50,23 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     root = tmp_path_factory.mktemp("served")
     folder = root / "idefics3"
     save("idefics3", folder)
-    settings = folder / "generation_config.json"  # without do_sample this server draws at no temperature
+    settings = (
+        folder / "generation_config.json"
+    )  # without do_sample this server draws at no temperature
     settings.write_text(json.dumps(json.loads(settings.read_text()) | {"do_sample": True}))
     port = free_port()
     command = [sys.executable, "-c", SERVE, "serve", "--host", "127.0.0.1", "--port", str(port)]
-    environment = os.environ | {"HF_HUB_OFFLINE": "1", "HF_HOME": str(root / "home"), "OMP_NUM_THREADS": "1"}
+    environment = os.environ | {
+        "HF_HUB_OFFLINE": "1",
+        "HF_HOME": str(root / "home"),
+        "OMP_NUM_THREADS": "1",
+    }
     with (root / "log").open("w") as log:
         server = subprocess.Popen(
-            [*command, "--device", "cpu", "--dtype", "float32"], stdout=log, stderr=log, env=environment
+            [*command, "--device", "cpu", "--dtype", "float32"],
+            stdout=log,
+            stderr=log,
+            env=environment,
         )
         try:
             wait_for_server(f"http://127.0.0.1:{port}/health", server, root / "log")
@@ -70,11 +81,25 @@ def both(served: Served, tmp_path: Path, run: Any) -> Callable[..., list[list[Un
     """Runs the same tasks behind the server and in this process; gives the records of both."""
 
     def both(*arguments: object, **more: str) -> list[list[UnitRecord[Any]]]:
-        here = {"pretrained": served.folder, "device": "cpu", "dtype": "float32", "max_tokens": 100_000}
+        here = {
+            "pretrained": served.folder,
+            "device": "cpu",
+            "dtype": "float32",
+            "max_tokens": 100_000,
+        }
         records = []
         for model, given in (("openai", served.options | more), ("hf-vlm", here)):
             options = ",".join(f"{name}={value}" for name, value in given.items())
-            typed = ["--model", model, "--model-args", options, "--name", model, "--output", tmp_path / "out"]
+            typed = [
+                "--model",
+                model,
+                "--model-args",
+                options,
+                "--name",
+                model,
+                "--output",
+                tmp_path / "out",
+            ]
             code, _, err = run(*typed, *arguments)
             assert code == 0, err
             records.append(records_in(tmp_path / "out" / model))
@@ -89,11 +114,15 @@ def test_it_keeps_the_contract(served: Served) -> None:
     model.close()
 
 
-def test_questions_are_answered_as_in_this_process(both: Callable[..., list[list[UnitRecord[Any]]]]) -> None:
+def test_questions_are_answered_as_in_this_process(
+    both: Callable[..., list[list[UnitRecord[Any]]]],
+) -> None:
     behind, here = both("--tasks", "nieh_mini", "--limit", 3)
     assert len(behind) == 6
     assert [record.payload for record in behind] == [record.payload for record in here]
-    assert [record.tokens.context for record in behind] == [record.tokens.context for record in here]
+    assert [record.tokens.context for record in behind] == [
+        record.tokens.context for record in here
+    ]
     assert any(record.payload.reply for record in behind)
     assert not any(record.faults for record in behind)
 
@@ -102,10 +131,14 @@ def test_plans_are_carried_out_as_in_this_process(
     both: Callable[..., list[list[UnitRecord[Any]]]], tmp_path: Path
 ) -> None:
     data = write(tmp_path / "data", cut(FORK, 2), cut(CANDLE, 2))
-    behind, here = both("--tasks", "infthor_plans", "--data", data, "--greedy", **WITHOUT_STOP, **WITHOUT_PENALTY)
+    behind, here = both(
+        "--tasks", "infthor_plans", "--data", data, "--greedy", **WITHOUT_STOP, **WITHOUT_PENALTY
+    )
     assert len(behind) == 4
     assert [record.payload for record in behind] == [record.payload for record in here]
-    assert {record.usage.requests for record in behind} == {len(record.payload.steps) for record in behind}
+    assert {record.usage.requests for record in behind} == {
+        len(record.payload.steps) for record in behind
+    }
 
 
 def test_all_bundled_questions_are_answered_alike(
@@ -116,8 +149,12 @@ def test_all_bundled_questions_are_answered_alike(
     assert [record.payload for record in behind] == [record.payload for record in here]
 
 
-def test_bundled_plans_are_carried_out_alike(both: Callable[..., list[list[UnitRecord[Any]]]]) -> None:
-    behind, here = both("--tasks", "infthor_plans_mini", "--limit", 2, "--greedy", **WITHOUT_STOP, **WITHOUT_PENALTY)
+def test_bundled_plans_are_carried_out_alike(
+    both: Callable[..., list[list[UnitRecord[Any]]]],
+) -> None:
+    behind, here = both(
+        "--tasks", "infthor_plans_mini", "--limit", 2, "--greedy", **WITHOUT_STOP, **WITHOUT_PENALTY
+    )
     assert len(behind) > 40
     # A server counts the tokens of requests alone, not those of a history that it is not asked.
     uncounted = [msgspec.structs.replace(record.payload, clue_tokens=None) for record in here]
@@ -143,9 +180,13 @@ def test_turns_and_systems_are_taken(served: Served, frames: list[FrameRef]) -> 
 
 
 def test_what_the_server_refuses_is_one_line(served: Served, tmp_path: Path) -> None:
-    model: Any = load("openai", served.options | {"model": str(tmp_path / "none"), "retries": "0"}, 0)
+    model: Any = load(
+        "openai", served.options | {"model": str(tmp_path / "none"), "retries": "0"}, 0
+    )
     talk = model.conversation()
     talk.append("What is it?")
-    with pytest.raises(ModelError, match=r"/v1 answers 500 Internal Server Error: .*; see the server's log"):
+    with pytest.raises(
+        ModelError, match=r"/v1 answers 500 Internal Server Error: .*; see the server's log"
+    ):
         talk.reply(up_to(4))
     model.close()

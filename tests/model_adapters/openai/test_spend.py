@@ -30,7 +30,10 @@ def test_nothing_is_begun_once_the_cap_is_reached(takes: list[int], cap: int) ->
     spend, taken = Spend("m", Caps(tokens=cap)), 0
     for tokens in takes:
         if taken >= cap:
-            with pytest.raises(ModelError, match=f"not asked: {taken} tokens reach max_tokens_total={cap}; raise it"):
+            with pytest.raises(
+                ModelError,
+                match=f"not asked: {taken} tokens reach max_tokens_total={cap}; raise it",
+            ):
                 _took(spend, tokens)
         else:
             _took(spend, tokens)
@@ -41,7 +44,10 @@ def test_money_is_capped_likewise() -> None:
     spend = Spend("m", Caps(cost=1.0))
     _took(spend, 10, 0.6)
     _took(spend, 10, 0.6)
-    with pytest.raises(ModelError, match=r"not asked: 1\.2000 US dollars reach max_cost=1; raise it and run the same"):
+    with pytest.raises(
+        ModelError,
+        match=r"not asked: 1\.2000 US dollars reach max_cost=1; raise it and run the same",
+    ):
         _took(spend, 10, 0.6)
 
 
@@ -59,7 +65,9 @@ def test_a_server_that_does_not_tell_is_asked_once_under_a_cap_and_for_ever_with
     for spend in (capped, free):
         _took(spend, None)
     _took(free, None)
-    with pytest.raises(ModelError, match="m does not report the usage of its replies, so caps cannot be enforced"):
+    with pytest.raises(
+        ModelError, match="m does not report the usage of its replies, so caps cannot be enforced"
+    ):
         _took(capped, None)
 
 
@@ -108,7 +116,9 @@ def test_a_pace_is_even(clock: list[float]) -> None:
     assert begun == [0, 2, 4, 6]
 
 
-def test_what_was_taken_is_made_up_for_and_what_was_given_back_is_not_waited_for(clock: list[float]) -> None:
+def test_what_was_taken_is_made_up_for_and_what_was_given_back_is_not_waited_for(
+    clock: list[float],
+) -> None:
     pace = RateLimiter(60)
     pace.wait(10)
     pace.take(20)  # it was 30

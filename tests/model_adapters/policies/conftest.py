@@ -41,7 +41,8 @@ def policy_checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pa
 def policies(policy_checkpoints: dict[str, Path]) -> Iterator[dict[str, VlaPolicy]]:
     """The tiny checkpoints as the adapters of the published ones load them, by family."""
     loaded = {
-        family: load(family, {"pretrained": str(at), "device": "cpu"}, 0) for family, at in policy_checkpoints.items()
+        family: load(family, {"pretrained": str(at), "device": "cpu"}, 0)
+        for family, at in policy_checkpoints.items()
     }
     yield loaded  # type: ignore[misc]
     for policy in loaded.values():
@@ -85,6 +86,8 @@ def weights_edit(change: Callable[[dict[str, Any]], Mapping[str, Any]]) -> Edit:
     """An edit of a checkpoint's tensors."""
 
     def edit(folder: Path) -> None:
-        save_file(dict(change(load_file(folder / "model.safetensors"))), folder / "model.safetensors")
+        save_file(
+            dict(change(load_file(folder / "model.safetensors"))), folder / "model.safetensors"
+        )
 
     return edit

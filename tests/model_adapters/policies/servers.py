@@ -41,7 +41,9 @@ def serving(answer: Answer, path: str = "/act") -> Iterator[str]:
 
     server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     server.daemon_threads = True
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
+    thread = threading.Thread(
+        target=server.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True
+    )
     thread.start()
     try:
         yield f"http://127.0.0.1:{server.server_port}"
@@ -51,7 +53,9 @@ def serving(answer: Answer, path: str = "/act") -> Iterator[str]:
         thread.join()
 
 
-def send(handler: BaseHTTPRequestHandler, status: int, body: bytes, length: int | None = None) -> None:
+def send(
+    handler: BaseHTTPRequestHandler, status: int, body: bytes, length: int | None = None
+) -> None:
     """Answer a request; `length` is what is announced instead of the body's."""
     handler.send_response(status)
     handler.send_header("Content-Length", str(len(body) if length is None else length))
@@ -64,7 +68,9 @@ def asked_image(request: dict[str, Any]) -> np.ndarray:
     image = request["image"]
     if isinstance(image, list):
         return np.array(image, dtype=np.uint8)
-    return np.frombuffer(base64.b64decode(image["__numpy__"]), np.dtype(image["dtype"])).reshape(image["shape"])
+    return np.frombuffer(base64.b64decode(image["__numpy__"]), np.dtype(image["dtype"])).reshape(
+        image["shape"]
+    )
 
 
 def policy_answers(policy: Policy, change: float = 0.0) -> Answer:
@@ -77,7 +83,8 @@ def policy_answers(policy: Policy, change: float = 0.0) -> Answer:
             Image.fromarray(asked_image(request)).save(path)
             steps = policy.act(FrameRef(path), request["instruction"])
         actions = [
-            [step.translation[0] + change, *step.translation[1:], *step.rotation, step.gripper] for step in steps
+            [step.translation[0] + change, *step.translation[1:], *step.rotation, step.gripper]
+            for step in steps
         ]
         return actions[0] if len(actions) == 1 else actions
 

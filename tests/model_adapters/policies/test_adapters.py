@@ -36,7 +36,9 @@ def test_the_twins_keep_the_contract(name: str, tiny: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_checkpoints_in_the_published_layout_keep_the_contract(family: str, policies: dict[str, VlaPolicy]) -> None:
+def test_checkpoints_in_the_published_layout_keep_the_contract(
+    family: str, policies: dict[str, VlaPolicy]
+) -> None:
     check_adapter(policies[family])
 
 
@@ -49,13 +51,19 @@ def test_frame_and_instruction_both_change_the_action(
         return tiny[name].act(frame, instruction)
 
     black, white = plain_frames
-    actions = [act(black, "pick up the mug"), act(white, "pick up the mug"), act(black, "close the fridge")]
+    actions = [
+        act(black, "pick up the mug"),
+        act(white, "pick up the mug"),
+        act(black, "close the fridge"),
+    ]
     assert all(one != other for at, one in enumerate(actions) for other in actions[at + 1 :])
     assert actions[0] == act(black, "pick up the mug")
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_seed_makes_the_weights(name: str, tiny: dict[str, Any], plain_frames: tuple[FrameRef, FrameRef]) -> None:
+def test_the_seed_makes_the_weights(
+    name: str, tiny: dict[str, Any], plain_frames: tuple[FrameRef, FrameRef]
+) -> None:
     other, same = load(name, {}, 1), load(name, {}, 0)
     for policy in (tiny[name], other, same):
         policy.reset()  # type: ignore[union-attr]
@@ -78,7 +86,10 @@ def test_chunks_of_spatialvla_are_four_steps_unless_they_are_averaged(
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("dtype", ["bfloat16", "float16"])
 def test_narrow_types_act_too(
-    family: str, dtype: str, policy_checkpoints: dict[str, Path], plain_frames: tuple[FrameRef, FrameRef]
+    family: str,
+    dtype: str,
+    policy_checkpoints: dict[str, Path],
+    plain_frames: tuple[FrameRef, FrameRef],
 ) -> None:
     policy = _load(family, policy_checkpoints[family], dtype=dtype)
     assert policy.identity()["dtype"] == dtype
@@ -87,14 +98,20 @@ def test_narrow_types_act_too(
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_the_checkpoint_s_own_type_is_taken(family: str, altered: Altered) -> None:
-    folder = altered(family, json_edit("config.json", lambda config: config.update(torch_dtype="bfloat16")))
+    folder = altered(
+        family, json_edit("config.json", lambda config: config.update(torch_dtype="bfloat16"))
+    )
     assert _load(family, folder).identity()["dtype"] == "bfloat16"
 
 
 def test_tied_embeddings_are_written_by_what_they_are_read_by(altered: Altered) -> None:
     def tie(folder: Path) -> None:
-        json_edit("config.json", lambda config: config["text_config"].update(tie_word_embeddings=True))(folder)
-        weights_edit(lambda weights: {key: value for key, value in weights.items() if "lm_head" not in key})(folder)
+        json_edit(
+            "config.json", lambda config: config["text_config"].update(tie_word_embeddings=True)
+        )(folder)
+        weights_edit(
+            lambda weights: {key: value for key, value in weights.items() if "lm_head" not in key}
+        )(folder)
 
     policy = _load("spatialvla", altered("spatialvla", tie))
     model = policy._network.weights.language_model
@@ -122,10 +139,15 @@ KEYS = {
 }
 
 
-@pytest.mark.parametrize(("family", "key"), [(family, key) for family in FAMILIES for key in KEYS[family]])
+@pytest.mark.parametrize(
+    ("family", "key"), [(family, key) for family in FAMILIES for key in KEYS[family]]
+)
 def test_a_missing_key_ends_the_loading(family: str, key: str, altered: Altered) -> None:
     folder = altered(
-        family, weights_edit(lambda weights: {name: value for name, value in weights.items() if name != key})
+        family,
+        weights_edit(
+            lambda weights: {name: value for name, value in weights.items() if name != key}
+        ),
     )
     with pytest.raises(ModelError, match=f"the checkpoint lacks {key}"):
         _load(family, folder)
@@ -136,22 +158,30 @@ def test_an_unknown_key_or_another_shape_ends_the_loading(family: str, altered: 
     def change(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
         return weights | {"action_head.weight": torch.zeros(1), KEYS[family][0]: torch.zeros(2)}
 
-    with pytest.raises(ModelError, match=rf"unknown action_head\.weight; has another shape in {KEYS[family][0]} \[2\]"):
+    with pytest.raises(
+        ModelError,
+        match=rf"unknown action_head\.weight; has another shape in {KEYS[family][0]} \[2\]",
+    ):
         _load(family, altered(family, weights_edit(change)))
 
 
 def test_a_depth_model_under_its_new_names_is_no_checkpoint_of_ours(altered: Altered) -> None:
     def renamed(weights: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
         return {
-            name.replace("backbone.encoder.layer.", "backbone.beit.layers."): value for name, value in weights.items()
+            name.replace("backbone.encoder.layer.", "backbone.beit.layers."): value
+            for name, value in weights.items()
         }
 
-    with pytest.raises(ModelError, match=r"lacks vision_zoe_model\.backbone\.encoder.*; has unknown vision_zoe"):
+    with pytest.raises(
+        ModelError, match=r"lacks vision_zoe_model\.backbone\.encoder.*; has unknown vision_zoe"
+    ):
         _load("spatialvla", altered("spatialvla", weights_edit(renamed)))
 
 
 @pytest.mark.parametrize(("family", "other"), [FAMILIES, FAMILIES[::-1]])
-def test_a_checkpoint_of_another_family_is_named(family: str, other: str, policy_checkpoints: dict[str, Path]) -> None:
+def test_a_checkpoint_of_another_family_is_named(
+    family: str, other: str, policy_checkpoints: dict[str, Path]
+) -> None:
     with pytest.raises(ModelError, match=f"is a {other} checkpoint, not {family}"):
         _load(family, policy_checkpoints[other])
 
@@ -164,15 +194,32 @@ def test_a_checkpoint_of_another_family_is_named(family: str, other: str, policy
         (lambda folder: (folder / "model.safetensors").write_bytes(b"cut"), "cannot be loaded"),
         (lambda folder: (folder / "tokenizer.json").unlink(), "tokenizer.json"),
         (lambda folder: (folder / "tokenizer.json").write_text("{}"), "cannot be loaded"),
-        (lambda folder: (folder / "config.json").write_text("{"), "config.json: not in its documented form"),
+        (
+            lambda folder: (folder / "config.json").write_text("{"),
+            "config.json: not in its documented form",
+        ),
         (lambda folder: (folder / "config.json").unlink(), "config.json"),
-        (json_edit("config.json", lambda config: config.update(model_type="llava")), "a llava checkpoint"),
-        (json_edit("config.json", lambda config: config.update(text_config=3)), "not in its documented form"),
-        (json_edit("config.json", lambda config: config.update(torch_dtype="int8")), "has no type of weights"),
-        (json_edit("config.json", lambda config: config.pop("torch_dtype")), "has no type of weights; give dtype="),
+        (
+            json_edit("config.json", lambda config: config.update(model_type="llava")),
+            "a llava checkpoint",
+        ),
+        (
+            json_edit("config.json", lambda config: config.update(text_config=3)),
+            "not in its documented form",
+        ),
+        (
+            json_edit("config.json", lambda config: config.update(torch_dtype="int8")),
+            "has no type of weights",
+        ),
+        (
+            json_edit("config.json", lambda config: config.pop("torch_dtype")),
+            "has no type of weights; give dtype=",
+        ),
     ],
 )
-def test_a_damaged_checkpoint_is_one_line(family: str, edit: Edit, message: str, altered: Altered) -> None:
+def test_a_damaged_checkpoint_is_one_line(
+    family: str, edit: Edit, message: str, altered: Altered
+) -> None:
     with pytest.raises(InfthorError) as caught:
         _load(family, altered(family, edit))
     assert message in str(caught.value)
@@ -188,36 +235,79 @@ def test_a_damaged_checkpoint_is_one_line(family: str, edit: Edit, message: str,
     ],
 )
 def test_the_dataset_is_chosen_by_its_key(
-    family: str, name: str, place: str, key: str, altered: Altered, plain_frames: tuple[FrameRef, FrameRef]
+    family: str,
+    name: str,
+    place: str,
+    key: str,
+    altered: Altered,
+    plain_frames: tuple[FrameRef, FrameRef],
 ) -> None:
     still = {"q01": [0.0] * 7, "q99": [0.0] * 7, "mask": [True] * 6 + [False]}
-    folder = altered(family, json_edit(name, lambda content: content[place].update(still={"action": still})))
+    folder = altered(
+        family, json_edit(name, lambda content: content[place].update(still={"action": still}))
+    )
     with pytest.raises(UsageError, match=f"choose one with unnorm_key= of {key}, still"):
         _load(family, folder)
-    with pytest.raises(UsageError, match=f"unnorm_key=bridge is not a dataset of .*; there are {key}, still"):
+    with pytest.raises(
+        UsageError, match=f"unnorm_key=bridge is not a dataset of .*; there are {key}, still"
+    ):
         _load(family, folder, unnorm_key="bridge")
     policy = _load(family, folder, unnorm_key="still")
     assert policy.identity()["unnorm_key"] == "still"
-    assert {step.translation for step in policy.act(plain_frames[0], "pick up the mug")} == {(0.0, 0.0, 0.0)}
+    assert {step.translation for step in policy.act(plain_frames[0], "pick up the mug")} == {
+        (0.0, 0.0, 0.0)
+    }
 
 
 def test_statistics_of_a_fine_tuned_openvla_are_in_a_file_of_their_own(altered: Altered) -> None:
     action = {"q01": [0.0] * 7, "q99": [1.0] * 7}
     content = json.dumps({"kitchen": {"action": action}})
-    folder = altered("openvla", lambda folder: (folder / "dataset_statistics.json").write_text(content))
+    folder = altered(
+        "openvla", lambda folder: (folder / "dataset_statistics.json").write_text(content)
+    )
     assert _load("openvla", folder).identity()["unnorm_key"] == "kitchen"
 
 
 @pytest.mark.parametrize(
     ("family", "file", "change", "message"),
     [
-        ("openvla", "config.json", {"timm_model_ids": ["vit_tiny", "vit_small"]}, "has the vision towers"),
-        ("openvla", "config.json", {"image_resize_strategy": "letterbox"}, "only the preprocessing of openvla"),
+        (
+            "openvla",
+            "config.json",
+            {"timm_model_ids": ["vit_tiny", "vit_small"]},
+            "has the vision towers",
+        ),
+        (
+            "openvla",
+            "config.json",
+            {"image_resize_strategy": "letterbox"},
+            "only the preprocessing of openvla",
+        ),
         ("openvla", "config.json", {"image_sizes": [56, 70]}, "only the preprocessing of openvla"),
-        ("openvla", "config.json", {"timm_override_act_layers": ["quick_gelu", None]}, "only the preprocessing"),
-        ("spatialvla", "config.json", {"use_vision_zoe": False}, "only SpatialVLA with use_spatial_token"),
-        ("spatialvla", "config.json", {"action_token_begin_idx": 600}, "actions begin at 600 in the config and at 605"),
-        ("spatialvla", "config.json", {"spatial_token_num": 8190}, "has 8190 action tokens and 8194 bins"),
+        (
+            "openvla",
+            "config.json",
+            {"timm_override_act_layers": ["quick_gelu", None]},
+            "only the preprocessing",
+        ),
+        (
+            "spatialvla",
+            "config.json",
+            {"use_vision_zoe": False},
+            "only SpatialVLA with use_spatial_token",
+        ),
+        (
+            "spatialvla",
+            "config.json",
+            {"action_token_begin_idx": 600},
+            "actions begin at 600 in the config and at 605",
+        ),
+        (
+            "spatialvla",
+            "config.json",
+            {"spatial_token_num": 8190},
+            "has 8190 action tokens and 8194 bins",
+        ),
         ("spatialvla", "processor_config.json", {"intrinsic_config": {}}, "has no intrinsics"),
         ("spatialvla", "processor_config.json", {"bin_policy": {}}, "not in its documented form"),
     ],
@@ -230,7 +320,9 @@ def test_a_variant_that_is_not_run_here_is_refused(
 
 
 def test_a_tokenizer_that_begins_no_text_is_refused(altered: Altered) -> None:
-    folder = altered("openvla", json_edit("tokenizer.json", lambda content: content.update(post_processor=None)))
+    folder = altered(
+        "openvla", json_edit("tokenizer.json", lambda content: content.update(post_processor=None))
+    )
     with pytest.raises(ModelError, match="the tokenizer does not begin a text with <s>"):
         _load("openvla", folder)
 
@@ -240,7 +332,9 @@ def test_weights_that_are_no_numbers_are_refused_when_it_acts(
     family: str, altered: Altered, plain_frames: tuple[FrameRef, FrameRef]
 ) -> None:
     key = "language_model.lm_head.weight"
-    folder = altered(family, weights_edit(lambda weights: weights | {key: weights[key] * torch.nan}))
+    folder = altered(
+        family, weights_edit(lambda weights: weights | {key: weights[key] * torch.nan})
+    )
     with pytest.raises(ModelError, match="action token 1 has no finite score"):
         _load(family, folder).act(plain_frames[0], "pick up the mug")
 
@@ -254,5 +348,7 @@ def test_misuse_is_refused_before_anything_is_looked_for(name: str) -> None:
 
 
 def test_attention_that_cannot_read_in_both_directions_is_refused() -> None:
-    with pytest.raises(UsageError, match="cannot attend to the prefix in both directions; use eager or sdpa"):
+    with pytest.raises(
+        UsageError, match="cannot attend to the prefix in both directions; use eager or sdpa"
+    ):
         load("spatialvla-tiny", {"attn_implementation": "flex_attention"}, 0)

@@ -35,7 +35,9 @@ def test_without_the_constraint_others_are_clipped_as_the_originals_do() -> None
 
     assert decode_greedily(_scores(best=9), step, LEGAL, constrained=False) == [5, 6]
     assert fed == [9]  # what was written is what the model reads; only what it means is clipped
-    assert decode_greedily(_scores(best=4), lambda token: _scores(best=7), LEGAL, constrained=False) == [4, 7]
+    assert decode_greedily(
+        _scores(best=4), lambda token: _scores(best=7), LEGAL, constrained=False
+    ) == [4, 7]
 
 
 @pytest.mark.parametrize("bad", [torch.nan, torch.inf])

@@ -18,7 +18,11 @@ def _firsts(ensemble: ExponentialEnsemble, *chunks: np.ndarray) -> list[float]:
 
 def test_what_several_chunks_say_of_a_step_is_averaged_the_newest_counting_most() -> None:
     averages = _firsts(
-        ExponentialEnsemble(), _chunk(1, 10, 100), _chunk(2, 20, 200), _chunk(3, 30, 300), _chunk(4, 40, 400)
+        ExponentialEnsemble(),
+        _chunk(1, 10, 100),
+        _chunk(2, 20, 200),
+        _chunk(3, 30, 300),
+        _chunk(4, 40, 400),
     )
     one, two = math.exp(0.8), math.exp(1.6)
     assert averages == pytest.approx(
@@ -26,7 +30,8 @@ def test_what_several_chunks_say_of_a_step_is_averaged_the_newest_counting_most(
             1,
             (10 + one * 2) / (1 + one),
             (100 + one * 20 + two * 3) / (1 + one + two),
-            (200 + one * 30 + two * 4) / (1 + one + two),  # the first chunk says nothing of the fourth step
+            (200 + one * 30 + two * 4)
+            / (1 + one + two),  # the first chunk says nothing of the fourth step
         ]
     )
 

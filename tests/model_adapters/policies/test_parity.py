@@ -49,8 +49,12 @@ def test_the_same_policy_behind_a_server_is_equal(
     given = {"pretrained": str(policy_checkpoints[family]), "device": "cpu"}
     theirs = load_policy(family, given)
     with synthetic_frames() as frames, serving(policy_answers(theirs)) as url:
-        report = compare_policies(load_policy(family, given), reference_policy(url, None), frames, INSTRUCTIONS, 1e-6)
-        apart = compare_policies(policies["openvla"], reference_policy(url, None), frames[:1], INSTRUCTIONS[:1], 1e-6)
+        report = compare_policies(
+            load_policy(family, given), reference_policy(url, None), frames, INSTRUCTIONS, 1e-6
+        )
+        apart = compare_policies(
+            policies["openvla"], reference_policy(url, None), frames[:1], INSTRUCTIONS[:1], 1e-6
+        )
     assert report.equal
     assert [row.cells[1] for row in report.table().rows] == ["6"] * 3
     assert {row.cells[2] for row in report.table().rows} == {"1" if family == "openvla" else "4"}
@@ -67,7 +71,9 @@ def test_differences_are_told_by_kind(plain_frames: tuple[FrameRef, FrameRef]) -
     assert compare_policies(ours, theirs, plain_frames, ["x"], 1.0).equal
 
 
-def test_more_steps_than_the_other_gives_is_a_difference(plain_frames: tuple[FrameRef, FrameRef]) -> None:
+def test_more_steps_than_the_other_gives_is_a_difference(
+    plain_frames: tuple[FrameRef, FrameRef],
+) -> None:
     ours: Any = Still(STEP, STEP)
     theirs: Any = Still(STEP)
     report = compare_policies(ours, theirs, plain_frames, ["x"], 1e9)
@@ -92,5 +98,7 @@ def test_a_folder_without_pictures_is_refused(tmp_path: Path) -> None:
 def test_misuse_is_refused() -> None:
     with pytest.raises(UsageError, match=r"--reference-url: url is not the address of a server"):
         reference_policy("host", None)
-    with pytest.raises(UsageError, match=r"qwen2\.5-vl-tiny is not a policy; compare openvla or spatialvla"):
+    with pytest.raises(
+        UsageError, match=r"qwen2\.5-vl-tiny is not a policy; compare openvla or spatialvla"
+    ):
         load_policy("qwen2.5-vl-tiny", {})

@@ -30,7 +30,9 @@ class Scripted:
 
 
 def _policy(chunk: Any, **options: Any) -> VlaPolicy:
-    return VlaPolicy("scripted", Scripted(chunk), STATISTICS, PolicyOptions(**options), {"checkpoint": "none"})
+    return VlaPolicy(
+        "scripted", Scripted(chunk), STATISTICS, PolicyOptions(**options), {"checkpoint": "none"}
+    )
 
 
 STEP = [0.5, -0.5, 0.0, 0.1, 0.2, 0.3, 1.0]
@@ -53,7 +55,9 @@ def test_so_many_steps_of_a_chunk_are_given_out(
     assert len(_policy([STEP] * 4, execute=execute).act(plain_frames[0], "x")) == n_steps
 
 
-def test_an_ensemble_gives_out_one_step_and_forgets_at_reset(plain_frames: tuple[FrameRef, FrameRef]) -> None:
+def test_an_ensemble_gives_out_one_step_and_forgets_at_reset(
+    plain_frames: tuple[FrameRef, FrameRef],
+) -> None:
     chunk = [STEP, [0.0] * 7]
     policy = _policy(chunk, ensemble="exp")
     first = policy.act(plain_frames[0], "x")
@@ -76,11 +80,16 @@ def test_the_gripper_is_held_between_closed_and_open() -> None:
     [
         ([[*STEP[:3], float("nan"), *STEP[4:]]], "scripted gave an action that is not finite"),
         ([[float("inf"), *STEP[1:]]], "not finite"),
-        (RuntimeError("CUDA out of memory. Tried to allocate"), "scripted fails on the request .*out of memory"),
+        (
+            RuntimeError("CUDA out of memory. Tried to allocate"),
+            "scripted fails on the request .*out of memory",
+        ),
         (MemoryError("none left"), "scripted fails on the request"),
     ],
 )
-def test_what_is_no_action_is_refused(chunk: Any, message: str, plain_frames: tuple[FrameRef, FrameRef]) -> None:
+def test_what_is_no_action_is_refused(
+    chunk: Any, message: str, plain_frames: tuple[FrameRef, FrameRef]
+) -> None:
     with pytest.raises(ModelError, match=message):
         _policy(chunk).act(plain_frames[0], "x")
 
@@ -100,7 +109,9 @@ def test_a_bad_chunk_does_not_stay_in_the_average(plain_frames: tuple[FrameRef, 
     assert policy.act(plain_frames[0], "x")[0].gripper == 1.0
 
 
-def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: tuple[FrameRef, FrameRef]) -> None:
+def test_a_frame_that_is_not_there_is_a_fault_of_the_data(
+    plain_frames: tuple[FrameRef, FrameRef],
+) -> None:
     with pytest.raises(DataError):
         _policy([STEP]).act(FrameRef(plain_frames[0].path.with_name("none.png")), "x")
 

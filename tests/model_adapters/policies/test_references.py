@@ -18,7 +18,10 @@ from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.preprocessing import resize
 
 # A patch's features, of every 16th number: OpenVLA's as its towers give them, SpatialVLA's as Gemma sees them.
-FEATURES = {"openvla": [3.8063, 4.3223, 2.4657, -9.9152, 1.4795], "spatialvla": [0.3502, 0.1778, 0.865, 0.7166]}
+FEATURES = {
+    "openvla": [3.8063, 4.3223, 2.4657, -9.9152, 1.4795],
+    "spatialvla": [0.3502, 0.1778, 0.865, 0.7166],
+}
 ACTIONS = {
     "openvla": [[0.019247, -0.015948, 0.02291, -0.014184, 0.075556, -0.038771, 0.956863]],
     "spatialvla": [
@@ -41,7 +44,9 @@ def frame(tmp_path_factory: pytest.TempPathFactory) -> FrameRef:
 @torch.inference_mode()
 def _features(family: str, network: Any, image: Image.Image) -> torch.Tensor:
     if family == "openvla":
-        values: torch.Tensor = network.weights.vision_backbone(resize(image, network.image_size)[None])
+        values: torch.Tensor = network.weights.vision_backbone(
+            resize(image, network.image_size)[None]
+        )
         return values
     return network.features(image)  # type: ignore[no-any-return]
 
@@ -53,7 +58,9 @@ def test_features_are_theirs(family: str, policies: dict[str, VlaPolicy], frame:
 
 
 @pytest.mark.parametrize("family", ACTIONS)
-def test_actions_are_theirs(family: str, policy_checkpoints: dict[str, Path], frame: FrameRef) -> None:
+def test_actions_are_theirs(
+    family: str, policy_checkpoints: dict[str, Path], frame: FrameRef
+) -> None:
     given = {"pretrained": str(policy_checkpoints[family]), "device": "cpu", "ensemble": "none"}
     steps = load(family, given, 0).act(frame, "pick up the mug")  # type: ignore[union-attr]
     values = [(*step.translation, *step.rotation, step.gripper) for step in steps]

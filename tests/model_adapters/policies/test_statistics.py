@@ -6,7 +6,11 @@ import pytest
 from infthor_eval.errors import ModelError, UsageError
 from model_adapters.policies.statistics import ActionStatistics, select_statistics
 
-ARM = {"q01": [-1.0, 0, 0, 0, 0, 0, 0], "q99": [3.0, 1, 1, 1, 1, 1, 1], "mask": [True] * 6 + [False]}
+ARM = {
+    "q01": [-1.0, 0, 0, 0, 0, 0, 0],
+    "q99": [3.0, 1, 1, 1, 1, 1, 1],
+    "mask": [True] * 6 + [False],
+}
 KNOWN = {"a": {"action": ARM}, "b": {"action": ARM | {"q99": [5.0, 1, 1, 1, 1, 1, 1]}}}
 
 
@@ -33,13 +37,18 @@ def test_the_only_dataset_is_the_default() -> None:
 
 
 def test_of_several_one_must_be_chosen() -> None:
-    with pytest.raises(UsageError, match=r"mine was trained on several datasets; choose one with unnorm_key= of a, b"):
+    with pytest.raises(
+        UsageError,
+        match=r"mine was trained on several datasets; choose one with unnorm_key= of a, b",
+    ):
         select_statistics(KNOWN, None, "mine")
 
 
 @pytest.mark.parametrize("known", [KNOWN, {"a": KNOWN["a"]}])
 def test_an_unknown_dataset_lists_the_known(known: dict[str, object]) -> None:
-    with pytest.raises(UsageError, match=r"unnorm_key=c is not a dataset of mine; there are " + ", ".join(known)):
+    with pytest.raises(
+        UsageError, match=r"unnorm_key=c is not a dataset of mine; there are " + ", ".join(known)
+    ):
         select_statistics(known, "c", "mine")
 
 

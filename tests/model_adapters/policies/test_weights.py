@@ -67,7 +67,11 @@ def test_parameters_take_no_memory_before_they_are_loaded() -> None:
         ("head.weight", {}, r"lacks head\.weight"),
         (None, {"extra": torch.ones(1)}, "has unknown extra"),
         (None, {"old.bias": torch.ones(3)}, r"another shape in old\.bias \[3\] instead of \[2\]"),
-        (None, {"head.weight": torch.ones(5, 3)}, r"another shape in head\.weight \[5, 3\] instead of \[5, 2\]"),
+        (
+            None,
+            {"head.weight": torch.ones(5, 3)},
+            r"another shape in head\.weight \[5, 3\] instead of \[5, 2\]",
+        ),
         ("old.bias", {"extra": torch.ones(1)}, "lacks old.bias; has unknown extra"),
         (
             None,
@@ -79,7 +83,10 @@ def test_parameters_take_no_memory_before_they_are_loaded() -> None:
 def test_any_other_key_or_shape_ends_the_loading(
     tmp_path: Path, without: str | None, also: dict[str, torch.Tensor], message: str
 ) -> None:
-    save_file({key: value for key, value in WHOLE.items() if key != without} | also, tmp_path / "model.safetensors")
+    save_file(
+        {key: value for key, value in WHOLE.items() if key != without} | also,
+        tmp_path / "model.safetensors",
+    )
     with pytest.raises(ModelError, match=message):
         _loaded(tmp_path)
 

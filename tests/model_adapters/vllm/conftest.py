@@ -16,7 +16,9 @@ from .double import Double
 def vllm(monkeypatch: pytest.MonkeyPatch) -> Double:
     """The double, found by whoever imports vLLM."""
     double = Double()
-    monkeypatch.setenv("VLLM_LOGGING_STREAM", "ext://sys.stderr")  # else the adapter sets it for all tests to come
+    monkeypatch.setenv(
+        "VLLM_LOGGING_STREAM", "ext://sys.stderr"
+    )  # else the adapter sets it for all tests to come
     for name, module in double.modules().items():
         monkeypatch.setitem(sys.modules, name, module)
     return double
@@ -41,8 +43,15 @@ def in_process(checkpoints: dict[str, Path]) -> Iterator[Callable[..., Any]]:
     def get(family: str, name: str | None = None, **options: object) -> Any:
         key = (family, str(sorted(options.items())))
         if key not in loaded:
-            given = {"pretrained": checkpoints[family], "dtype": "float32", "device": "cpu", **options}
-            loaded[key] = load(name or family, {option: str(value) for option, value in given.items()}, 0)
+            given = {
+                "pretrained": checkpoints[family],
+                "dtype": "float32",
+                "device": "cpu",
+                **options,
+            }
+            loaded[key] = load(
+                name or family, {option: str(value) for option, value in given.items()}, 0
+            )
         return loaded[key]
 
     yield get

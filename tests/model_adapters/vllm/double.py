@@ -19,8 +19,8 @@ import torch
 from PIL import Image
 from transformers import StoppingCriteriaList
 
-from model_adapters.hf.checkpoint import load_checkpoint, locate
 from model_adapters.hf.families.hf_vlm import ProcessorFamily, family_of, load_processor
+from model_adapters.hf.loading.checkpoint import load_checkpoint, locate
 from model_adapters.options.checkpoints import CheckpointOptions
 from model_adapters.policies.decoding import embed_ids
 from model_adapters.policies.openvla.adapter import OpenVLA
@@ -75,7 +75,9 @@ class _Vlm:
 
     def __init__(self, arguments: Mapping[str, Any]) -> None:
         dtype = arguments.get("dtype", "auto")
-        located = locate(CheckpointOptions(pretrained=arguments["model"], dtype=dtype, device="cpu"))
+        located = locate(
+            CheckpointOptions(pretrained=arguments["model"], dtype=dtype, device="cpu")
+        )
         for part, changed in arguments.get("hf_overrides", {}).items():
             for name, value in changed.items():
                 setattr(getattr(located.config, part), name, _as_read(name, value))
@@ -85,8 +87,14 @@ class _Vlm:
         self._loaded = load_checkpoint(located, family)
         self.limit: int = located.config.get_text_config().max_position_embeddings
 
-    def read(self, ids: Sequence[int], images: Sequence[Image.Image], names: Sequence[str]) -> _Read:
-        family, prompt_read, frames = self._loaded.family, _Read([], []), iter(zip(images, names, strict=True))
+    def read(
+        self, ids: Sequence[int], images: Sequence[Image.Image], names: Sequence[str]
+    ) -> _Read:
+        family, prompt_read, frames = (
+            self._loaded.family,
+            _Read([], []),
+            iter(zip(images, names, strict=True)),
+        )
         for token in ids:
             expanded, name = (token,), ""
             if token == family.placeholder_id:
@@ -97,7 +105,9 @@ class _Vlm:
         assert next(frames, None) is None, "more images than placeholders"
         return prompt_read
 
-    def write(self, ids: list[int], images: Sequence[Image.Image], params: SamplingParams) -> tuple[list[int], str]:
+    def write(
+        self, ids: list[int], images: Sequence[Image.Image], params: SamplingParams
+    ) -> tuple[list[int], str]:
         tokenizer, model = self._loaded.tokenizer, self._loaded.model
 
         def said(written: Sequence[int]) -> str:
@@ -116,7 +126,9 @@ class _Vlm:
                 max_new_tokens=params.max_tokens,
                 do_sample=params.temperature > 0,
                 **(
-                    {"temperature": params.temperature, "top_p": params.top_p, "top_k": 0} if params.temperature else {}
+                    {"temperature": params.temperature, "top_p": params.top_p, "top_k": 0}
+                    if params.temperature
+                    else {}
                 ),
                 repetition_penalty=params.repetition_penalty,
                 eos_token_id=ends,
@@ -140,7 +152,9 @@ class _Vlm:
         inputs: dict[str, Any] = {"input_ids": rows, "attention_mask": torch.ones_like(rows)}
         takes = inspect.signature(self._loaded.model.forward).parameters
         if images:
-            processed = self._loaded.family._image_processor(images=list(images), return_tensors="pt")
+            processed = self._loaded.family._image_processor(
+                images=list(images), return_tensors="pt"
+            )
             inputs |= {name: value for name, value in processed.items() if name in takes}
         if "mm_token_type_ids" in takes:
             inputs["mm_token_type_ids"] = (rows == self._loaded.family.slot_id).int()
@@ -157,7 +171,9 @@ def _held(
     def allowed(_: int, row: torch.Tensor) -> list[int]:
         written = row[n:].tolist()
         begun = [ids for ids in spelled if ids[: len(written)] == written]
-        return [ids[len(written)] for ids in begun if len(ids) > len(written)] + (ends if written in spelled else [])
+        return [ids[len(written)] for ids in begun if len(ids) > len(written)] + (
+            ends if written in spelled else []
+        )
 
     return allowed
 
@@ -169,24 +185,32 @@ class _OpenVLA:
     cut = None  # it says nothing
 
     def __init__(self, arguments: Mapping[str, Any]) -> None:
-        options = OpenVLA.Options(pretrained=arguments["model"], dtype=arguments["dtype"], device="cpu")
+        options = OpenVLA.Options(
+            pretrained=arguments["model"], dtype=arguments["dtype"], device="cpu"
+        )
         self._network = OpenVLA.build("openvla", options, 0)._network
 
-    def read(self, ids: Sequence[int], images: Sequence[Image.Image], names: Sequence[str]) -> _Read:
+    def read(
+        self, ids: Sequence[int], images: Sequence[Image.Image], names: Sequence[str]
+    ) -> _Read:
         assert len(images) == 1, "OpenVLA takes one image"
         n_patches = self._patches(images[0]).shape[1]
         expanded = [ids[0], *[32_000] * n_patches, *ids[1:]]
         return _Read(expanded, [(token, names[0] if token == 32_000 else "") for token in expanded])
 
     @torch.inference_mode()
-    def write(self, ids: list[int], images: Sequence[Image.Image], params: SamplingParams) -> tuple[list[int], str]:
+    def write(
+        self, ids: list[int], images: Sequence[Image.Image], params: SamplingParams
+    ) -> tuple[list[int], str]:
         assert params.temperature == 0 and params.ignore_eos
         model, patches = self._network.weights.language_model, self._patches(images[0])
         text, written = [token for token in ids if token != 32_000], []
         assert text[-1] == 29_871
         for _ in range(params.max_tokens):
             embeds = embed_ids(model, text + written)
-            logits = model(inputs_embeds=torch.cat([embeds[:, :1], patches, embeds[:, 1:]], dim=1)).logits[0, -1]
+            logits = model(
+                inputs_embeds=torch.cat([embeds[:, :1], patches, embeds[:, 1:]], dim=1)
+            ).logits[0, -1]
             held = torch.full_like(logits, -torch.inf)
             allowed = torch.tensor(params.allowed_token_ids or range(len(logits)))
             held[allowed] = logits[allowed]
@@ -237,12 +261,18 @@ class Double:
 
     def modules(self) -> dict[str, ModuleType]:
         """What `import vllm` is to find, by name."""
-        top, params, platforms = (ModuleType(name) for name in ("vllm", "vllm.sampling_params", "vllm.platforms"))
+        top, params, platforms = (
+            ModuleType(name) for name in ("vllm", "vllm.sampling_params", "vllm.platforms")
+        )
         vars(platforms).update(current_platform=SimpleNamespace(is_cpu=lambda: self.on_cpu))
         vars(top).update(
-            LLM=functools.partial(_LLM, self), SamplingParams=SamplingParams, __version__=SIGNATURES["version"]
+            LLM=functools.partial(_LLM, self),
+            SamplingParams=SamplingParams,
+            __version__=SIGNATURES["version"],
         )
-        vars(params).update(StructuredOutputsParams=StructuredOutputsParams, SamplingParams=SamplingParams)
+        vars(params).update(
+            StructuredOutputsParams=StructuredOutputsParams, SamplingParams=SamplingParams
+        )
         return {module.__name__: module for module in (top, params, platforms)}
 
 
@@ -261,7 +291,9 @@ class _LLM:
         self._caches = arguments.get("enable_prefix_caching", True)
         self._seen: list[list[tuple[int, str]]] = []
 
-    def generate(self, prompts: Any, sampling_params: SamplingParams | None = None, **given: Any) -> list[Any]:
+    def generate(
+        self, prompts: Any, sampling_params: SamplingParams | None = None, **given: Any
+    ) -> list[Any]:
         _checked("LLM.generate", given)
         double = self._double
         double.calls.append(_Call(prompts, sampling_params or SamplingParams()))
@@ -278,7 +310,9 @@ class _LLM:
     def _read(self, prompt: dict[str, Any]) -> _Read:
         _checked("TokensPrompt", prompt)
         images = prompt.get("multi_modal_data", {}).get("image", [])
-        names = prompt.get("multi_modal_uuids", {}).get("image") or [_hash(image) for image in images]
+        names = prompt.get("multi_modal_uuids", {}).get("image") or [
+            _hash(image) for image in images
+        ]
         if len(images) > self._most_frames:
             raise ValueError(f"At most {self._most_frames} image(s) may be provided in one prompt.")
         prompt_read = self._model.read(prompt["prompt_token_ids"], images, names)
@@ -292,20 +326,28 @@ class _LLM:
         common = max((_n_common(keys, seen) for seen in self._seen), default=0)
         return min(common, len(keys) - 1) // _BLOCK * _BLOCK
 
-    def _output(self, prompt: dict[str, Any], read: _Read, cached: int, params: SamplingParams) -> Any:
+    def _output(
+        self, prompt: dict[str, Any], read: _Read, cached: int, params: SamplingParams
+    ) -> Any:
         images = prompt.get("multi_modal_data", {}).get("image", [])
         said = self._double.would_say
-        ids, text = self._model.cut(said, params) if said else self._model.write(read.ids, images, params)
+        ids, text = (
+            self._model.cut(said, params) if said else self._model.write(read.ids, images, params)
+        )
         prompt_ids = read.ids + [0] * self._double.expands
         completion = SimpleNamespace(token_ids=ids, text=text)
-        return SimpleNamespace(outputs=[completion], prompt_token_ids=prompt_ids, num_cached_tokens=cached)
+        return SimpleNamespace(
+            outputs=[completion], prompt_token_ids=prompt_ids, num_cached_tokens=cached
+        )
 
 
 def _as_read(name: str, value: Any) -> Any:
     """What vLLM makes of an override: for positions on three axes it multiplies YaRN's original length by four."""
     if name != "rope_parameters" or "mrope_section" not in value:
         return value
-    return value | {"original_max_position_embeddings": 4 * value["original_max_position_embeddings"]}
+    return value | {
+        "original_max_position_embeddings": 4 * value["original_max_position_embeddings"]
+    }
 
 
 def _count(limit: int | dict[str, int]) -> int:
@@ -317,4 +359,7 @@ def _hash(image: Image.Image) -> str:
 
 
 def _n_common(one: Sequence[Any], other: Sequence[Any]) -> int:
-    return next((at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+    return next(
+        (at for at, (a, b) in enumerate(zip(one, other, strict=False)) if a != b),
+        min(len(one), len(other)),
+    )

@@ -13,13 +13,20 @@ from pathlib import Path
 
 # What the adapters use, by the file that has it: functions give their parameters, classes their fields.
 _WANTED = {
-    "vllm/entrypoints/llm.py": {"LLM": "LLM.__init__", "LLM.generate": "LLM.generate", "LLM.chat": "LLM.chat"},
+    "vllm/entrypoints/llm.py": {
+        "LLM": "LLM.__init__",
+        "LLM.generate": "LLM.generate",
+        "LLM.chat": "LLM.chat",
+    },
     "vllm/engine/arg_utils.py": {"EngineArgs": "EngineArgs"},
     "vllm/sampling_params.py": {
         "SamplingParams": "SamplingParams",
         "StructuredOutputsParams": "StructuredOutputsParams",
     },
-    "vllm/outputs.py": {"RequestOutput": "RequestOutput.__init__", "CompletionOutput": "CompletionOutput"},
+    "vllm/outputs.py": {
+        "RequestOutput": "RequestOutput.__init__",
+        "CompletionOutput": "CompletionOutput",
+    },
     "vllm/inputs/llm.py": {"TokensPrompt": "TokensPrompt"},
 }
 
@@ -27,15 +34,21 @@ _WANTED = {
 def _definition(tree: ast.Module, path: str) -> ast.ClassDef | ast.FunctionDef:
     """A class, or the last definition of a method: overloads come before it."""
     name, _, method = path.partition(".")
-    (of_class,) = [node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == name]
+    (of_class,) = [
+        node for node in tree.body if isinstance(node, ast.ClassDef) and node.name == name
+    ]
     if not method:
         return of_class
-    return [node for node in of_class.body if isinstance(node, ast.FunctionDef) and node.name == method][-1]
+    return [
+        node for node in of_class.body if isinstance(node, ast.FunctionDef) and node.name == method
+    ][-1]
 
 
 def _names(tree: ast.Module, node: ast.ClassDef | ast.FunctionDef) -> Iterator[str]:
     if isinstance(node, ast.FunctionDef):
-        yield from (arg.arg for arg in (*node.args.args, *node.args.kwonlyargs) if arg.arg != "self")
+        yield from (
+            arg.arg for arg in (*node.args.args, *node.args.kwonlyargs) if arg.arg != "self"
+        )
         return
     classes = {item.name: item for item in tree.body if isinstance(item, ast.ClassDef)}
     for base in node.bases:  # fields are inherited from classes of the same file

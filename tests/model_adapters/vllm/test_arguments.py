@@ -11,9 +11,15 @@ from transformers import LlamaConfig, Qwen2_5_VLConfig
 
 from infthor_eval.errors import ModelError, UsageError
 from model_adapters import check_options, options
-from model_adapters.hf.rope import apply_rope
+from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.vllm.adapter import Qwen25VLOnVllm
-from model_adapters.vllm.arguments import engine_arguments, frame_limit, model_arguments, rope_overrides, token_limit
+from model_adapters.vllm.arguments import (
+    engine_arguments,
+    frame_limit,
+    model_arguments,
+    rope_overrides,
+    token_limit,
+)
 from model_adapters.vllm.options import EngineOptions, VllmOptions
 
 from .double import SIGNATURES
@@ -26,7 +32,11 @@ def _qwen(rope: str) -> Any:
     config = Qwen2_5_VLConfig(
         text_config={
             "max_position_embeddings": 128_000,
-            "rope_parameters": {"rope_type": "default", "rope_theta": 1e6, "mrope_section": [16, 24, 24]},
+            "rope_parameters": {
+                "rope_type": "default",
+                "rope_theta": 1e6,
+                "mrope_section": [16, 24, 24],
+            },
         }
     )
     apply_rope(config, rope)
@@ -76,52 +86,62 @@ def test_every_option_arrives_under_vllms_name() -> None:
         frame_size=640,
         rope="yarn:4",
     )
-    assert model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12) == {
-        "model": "checkpoint",
-        "dtype": "bfloat16",
-        "seed": 7,
-        "tensor_parallel_size": 2,
-        "pipeline_parallel_size": 3,
-        "data_parallel_size": 4,
-        "distributed_executor_backend": "external_launcher",
-        "gpu_memory_utilization": 0.5,
-        "enforce_eager": True,
-        "quantization": "fp8",
-        "enable_prefix_caching": False,
-        "mm_processor_cache_gb": 0.0,
-        "max_num_seqs": 3,
-        "max_num_batched_tokens": 4_096,
-        "enable_chunked_prefill": False,
-        "block_size": 32,
-        "kv_cache_dtype": "fp8",
-        "kv_offloading_size": 1.5,
-        "decode_context_parallel_size": 2,
-        "prefill_context_parallel_size": 4,
-        "mm_encoder_tp_mode": "data",
-        "mm_encoder_attn_backend": "TORCH_SDPA",
-        "max_model_len": 9_999,
-        "trust_remote_code": True,
-        "limit_mm_per_prompt": {"image": {"count": 12, "width": 640, "height": 640}, "video": 0},
-        "mm_processor_kwargs": {"use_fast": False},
-        "hf_overrides": {
-            "text_config": {
-                "rope_parameters": {
-                    "rope_type": "yarn",
-                    "rope_theta": 1e6,
-                    "factor": 4.0,
-                    "original_max_position_embeddings": 32_000,  # vLLM makes four times as many of it
-                    "mrope_section": [16, 24, 24],
-                },
-                "max_position_embeddings": 512_000,
-            }
-        },
-    }
+    assert (
+        model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12)
+        == {
+            "model": "checkpoint",
+            "dtype": "bfloat16",
+            "seed": 7,
+            "tensor_parallel_size": 2,
+            "pipeline_parallel_size": 3,
+            "data_parallel_size": 4,
+            "distributed_executor_backend": "external_launcher",
+            "gpu_memory_utilization": 0.5,
+            "enforce_eager": True,
+            "quantization": "fp8",
+            "enable_prefix_caching": False,
+            "mm_processor_cache_gb": 0.0,
+            "max_num_seqs": 3,
+            "max_num_batched_tokens": 4_096,
+            "enable_chunked_prefill": False,
+            "block_size": 32,
+            "kv_cache_dtype": "fp8",
+            "kv_offloading_size": 1.5,
+            "decode_context_parallel_size": 2,
+            "prefill_context_parallel_size": 4,
+            "mm_encoder_tp_mode": "data",
+            "mm_encoder_attn_backend": "TORCH_SDPA",
+            "max_model_len": 9_999,
+            "trust_remote_code": True,
+            "limit_mm_per_prompt": {
+                "image": {"count": 12, "width": 640, "height": 640},
+                "video": 0,
+            },
+            "mm_processor_kwargs": {"use_fast": False},
+            "hf_overrides": {
+                "text_config": {
+                    "rope_parameters": {
+                        "rope_type": "yarn",
+                        "rope_theta": 1e6,
+                        "factor": 4.0,
+                        "original_max_position_embeddings": 32_000,  # vLLM makes four times as many of it
+                        "mrope_section": [16, 24, 24],
+                    },
+                    "max_position_embeddings": 512_000,
+                }
+            },
+        }
+    )
 
 
 def test_limits_of_a_frames_area_are_the_processors() -> None:
     typed = Qwen25VLOnVllm.Options(min_pixels=100, max_pixels=200, image_backend="torchvision")
     arguments = model_arguments(FOLDER, _qwen("yarn:2"), typed, max_tokens=10, max_frames=1)
-    assert arguments["mm_processor_kwargs"] == {"use_fast": True, "min_pixels": 100, "max_pixels": 200}
+    assert arguments["mm_processor_kwargs"] == {
+        "use_fast": True,
+        "min_pixels": 100,
+        "max_pixels": 200,
+    }
     assert "hf_overrides" not in arguments
 
 
@@ -143,7 +163,9 @@ def test_limits_of_a_frames_area_are_the_processors() -> None:
 def test_whatever_is_chosen_vllm_takes_all_of_it_and_no_none(chosen: dict[str, Any]) -> None:
     typed = VllmOptions(pretrained="x", max_frames=chosen.pop("image", None), **chosen)
     config = SimpleNamespace()
-    arguments = model_arguments(FOLDER, config, typed, max_tokens=100, max_frames=frame_limit(100, 7, typed))
+    arguments = model_arguments(
+        FOLDER, config, typed, max_tokens=100, max_frames=frame_limit(100, 7, typed)
+    )
     assert set(arguments) <= TAKEN
     assert None not in arguments.values()
     assert arguments["limit_mm_per_prompt"]["image"]["count"] == (typed.max_frames or 14)
@@ -153,17 +175,25 @@ def test_a_frame_is_taken_even_where_none_would_fit() -> None:
     assert frame_limit(100, 121, VllmOptions(pretrained="x")) == 1
 
 
-@pytest.mark.parametrize(("typed", "own", "limit"), [(None, 128_000, 128_000), (4_096, 128_000, 4_096), (9, None, 9)])
-def test_the_limit_is_what_was_asked_for_or_the_checkpoints(typed: int | None, own: int | None, limit: int) -> None:
+@pytest.mark.parametrize(
+    ("typed", "own", "limit"), [(None, 128_000, 128_000), (4_096, 128_000, 4_096), (9, None, 9)]
+)
+def test_the_limit_is_what_was_asked_for_or_the_checkpoints(
+    typed: int | None, own: int | None, limit: int
+) -> None:
     assert token_limit("x", own, VllmOptions(pretrained="x", max_model_len=typed)) == limit
 
 
 def test_a_checkpoint_without_a_limit_needs_one() -> None:
-    with pytest.raises(ModelError, match="the config of x has no context limit; give max_model_len="):
+    with pytest.raises(
+        ModelError, match="the config of x has no context limit; give max_model_len="
+    ):
         token_limit("x", None, VllmOptions(pretrained="x"))
 
 
-@pytest.mark.parametrize(("rope_type", "longer"), [("yarn", True), ("longrope-scaled", True), ("linear", False)])
+@pytest.mark.parametrize(
+    ("rope_type", "longer"), [("yarn", True), ("longrope-scaled", True), ("linear", False)]
+)
 def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type: str, longer: bool) -> None:
     config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
     apply_rope(config, f"{rope_type}:2")
@@ -174,31 +204,41 @@ def test_a_model_of_one_part_has_its_extension_at_the_top(rope_type: str, longer
 
 
 @pytest.mark.parametrize(("rope", "scale"), [("longrope:2", 1.0), ("longrope-scaled:2", None)])
-def test_the_published_longrope_tells_vllm_that_attention_is_not_scaled(rope: str, scale: float | None) -> None:
+def test_the_published_longrope_tells_vllm_that_attention_is_not_scaled(
+    rope: str, scale: float | None
+) -> None:
     config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
     apply_rope(config, rope)
     overrides = rope_overrides(config, rope)
-    assert [overrides["rope_parameters"].get(f"{length}_mscale") for length in ("short", "long")] == [scale, scale]
+    assert [
+        overrides["rope_parameters"].get(f"{length}_mscale") for length in ("short", "long")
+    ] == [scale, scale]
     assert overrides["max_position_embeddings"] == 200
 
 
 @pytest.mark.parametrize("rope", ["linear:2", "longrope:2", "longrope-scaled:2"])
 def test_an_extension_that_would_lose_the_three_axes_is_refused(rope: str) -> None:
-    with pytest.raises(ModelError, match=r"qwen2_5_vl, which has three-axis positions, .* only yarn; use yarn:2"):
+    with pytest.raises(
+        ModelError, match=r"qwen2_5_vl, which has three-axis positions, .* only yarn; use yarn:2"
+    ):
         rope_overrides(_qwen(rope), rope)
 
 
 def test_a_dynamic_extension_is_refused_as_vllm_answers_nonsense_with_it() -> None:
     config = LlamaConfig(max_position_embeddings=100, hidden_size=64, num_attention_heads=4)
     apply_rope(config, "dynamic:2")
-    with pytest.raises(ModelError, match=r"rope=dynamic:2: vLLM has angles up to the original length .* use yarn:2"):
+    with pytest.raises(
+        ModelError, match=r"rope=dynamic:2: vLLM has angles up to the original length .* use yarn:2"
+    ):
         rope_overrides(config, "dynamic:2")
 
 
 def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
     config = _qwen("yarn:2")
     config.model_type = "qwen9_vl"
-    with pytest.raises(ModelError, match=r"rope=yarn:2: of qwen9_vl, .* not known whether .* --engine transformers"):
+    with pytest.raises(
+        ModelError, match=r"rope=yarn:2: of qwen9_vl, .* not known whether .* --engine transformers"
+    ):
         rope_overrides(config, "yarn:2")
 
 
@@ -236,6 +276,7 @@ def test_a_policys_options_are_refused_likewise(given: dict[str, str]) -> None:
 @pytest.mark.parametrize("name", ["qwen2.5-vl", "llava-onevision", "pixtral", "openvla"])
 def test_both_engines_load_the_same_checkpoint_where_none_is_named(name: str) -> None:
     named = [
-        next(each for each in options(known).split(", ") if "pretrained=" in each) for known in (name, f"{name}@vllm")
+        next(each for each in options(known).split(", ") if "pretrained=" in each)
+        for known in (name, f"{name}@vllm")
     ]
     assert named[0] == named[1] != "pretrained="

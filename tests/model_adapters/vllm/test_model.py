@@ -52,7 +52,9 @@ def test_replies_and_counts_are_those_of_transformers(
         assert replies[0].n_context_tokens == talks[0].n_tokens
 
 
-@pytest.mark.parametrize("options", [{"prompt": "plain"}, {"rope": "yarn:4"}, {"max_pixels": 3_200}])
+@pytest.mark.parametrize(
+    "options", [{"prompt": "plain"}, {"rope": "yarn:4"}, {"max_pixels": 3_200}]
+)
 def test_options_that_change_what_is_read_change_it_alike(
     options: dict[str, Any], start: Start, in_process: Start, frames: list[FrameRef]
 ) -> None:
@@ -63,18 +65,30 @@ def test_options_that_change_what_is_read_change_it_alike(
         return
     assert facts(ours.answer(turns, up_to(8))) == facts(theirs.answer(turns, up_to(8)))
     assert ours.capabilities.max_tokens == theirs.capabilities.max_tokens
-    assert ours.capabilities.max_tokens_before_extension == theirs.capabilities.max_tokens_before_extension
+    assert (
+        ours.capabilities.max_tokens_before_extension
+        == theirs.capabilities.max_tokens_before_extension
+    )
 
 
 @pytest.mark.parametrize("rope", ["linear:2", "yarn:2"])
 def test_a_model_of_one_axis_is_extended_alike(
     rope: str, start: Start, in_process: Start, vllm: Double, frames: list[FrameRef]
 ) -> None:
-    ours, theirs, turns = start("pixtral", rope=rope), in_process("pixtral", rope=rope), user(frames[0], "Where?" * 20)
-    assert vllm.started[0]["hf_overrides"]["text_config"]["rope_parameters"]["rope_type"] == rope.partition(":")[0]
+    ours, theirs, turns = (
+        start("pixtral", rope=rope),
+        in_process("pixtral", rope=rope),
+        user(frames[0], "Where?" * 20),
+    )
+    assert (
+        vllm.started[0]["hf_overrides"]["text_config"]["rope_parameters"]["rope_type"]
+        == rope.partition(":")[0]
+    )
     extended = theirs.answer(turns, up_to(12))
     assert (
-        facts(ours.answer(turns, up_to(12))) == facts(extended) != facts(in_process("pixtral").answer(turns, up_to(12)))
+        facts(ours.answer(turns, up_to(12)))
+        == facts(extended)
+        != facts(in_process("pixtral").answer(turns, up_to(12)))
     )
 
 
@@ -84,10 +98,13 @@ def test_a_checkpoint_with_a_penalty_is_written_with_it(
     folder = tmp_path / "penalised"
     shutil.copytree(checkpoints["qwen2.5-vl"], folder)
     settings = json.loads((folder / "generation_config.json").read_text())
-    (folder / "generation_config.json").write_text(json.dumps(settings | {"repetition_penalty": 20.0}))
+    (folder / "generation_config.json").write_text(
+        json.dumps(settings | {"repetition_penalty": 20.0})
+    )
     turns, decoding = user("Where is the mug?"), up_to(40)
     ours, theirs = (
-        make(pretrained=folder).answer(turns, decoding) for make in (start, partial(in_process, "qwen2.5-vl"))
+        make(pretrained=folder).answer(turns, decoding)
+        for make in (start, partial(in_process, "qwen2.5-vl"))
     )
     assert facts(ours) == facts(theirs) != facts(in_process("qwen2.5-vl").answer(turns, decoding))
     assert vllm.calls[-1].params.repetition_penalty == 20.0
@@ -101,7 +118,9 @@ def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
     ours, theirs, turns = start(), in_process("qwen2.5-vl"), user(frames[0], "Where?")
     whole = theirs.answer(turns, up_to(12)).text
     for stop in (whole[3:5], whole[-1], "never"):
-        replies = [model.answer(turns, up_to(12, stop=("not this", stop))) for model in (ours, theirs)]
+        replies = [
+            model.answer(turns, up_to(12, stop=("not this", stop))) for model in (ours, theirs)
+        ]
         assert facts(replies[0]) == facts(replies[1])
 
 
@@ -130,12 +149,17 @@ def test_special_tokens_stop_a_reply_and_are_no_text(
     ends = {tokenizer.convert_tokens_to_ids(end) for end in ("<|im_end|>", "<|endoftext|>")}
     assert not ends & set(reply.token_ids)
     assert ends <= set(vllm.calls[-1].params.stop_token_ids)
-    assert (tokenizer.convert_tokens_to_ids(SPECIAL) in vllm.calls[-1].params.stop_token_ids) == (SPECIAL in stop)
+    assert (tokenizer.convert_tokens_to_ids(SPECIAL) in vllm.calls[-1].params.stop_token_ids) == (
+        SPECIAL in stop
+    )
 
 
 def test_draws_are_the_requests_own(start: Start, vllm: Double) -> None:
     model = start()
-    replies = [model.answer(user("Say it."), up_to(8, temperature=2.0, top_p=0.9, seed=seed)) for seed in (3, 4, 3)]
+    replies = [
+        model.answer(user("Say it."), up_to(8, temperature=2.0, top_p=0.9, seed=seed))
+        for seed in (3, 4, 3)
+    ]
     assert replies[0].text == replies[2].text != replies[1].text
     params = vllm.calls[-1].params
     assert (params.temperature, params.top_p, params.seed) == (2.0, 0.9, 3)
@@ -155,7 +179,9 @@ def test_a_reply_is_held_to_choices_and_no_stop_string_cuts_it(
     assert (params.structured_outputs.choice, params.stop) == (["on the table", "in the sink"], [])
 
 
-def test_a_choice_that_does_not_fit_is_refused_before_vllm_is_asked(start: Start, vllm: Double) -> None:
+def test_a_choice_that_does_not_fit_is_refused_before_vllm_is_asked(
+    start: Start, vllm: Double
+) -> None:
     with pytest.raises(ModelError, match=r"has .* tokens and a reply may have 2"):
         start().answer(user("x"), up_to(2, choices=("on the kitchen table",)))
     assert vllm.calls == []
@@ -164,13 +190,19 @@ def test_a_choice_that_does_not_fit_is_refused_before_vllm_is_asked(start: Start
 def test_a_reply_that_is_no_choice_fails(start: Start, vllm: Double) -> None:
     model = start()
     vllm.would_say = model._loaded.tokenizer("mug", add_special_tokens=False)["input_ids"]
-    with pytest.raises(ModelError, match=r"vLLM 0\.33\.0 answers 'mug', which is none of the 2 choices"):
+    with pytest.raises(
+        ModelError, match=r"vLLM 0\.33\.0 answers 'mug', which is none of the 2 choices"
+    ):
         model.answer(user("x"), up_to(20, choices=("yes", "no")))
 
 
-def test_a_processor_that_joins_words_and_frames_is_refused_before_vllm_starts(start: Start, vllm: Double) -> None:
+def test_a_processor_that_joins_words_and_frames_is_refused_before_vllm_starts(
+    start: Start, vllm: Double
+) -> None:
     # Gemma 3 makes one token of the line breaks after a frame and before the words that follow.
-    with pytest.raises(ModelError, match=r"token ids differ .*: gemma3 cannot be run in vLLM; use --engine transf"):
+    with pytest.raises(
+        ModelError, match=r"token ids differ .*: gemma3 cannot be run in vLLM; use --engine transf"
+    ):
         start("gemma3-line-breaks", "hf-vlm")
     assert vllm.started == []
 
@@ -197,7 +229,9 @@ def test_of_continuations_the_first_goes_alone_and_the_others_find_its_prefix(
     assert all(reply.n_cached_tokens >= shared > 0 for reply in replies[1:])
 
 
-def test_what_was_just_read_is_warm_already(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
+def test_what_was_just_read_is_warm_already(
+    start: Start, vllm: Double, frames: list[FrameRef]
+) -> None:
     talk = _talk(start(), *frames)
     talk.replies([["\nOne?"], ["\nTwo?"]], up_to(2))
     more = talk.replies([["\nThree?"], ["\nFour?"]], up_to(2))
@@ -214,12 +248,18 @@ def test_the_first_of_each_context_go_together_and_then_the_others(
     replies = start().conversation().replies(asked, up_to(4))
     assert [len(call.prompts) for call in vllm.calls] == [3, 2]
     assert min(replies[1].n_cached_tokens, replies[3].n_cached_tokens) > 40
-    theirs = [in_process("qwen2.5-vl").conversation().replies([parts], up_to(4))[0] for parts in asked]
+    theirs = [
+        in_process("qwen2.5-vl").conversation().replies([parts], up_to(4))[0] for parts in asked
+    ]
     assert [facts(reply) for reply in replies] == [facts(reply) for reply in theirs]
 
 
-def test_without_a_cache_all_go_together(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
-    replies = _talk(start(prefix_caching=False), *frames).replies([["\nOne?"], ["\nTwo?"]], up_to(2))
+def test_without_a_cache_all_go_together(
+    start: Start, vllm: Double, frames: list[FrameRef]
+) -> None:
+    replies = _talk(start(prefix_caching=False), *frames).replies(
+        [["\nOne?"], ["\nTwo?"]], up_to(2)
+    )
     assert [len(call.prompts) for call in vllm.calls] == [2]
     assert [reply.n_cached_tokens for reply in replies] == [0, 0]
     assert vllm.started[0]["enable_prefix_caching"] is False
@@ -230,7 +270,10 @@ def test_other_frames_are_no_warm_prefix(start: Start, frames: list[FrameRef]) -
     first = model.answer(user(*frames[:3], "What?"), up_to(2))
     other = model.answer(user(*frames[3:], "What?"), up_to(2))
     again = model.answer(user(*frames[:3], "Where?"), up_to(2))
-    assert (first.n_cached_tokens, other.n_cached_tokens) == (0, 16)  # a block of the template's own words
+    assert (first.n_cached_tokens, other.n_cached_tokens) == (
+        0,
+        16,
+    )  # a block of the template's own words
     assert again.n_cached_tokens == 48
 
 
@@ -251,33 +294,45 @@ def test_frames_are_sent_once_each_by_name_and_loaded_once(
 # What does not fit, and what fails.
 
 
-def test_what_does_not_fit_is_refused_before_vllm_is_asked(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
+def test_what_does_not_fit_is_refused_before_vllm_is_asked(
+    start: Start, vllm: Double, frames: list[FrameRef]
+) -> None:
     model = start(max_model_len=60)
     assert model.capabilities.max_tokens == 60 == vllm.started[0]["max_model_len"]
     with pytest.raises(
-        ModelError, match=r"a context of \d+ tokens and 50 new ones is beyond the 60 .* set max_model_len"
+        ModelError,
+        match=r"a context of \d+ tokens and 50 new ones is beyond the 60 .* set max_model_len",
     ):
         model.answer(user(frames[0], "What?"), up_to(50))
     assert vllm.calls == []
 
 
-def test_more_frames_than_reserved_are_refused(start: Start, vllm: Double, frames: list[FrameRef]) -> None:
+def test_more_frames_than_reserved_are_refused(
+    start: Start, vllm: Double, frames: list[FrameRef]
+) -> None:
     model = start(max_frames=2)
     assert vllm.started[0]["limit_mm_per_prompt"]["image"]["count"] == 2
-    with pytest.raises(ModelError, match=r"3 frames are more than max_frames=2 of qwen2.5-vl@vllm; raise it"):
+    with pytest.raises(
+        ModelError, match=r"3 frames are more than max_frames=2 of qwen2.5-vl@vllm; raise it"
+    ):
         model.answer(user(*frames[:3]), up_to(2))
     model.answer(user(*frames[:2]), up_to(2))
 
 
 def test_frames_reserved_are_as_many_as_fit(start: Start, vllm: Double) -> None:
     start(max_model_len=1_300)
-    assert vllm.started[0]["limit_mm_per_prompt"] == {"image": {"count": 10, "width": 300, "height": 300}, "video": 0}
+    assert vllm.started[0]["limit_mm_per_prompt"] == {
+        "image": {"count": 10, "width": 300, "height": 300},
+        "video": 0,
+    }
 
 
 def test_a_vllm_that_counts_otherwise_is_not_believed(start: Start, vllm: Double) -> None:
     model = start()
     vllm.expands = True
-    with pytest.raises(ModelError, match=r"vLLM 0\.33\.0 reads \d+ tokens where .* makes \d+: it processes frames"):
+    with pytest.raises(
+        ModelError, match=r"vLLM 0\.33\.0 reads \d+ tokens where .* makes \d+: it processes frames"
+    ):
         model.answer(user("x"), up_to(2))
 
 
@@ -289,10 +344,14 @@ def test_a_vllm_that_counts_otherwise_is_not_believed(start: Start, vllm: Double
         ValueError("At most 1 image(s) may be provided in one prompt."),
     ],
 )
-def test_what_vllm_says_to_a_request_is_one_line(error: Exception, start: Start, vllm: Double) -> None:
+def test_what_vllm_says_to_a_request_is_one_line(
+    error: Exception, start: Start, vllm: Double
+) -> None:
     model = start()
     vllm.fails = error
-    with pytest.raises(ModelError, match=r"@vllm: vLLM 0\.33\.0 fails on the request \(.*\); use fewer") as raised:
+    with pytest.raises(
+        ModelError, match=r"@vllm: vLLM 0\.33\.0 fails on the request \(.*\); use fewer"
+    ) as raised:
         model.answer(user("x"), up_to(2))
     assert "\n" not in str(raised.value)
     assert " ".join(str(error).split()) in str(raised.value)
@@ -300,7 +359,9 @@ def test_what_vllm_says_to_a_request_is_one_line(error: Exception, start: Start,
 
 def test_a_vllm_that_does_not_start_says_so_in_one_line(start: Start, vllm: Double) -> None:
     vllm.fails = RuntimeError("Engine core initialization failed.\nSee root cause above.")
-    with pytest.raises(ModelError, match=r"does not start \(Engine core initialization failed. See .*max_model_len"):
+    with pytest.raises(
+        ModelError, match=r"does not start \(Engine core initialization failed. See .*max_model_len"
+    ):
         start()
 
 
@@ -309,11 +370,15 @@ def test_without_vllm_the_line_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "vllm", None)
     for name in ("qwen2.5-vl@vllm", "hf-vlm@vllm", "openvla@vllm"):
-        with pytest.raises(ModelError, match=rf"{name} needs the package vllm .*pip install 'infthor-eval\[vllm\]'"):
+        with pytest.raises(
+            ModelError, match=rf"{name} needs the package vllm .*pip install 'infthor-eval\[vllm\]'"
+        ):
             load(name, {"pretrained": str(checkpoints["qwen2.5-vl"])}, 0)
 
 
-def test_a_checkpoint_of_another_family_is_refused_as_in_transformers(start: Start, vllm: Double) -> None:
+def test_a_checkpoint_of_another_family_is_refused_as_in_transformers(
+    start: Start, vllm: Double
+) -> None:
     with pytest.raises(ModelError, match="is a llava checkpoint, not qwen2_5_vl; try hf-vlm"):
         start("llava", "qwen2.5-vl")
     with pytest.raises(UsageError, match=r"hf-vlm@vllm needs pretrained="):
@@ -321,12 +386,19 @@ def test_a_checkpoint_of_another_family_is_refused_as_in_transformers(start: Sta
     assert vllm.started == []
 
 
-def test_identities_tell_engines_and_what_changes_a_number_apart(start: Start, in_process: Start) -> None:
+def test_identities_tell_engines_and_what_changes_a_number_apart(
+    start: Start, in_process: Start
+) -> None:
     plain, theirs = start().identity(), in_process("qwen2.5-vl").identity()
     assert (plain["engine"], plain["versions"]["vllm"]) == ("vllm", "0.33.0")
     assert plain["fingerprint"] == theirs["fingerprint"]
     assert plain["n_parameters"] == theirs["n_parameters"]
-    changed = [{"enforce_eager": True}, {"max_model_len": 999}, {"quantization": "fp8"}, {"rope": "yarn:2"}]
+    changed = [
+        {"enforce_eager": True},
+        {"max_model_len": 999},
+        {"quantization": "fp8"},
+        {"rope": "yarn:2"},
+    ]
     others = [start(**options).identity() for options in changed]
     assert all(one != other for at, one in enumerate([plain, *others]) for other in others[at:])
     assert start(gpu_memory_utilization=0.5, mm_processor_cache_gb=1).identity() == plain

@@ -39,11 +39,17 @@ def test_actions_are_those_of_the_native_port(
     constrained: bool, policy: Callable[..., Any], folder: Path, frames: list[FrameRef]
 ) -> None:
     ours = policy(constrained=constrained)
-    theirs: Any = load("openvla", {"pretrained": str(folder), "device": "cpu", "constrained": str(constrained)}, 0)
-    asked = [(frame, text) for frame in frames[:3] for text in ("pick up the Mug", "close the fridge")]
+    theirs: Any = load(
+        "openvla", {"pretrained": str(folder), "device": "cpu", "constrained": str(constrained)}, 0
+    )
+    asked = [
+        (frame, text) for frame in frames[:3] for text in ("pick up the Mug", "close the fridge")
+    ]
     actions = [[each.act(frame, text) for frame, text in asked] for each in (ours, theirs)]
     assert actions[0] == actions[1]
-    assert len(set(actions[0])) > 1 or not constrained  # without, it writes words, which are clipped
+    assert (
+        len(set(actions[0])) > 1 or not constrained
+    )  # without, it writes words, which are clipped
 
 
 def test_it_keeps_the_contract_of_policies(policy: Callable[..., Any]) -> None:
@@ -52,7 +58,9 @@ def test_it_keeps_the_contract_of_policies(policy: Callable[..., Any]) -> None:
     acting.close()
 
 
-def test_what_vllm_is_asked(policy: Callable[..., Any], vllm: Double, frames: list[FrameRef], folder: Path) -> None:
+def test_what_vllm_is_asked(
+    policy: Callable[..., Any], vllm: Double, frames: list[FrameRef], folder: Path
+) -> None:
     policy(max_model_len=512, tensor_parallel_size=2).act(frames[0], "Pick up the mug")
     assert vllm.started[0]["limit_mm_per_prompt"] == {"image": 1}
     assert (vllm.started[0]["max_model_len"], vllm.started[0]["tensor_parallel_size"]) == (512, 2)
@@ -65,17 +73,26 @@ def test_what_vllm_is_asked(policy: Callable[..., Any], vllm: Double, frames: li
 
 
 def test_too_few_tokens_are_told(
-    policy: Callable[..., Any], vllm: Double, frames: list[FrameRef], monkeypatch: pytest.MonkeyPatch
+    policy: Callable[..., Any],
+    vllm: Double,
+    frames: list[FrameRef],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     acting = policy()
-    monkeypatch.setattr("tests.model_adapters.vllm.double._OpenVLA.write", lambda *_: ([31_800] * 3, ""))
+    monkeypatch.setattr(
+        "tests.model_adapters.vllm.double._OpenVLA.write", lambda *_: ([31_800] * 3, "")
+    )
     with pytest.raises(ModelError, match=r"openvla@vllm: vLLM wrote 3 action tokens, not 7"):
         acting.act(frames[0], "pick up the mug")
 
 
 def test_its_identity_has_engine_and_dataset(policy: Callable[..., Any]) -> None:
     identity = policy().identity()
-    assert (identity["engine"], identity["unnorm_key"], identity["adapter"]) == ("vllm", "bridge_orig", "openvla@vllm")
+    assert (identity["engine"], identity["unnorm_key"], identity["adapter"]) == (
+        "vllm",
+        "bridge_orig",
+        "openvla@vllm",
+    )
     assert identity != policy(enforce_eager=True).identity()
 
 
@@ -91,12 +108,19 @@ def test_what_is_wrong_with_checkpoint_or_key_is_told_as_in_the_native_port(
 
 @pytest.mark.parametrize("content", [None, {}, {"bos_token": None}])
 def test_a_tokenizer_without_a_begin_token_is_refused(
-    content: dict[str, Any] | None, policy: Callable[..., Any], folder: Path, vllm: Double, tmp_path: Path
+    content: dict[str, Any] | None,
+    policy: Callable[..., Any],
+    folder: Path,
+    vllm: Double,
+    tmp_path: Path,
 ) -> None:
     copy = Path(shutil.copytree(folder, tmp_path / "copy"))
     (copy / "tokenizer_config.json").unlink()
     if content is not None:
         (copy / "tokenizer_config.json").write_text(json.dumps(content))
-    with pytest.raises(ModelError, match=r"tokenizer_config\.json of .* names no bos_token, .* --engine transformers"):
+    with pytest.raises(
+        ModelError,
+        match=r"tokenizer_config\.json of .* names no bos_token, .* --engine transformers",
+    ):
         policy(pretrained=copy)
     assert vllm.started == []

@@ -22,10 +22,21 @@ def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run: A
     """Runs a task (`nieh_full`) on five questions about two trajectories."""
     data = make_nieh_set(size=56)
 
-    def ask(name: str, *options: object, task: str = "nieh_full", **model_args: object) -> tuple[int, str, str]:
+    def ask(
+        name: str, *options: object, task: str = "nieh_full", **model_args: object
+    ) -> tuple[int, str, str]:
         given = {"pretrained": checkpoints["qwen2.5-vl"], "dtype": "float32", **model_args}
         typed = ",".join(f"{option}={value}" for option, value in given.items())
-        arguments = ["--model", "qwen2.5-vl", "--model-args", typed, "--tasks", task, "--data", data]
+        arguments = [
+            "--model",
+            "qwen2.5-vl",
+            "--model-args",
+            typed,
+            "--tasks",
+            task,
+            "--data",
+            data,
+        ]
         return run(*arguments, "--name", name, "--output", tmp_path / "out", *options)
 
     return ask
@@ -44,9 +55,14 @@ def test_both_engines_give_the_same_replies_and_tokens_and_the_hit_rate_is_told(
     code, out, err = ask("on vllm", "--engine", "vllm")
     assert code == 0, err
     assert ask("here", "--engine", "transformers", device="cpu")[0] == 0
-    (ours, results, took), (theirs, others, _) = (_found(tmp_path / "out" / name) for name in ("on vllm", "here"))
+    (ours, results, took), (theirs, others, _) = (
+        _found(tmp_path / "out" / name) for name in ("on vllm", "here")
+    )
     facts = [
-        [(one.key, one.payload.reply, one.payload.scores, one.tokens.context, one.tokens.reply) for one in records]
+        [
+            (one.key, one.payload.reply, one.payload.scores, one.tokens.context, one.tokens.reply)
+            for one in records
+        ]
         for records in (ours, theirs)
     ]
     assert facts[0] == facts[1]
@@ -73,9 +89,14 @@ def test_the_order_of_the_requests_makes_the_hits(
     ask: Any, vllm: Double, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert ask("one first", "--engine", "vllm")[0] == 0
-    monkeypatch.setattr("model_adapters.vllm.model.VllmModel._new_prefixes", lambda _, prompts: [*range(len(prompts))])
+    monkeypatch.setattr(
+        "model_adapters.vllm.model.VllmModel._new_prefixes",
+        lambda _, prompts: [*range(len(prompts))],
+    )
     assert ask("all at once", "--engine", "vllm", "--fresh")[0] == 0
-    kept, lost = (_found(tmp_path / "out" / name)[2]["hit_rate"] for name in ("one first", "all at once"))
+    kept, lost = (
+        _found(tmp_path / "out" / name)[2]["hit_rate"] for name in ("one first", "all at once")
+    )
     assert kept > 0.4
     assert lost < 0.1
     assert [len(call.prompts) for call in vllm.calls] == [1, 2, 1, 1, 3, 2]
@@ -95,18 +116,31 @@ def test_plans_are_carried_out_alike(
     checkpoints: dict[str, Path], vllm: Double, task_files: Path, tmp_path: Path, run: Any
 ) -> None:
     task = task_files / "plans" / "infthor_plans.yaml"
-    task.write_text("include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n")
+    task.write_text(
+        "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n"
+    )
     data = write(tmp_path / "data", cut(MUG, 2))
     played = []
     for engine, more in (("vllm", ""), ("transformers", ",device=cpu")):
         given = f"pretrained={checkpoints['qwen2.5-vl']},dtype=float32{more}"
-        arguments = ["--model", "qwen2.5-vl", "--model-args", given, "--tasks", "infthor_plans", "--data", data]
+        arguments = [
+            "--model",
+            "qwen2.5-vl",
+            "--model-args",
+            given,
+            "--tasks",
+            "infthor_plans",
+            "--data",
+            data,
+        ]
         output = tmp_path / "out" / engine
         code, _, err = run(*arguments, "--engine", engine, "--constrained", "--output", output)
         assert code == 0, err
         (results,) = output.rglob("results.json")
         records = read_run(results.parent, PLAN_RECORDS)[1]
-        played.append((json.loads(results.read_text())["usage"], [record.payload for record in records]))
+        played.append(
+            (json.loads(results.read_text())["usage"], [record.payload for record in records])
+        )
     assert played[0] == played[1]
     assert all(call.params.structured_outputs is not None for call in vllm.calls)
 
@@ -114,16 +148,24 @@ def test_plans_are_carried_out_alike(
 def test_engines_that_do_not_run_a_model_are_refused_in_one_line(run: Any, tmp_path: Path) -> None:
     known = "these do: hf-vlm, llava-onevision, openvla, pixtral, qwen2.5-vl"
     for command in ("run", "plan"):
-        code, _, err = run(command, "--model", "deepseek-vl", "--engine", "vllm", "--tasks", "nieh_mini")
+        code, _, err = run(
+            command, "--model", "deepseek-vl", "--engine", "vllm", "--tasks", "nieh_mini"
+        )
         assert code == 2
         assert f"deepseek-vl does not run on vllm; {known}" in err
         assert "Traceback" not in err
 
 
 def test_the_name_of_a_model_may_say_its_engine() -> None:
-    assert name_on_engine("qwen2.5-vl", "vllm") == name_on_engine("qwen2.5-vl@vllm", "vllm") == "qwen2.5-vl@vllm"
+    assert (
+        name_on_engine("qwen2.5-vl", "vllm")
+        == name_on_engine("qwen2.5-vl@vllm", "vllm")
+        == "qwen2.5-vl@vllm"
+    )
     assert name_on_engine("deepseek-vl", "transformers") == "deepseek-vl"
-    with pytest.raises(UsageError, match="pixtral@vllm names its engine, and it is not transformers; leave one"):
+    with pytest.raises(
+        UsageError, match="pixtral@vllm names its engine, and it is not transformers; leave one"
+    ):
         name_on_engine("pixtral@vllm", "transformers")
 
 

@@ -37,7 +37,9 @@ def question_on(clues):
 
 
 def windows(n_frames, clues, seed=0, **settings):
-    return CONTEXTS["haystack"].samples(Frames(n_frames), question_on(clues), ContextSettings(seed=seed, **settings))
+    return CONTEXTS["haystack"].samples(
+        Frames(n_frames), question_on(clues), ContextSettings(seed=seed, **settings)
+    )
 
 
 def published(n_frames, clue, ctx_size, tokens_per_image):
@@ -59,7 +61,9 @@ def test_one_clue_gives_the_published_windows_on_a_thousand_random_cases():
         clue, tokens = draw.randrange(n_frames), draw.choice([121, 380, 576, 1485])
         ours = windows(n_frames, [clue], ctx_size=ctx_size, tokens_per_frame=tokens)
         theirs = published(n_frames, clue, ctx_size, tokens)
-        assert [list(sample.frames) if isinstance(sample, Sample) else None for sample in ours] == theirs
+        assert [
+            list(sample.frames) if isinstance(sample, Sample) else None for sample in ours
+        ] == theirs
         assert all(clue in sample.frames for sample in ours if isinstance(sample, Sample))
         assert [sample.variant for sample in ours] == [f"depth={depth:g}" for depth in DEPTHS]
         compared += sum(window is not None for window in theirs)
@@ -176,25 +180,38 @@ def test_a_question_without_a_needle_is_asked_once_outside_the_depths():
 
 
 def test_the_smallest_and_the_fullest_windows():
-    assert [sample.frames for sample in windows(10, [4], ctx_size=1, tokens_per_frame=1000)] == [(4,)] * 5
-    assert {sample.frames for sample in windows(100, [1, 5, 9], ctx_size=3, tokens_per_frame=1000)} == {(1, 5, 9)}
+    assert [sample.frames for sample in windows(10, [4], ctx_size=1, tokens_per_frame=1000)] == [
+        (4,)
+    ] * 5
+    assert {
+        sample.frames for sample in windows(100, [1, 5, 9], ctx_size=3, tokens_per_frame=1000)
+    } == {(1, 5, 9)}
 
 
 @pytest.mark.parametrize(("n_frames", "starts"), [(10, {0}), (11, {0, 1})])
 def test_a_window_without_a_needle_lies_anywhere_inside_the_trajectory(n_frames, starts):
     question = Question("t", "Is there a mug?", (3,), ("no",), absence=True)
     seeded = (ContextSettings(ctx_size=10, tokens_per_frame=1000, seed=seed) for seed in range(20))
-    samples = [CONTEXTS["haystack"].samples(Frames(n_frames), question, settings)[0] for settings in seeded]
-    assert {sample.frames for sample in samples} == {tuple(range(start, start + 10)) for start in starts}
+    samples = [
+        CONTEXTS["haystack"].samples(Frames(n_frames), question, settings)[0] for settings in seeded
+    ]
+    assert {sample.frames for sample in samples} == {
+        tuple(range(start, start + 10)) for start in starts
+    }
 
 
 def test_what_does_not_fit_says_why():
     def reasons(n_frames, clues, size):
-        return {skipped.reason for skipped in windows(n_frames, clues, ctx_size=size, tokens_per_frame=1000)}
+        return {
+            skipped.reason
+            for skipped in windows(n_frames, clues, ctx_size=size, tokens_per_frame=1000)
+        }
 
     assert reasons(5, [2], 8) == {"the window reaches outside the trajectory"}
     assert reasons(100, [1, 5, 9], 2) == {"the clues do not fit the window"}
-    assert reasons(100, [1, 5, 9], 200) == {"there are not enough frames between and around the clues"}
+    assert reasons(100, [1, 5, 9], 200) == {
+        "there are not enough frames between and around the clues"
+    }
     assert reasons(100, [1], 0.5) == {"no frame fits the window"}
 
 

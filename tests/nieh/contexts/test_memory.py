@@ -9,8 +9,8 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Question
 from infthor_eval.harness import registration
 from infthor_eval.harness.nieh_task import dataset, doc_to_image, doc_to_text
+from infthor_eval.nieh.asking.recalling import Recaller, recall_all
 from infthor_eval.nieh.docs import doc_of, doc_parts, sample_of
-from infthor_eval.nieh.recalling import Recaller, recall_all
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import find_samples, open_set
 
@@ -34,7 +34,10 @@ def found(make_nieh_set):
 def shown(task_samples):
     """Names of the frames, and the texts, of each request."""
     requests = [task_samples.request(sample) for sample in recall_all(task_samples)]
-    return [[part if isinstance(part, str) else int(part.path.stem) for part in parts] for parts, _ in requests]
+    return [
+        [part if isinstance(part, str) else int(part.path.stem) for part in parts]
+        for parts, _ in requests
+    ]
 
 
 def test_the_last_view_is_shown_after_what_is_recalled_of_those_before(found):
@@ -47,9 +50,13 @@ def test_the_last_view_is_shown_after_what_is_recalled_of_those_before(found):
 
 def test_words_tell_of_views_alone_or_of_what_was_recalled(found, own):
     frames, texts = found(), found(own(recalled='"a mug"'))
-    (_, of_frames), (parts, of_texts) = (item.request(recall_all(item)[0]) for item in (frames, texts))
+    (_, of_frames), (parts, of_texts) = (
+        item.request(recall_all(item)[0]) for item in (frames, texts)
+    )
     assert "\nAnswer the question given the agent's views in time order. " in of_frames
-    assert of_texts.startswith("\nAnswer the question given what was recalled of the agent's views, in time order, and")
+    assert of_texts.startswith(
+        "\nAnswer the question given what was recalled of the agent's views, in time order, and"
+    )
     assert (parts[0], len(parts)) == ("a mug", 2)
 
 
@@ -96,14 +103,19 @@ def own(tmp_path):
 
 
 @pytest.mark.parametrize("privileged", [False, True])
-def test_a_memory_sees_the_steps_before_the_question_and_metadata_only_if_privileged(found, own, privileged):
+def test_a_memory_sees_the_steps_before_the_question_and_metadata_only_if_privileged(
+    found, own, privileged
+):
     from model_adapters.own_file import load_from_file
 
     name = own(privileged)
     recall_all(found(name))
     seen = load_from_file(name).begin.__globals__["SEEN"]
     steps = [(number, f"{number:09d}", privileged) for number in range(5)]
-    asked = [(question.text, 5, question.clues if privileged else None, privileged) for question in QUESTIONS]
+    asked = [
+        (question.text, 5, question.clues if privileged else None, privileged)
+        for question in QUESTIONS
+    ]
     assert seen == [("begin", "t"), *steps, *asked[:2], ("begin", "u"), *steps, asked[2]]
 
 
@@ -140,7 +152,9 @@ def test_what_was_recalled_is_found_again_by_its_inputs(found):
     assert all(isinstance(item, NiehRecall) and item.build_s >= 0 for item in kept.values())
 
 
-@pytest.mark.parametrize(("frames", "same"), [("blank", False), ("other", False), ("shuffled", True), ("shown", True)])
+@pytest.mark.parametrize(
+    ("frames", "same"), [("blank", False), ("other", False), ("shuffled", True), ("shown", True)]
+)
 def test_an_ablation_is_what_a_memory_observes(found, own, frames, same):
     task_samples = found(own(recalled="str(query.present.frame.path)"), frames=frames)
     true = str(task_samples.data.frames("t")[-1].path)
@@ -197,7 +211,9 @@ def test_a_task_without_a_memory_says_how_to_give_one(make_nieh_set):
 
 def test_actions_and_goals_come_from_log_and_trajectory(found):
     open_set.cache_clear()
-    task_samples = find_samples({"context": "memory", "memory": "text-log", "bundled": "nieh_mini"}, limit=1)
+    task_samples = find_samples(
+        {"context": "memory", "memory": "text-log", "bundled": "nieh_mini"}, limit=1
+    )
     (sample,) = recall_all(task_samples)
     (text,) = (item for item in sample.recalled if isinstance(item, str))
     lines = text.splitlines()

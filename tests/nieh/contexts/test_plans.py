@@ -40,7 +40,12 @@ def test_puts_each_frame_where_the_text_has_it(folder):
 
 def test_takes_the_last_of_several_frames_of_an_action(folder):
     (folder / "traj.txt").write_text("Goal<image><|act|>Go<|act|><image>")
-    log = {"images": [{"low_idx": 0, "image_name": "000000001.png"}, {"low_idx": 0, "image_name": "000000002.png"}]}
+    log = {
+        "images": [
+            {"low_idx": 0, "image_name": "000000001.png"},
+            {"low_idx": 0, "image_name": "000000002.png"},
+        ]
+    }
     (folder / "expert_log.json").write_text(json.dumps(log))
     assert shown("interleaved_plans", folder.parents[1]) == ["Goal", 0, "<|act|>Go<|act|>", 2]
     (folder / "traj.txt").write_text("Goal<image>")

@@ -19,7 +19,12 @@ NAMES = {"full_traj": "trajectory"}  # of contexts that are called otherwise the
 
 
 def call(action, *ids):
-    return {"api_action": {"action": action, **dict(zip(("objectId", "receptacleObjectId"), ids, strict=False))}}
+    return {
+        "api_action": {
+            "action": action,
+            **dict(zip(("objectId", "receptacleObjectId"), ids, strict=False)),
+        }
+    }
 
 
 TRAJECTORY = {
@@ -41,7 +46,15 @@ LOG = [(0, "000000001.png"), (1, "000000002.png"), (1, "000000003.png"), (3, "00
 GOAL, STATE = "Your task goal: get a mug. ", " State: "
 INTERLEAVED = [
     *(GOAL, STATE, 0, " Action: RotateLeft", STATE, 1, " Action: PickupObject Mug", STATE, 2, 3),
-    *("Your task goal: cool it. ", STATE, 3, " Action: MoveAhead", " Action: PutObject Mug Fridge", STATE, 4),
+    *(
+        "Your task goal: cool it. ",
+        STATE,
+        3,
+        " Action: MoveAhead",
+        " Action: PutObject Mug Fridge",
+        STATE,
+        4,
+    ),
 ]
 
 
@@ -87,7 +100,9 @@ def test_contexts_equal_the_published_ones_part_for_part(make_set, tmp_path):
         root.mkdir()
         data = make_set(len(frames), log, case["trajectory"])
         sizes = {"ctx_size": case["kilo_tokens"], "tokens_per_frame": case["tokens_per_frame"]}
-        assert parts(NAMES.get(case["mode"], case["mode"]), data, **sizes) == [part for _, part in case["parts"]]
+        assert parts(NAMES.get(case["mode"], case["mode"]), data, **sizes) == [
+            part for _, part in case["parts"]
+        ]
         for folder in ("set", "trajectories"):
             (tmp_path / folder).rename(root / folder)
     assert len(cases) == 48
@@ -113,7 +128,10 @@ def test_states_of_a_trajectory_that_tells_none_are_those_beside_its_frames(make
 
 
 def test_a_final_task_that_stands_apart_is_the_last(make_set):
-    apart = TRAJECTORY | {"sub_tasks": TRAJECTORY["sub_tasks"][:1], "long_horizon_task": TRAJECTORY["sub_tasks"][1]}
+    apart = TRAJECTORY | {
+        "sub_tasks": TRAJECTORY["sub_tasks"][:1],
+        "long_horizon_task": TRAJECTORY["sub_tasks"][1],
+    }
     assert parts("interleaved", make_set(5, LOG, apart))[:-1] == INTERLEAVED
 
 
@@ -128,7 +146,11 @@ def test_a_file_that_is_no_trajectory_is_named(make_set):
 
 def test_another_trajectory_is_another_identity(make_set):
     data = make_set(5, LOG, TRAJECTORY)
-    config = {"context": "interleaved", "data": str(data.root), "trajectories": str(data.trajectories)}
+    config = {
+        "context": "interleaved",
+        "data": str(data.root),
+        "trajectories": str(data.trajectories),
+    }
     first = find_samples(config).sources
     (data.trajectories / "t.json").write_text(json.dumps(TRAJECTORY | {"state_summary": {}}))
     assert find_samples(config).sources != first

@@ -12,8 +12,8 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.memory import Observation, Query, TrajectoryFacts, open_memory
+from infthor_eval.nieh.asking.recalling import recall_all
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
-from infthor_eval.nieh.recalling import recall_all
 from infthor_eval.nieh.samples import find_samples
 from model_adapters.hf.retrieval import open_retriever
 
@@ -34,7 +34,9 @@ def noise(make_nieh_set):
         root = make_nieh_set(QUESTIONS, n_frames=n_frames, size=8)
         draw = np.random.default_rng(0)
         for path in sorted((root / "metadata" / "t" / "img").iterdir()):
-            Image.fromarray(draw.integers(0, 256, (8, 8, 3), dtype=np.uint8)).resize((40, 40)).save(path)
+            Image.fromarray(draw.integers(0, 256, (8, 8, 3), dtype=np.uint8)).resize((40, 40)).save(
+                path
+            )
         return root
 
     return make
@@ -47,7 +49,12 @@ def shown(context, root, question=QUESTIONS[0], **settings):
 
 def recalled(root, k, clip, question=QUESTIONS[0], memory="clip-view"):
     """The frames that a memory has shown."""
-    config = {"context": "memory", "memory": memory, "memory_args": {"k": k}, "retriever": str(clip)}
+    config = {
+        "context": "memory",
+        "memory": memory,
+        "memory_args": {"k": k},
+        "retriever": str(clip),
+    }
     task_samples = find_samples({**config, "data": str(root)})
     by_text = {sample.question.text: sample for sample in recall_all(task_samples)}
     return list(by_text[question.text].frames)
@@ -57,8 +64,13 @@ def recalled(root, k, clip, question=QUESTIONS[0], memory="clip-view"):
 def similarities(clip, root):
     """Cosines of (texts, frames) and (frames, frames), by transformers alone, all frames in one batch."""
     model = CLIPModel.from_pretrained(clip)
-    images = [Image.open(path).convert("RGB") for path in sorted((root / "metadata" / "t" / "img").iterdir())]
-    pixels = AutoImageProcessor.from_pretrained(clip, backend="pil")(images=images, return_tensors="pt")
+    images = [
+        Image.open(path).convert("RGB")
+        for path in sorted((root / "metadata" / "t" / "img").iterdir())
+    ]
+    pixels = AutoImageProcessor.from_pretrained(clip, backend="pil")(
+        images=images, return_tensors="pt"
+    )
     texts = AutoTokenizer.from_pretrained(clip)(list(TEXTS), padding=True, return_tensors="pt")
     found = model(**pixels, **texts)
     between = found.image_embeds @ found.image_embeds.T
@@ -81,7 +93,9 @@ def test_the_frames_nearest_to_each_question_are_those_of_plain_transformers(noi
     assert shown("clip_retrieval", root, retriever=str(clip), top_k=3) == largest(to_texts[0], 3)
 
 
-def test_a_memory_recalls_those_nearest_to_the_question_or_to_the_last_view_which_comes_after_them(noise, clip):
+def test_a_memory_recalls_those_nearest_to_the_question_or_to_the_last_view_which_comes_after_them(
+    noise, clip
+):
     root = noise(40)
     to_texts, between = similarities(clip, root)
     assert recalled(root, 10, clip, memory="clip") == [*largest(to_texts[0, :-1], 10), 39]
@@ -93,7 +107,10 @@ def test_a_memory_may_be_asked_with_the_goal(noise, clip):
     to_texts, _ = similarities(clip, root)
     memory = open_memory("clip", (("k", 5), ("query", "goal"), ("retriever", str(clip))))
     frames = NiehSet(root).frames("t")
-    steps = [Observation(number=number, frame=frame, goal=TEXTS[2]) for number, frame in enumerate(frames)]
+    steps = [
+        Observation(number=number, frame=frame, goal=TEXTS[2])
+        for number, frame in enumerate(frames)
+    ]
     memory.begin(TrajectoryFacts(name="t"))
     for step in steps[:-1]:
         memory.observe(step)
@@ -124,7 +141,9 @@ def test_of_equal_frames_the_earlier_are_taken(noise, clip):
 def test_each_frame_is_decoded_once_and_few_at_a_time(noise, make_clip, monkeypatch):
     root, clip = noise(70), make_clip(seed=3)
     loaded, load = [], FrameRef.load
-    monkeypatch.setattr(FrameRef, "load", lambda frame: loaded.append(frame.path.name) or load(frame))
+    monkeypatch.setattr(
+        FrameRef, "load", lambda frame: loaded.append(frame.path.name) or load(frame)
+    )
     batches, features = [], CLIPModel.get_image_features
 
     def counted(model, **inputs):
@@ -147,7 +166,10 @@ def test_a_frame_that_cannot_be_decoded_has_the_question_skipped(noise, clip):
     root = noise(12)
     broken = root / "metadata" / "t" / "img" / "000000007.png"
     broken.write_bytes(broken.read_bytes()[:60])
-    assert f"{broken}: not a readable image" in shown("clip_retrieval", root, retriever=str(clip)).reason
+    assert (
+        f"{broken}: not a readable image"
+        in shown("clip_retrieval", root, retriever=str(clip)).reason
+    )
     with pytest.raises(UsageError, match=f"{broken}: not a readable image"):
         recalled(root, 10, clip)
 
@@ -161,7 +183,9 @@ def test_the_identity_tells_weights_apart_and_not_places(noise, make_clip, clip,
     data = NiehSet(noise(4))
 
     def identity(folder):
-        return CONTEXTS["clip_retrieval"].sources(data, ContextSettings(retriever=str(folder)))["retriever"]
+        return CONTEXTS["clip_retrieval"].sources(data, ContextSettings(retriever=str(folder)))[
+            "retriever"
+        ]
 
     moved = tmp_path / "elsewhere" / clip.name
     shutil.copytree(clip, moved)
@@ -174,7 +198,9 @@ def test_a_retriever_that_cannot_be_had_says_what_to_do(noise, clip, tmp_path, m
     root = noise(4)
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True)
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_CACHE", str(tmp_path / "hub"))
-    with pytest.raises(UsageError, match=r"not in the local cache .* `hf download .*` and give --retriever DIR"):
+    with pytest.raises(
+        UsageError, match=r"not in the local cache .* `hf download .*` and give --retriever DIR"
+    ):
         shown("clip_retrieval", root)
     with pytest.raises(UsageError, match=r"--retriever \./nowhere: there is no such folder"):
         shown("clip_retrieval", root, retriever="./nowhere")
@@ -196,5 +222,7 @@ def test_a_checkpoint_of_another_kind_is_refused(noise, tmp_path):
 def test_so_many_frames_cannot_be():
     for name in ("top_k", "budget"):
         for value in (0, -1, 2.5, "ten"):
-            with pytest.raises(UsageError, match=f"{name} is .*whole number|Expected `int`.*{name}"):
+            with pytest.raises(
+                UsageError, match=f"{name} is .*whole number|Expected `int`.*{name}"
+            ):
                 ContextSettings.read({name: value})

@@ -14,7 +14,15 @@ from ...bundled import BUNDLED, bundled_name
 from ..test_requests import EXPECTED, as_text
 
 NAME = bundled_name("kitchen-1")
-LONG = ("_16k", "_32k", "_64k", "_128k", "_256k", "_512k", "_1m")  # haystacks of more frames than there are
+LONG = (
+    "_16k",
+    "_32k",
+    "_64k",
+    "_128k",
+    "_256k",
+    "_512k",
+    "_1m",
+)  # haystacks of more frames than there are
 TASKS = sorted(task for task in EXPECTED if not task.endswith((*LONG, "_mini_gt", "_mini_full")))
 PUBLISHED_FIELDS = ("img_idx", "img_filename", "step", "object_log")
 
@@ -24,15 +32,23 @@ def folder(tmp_path):
     """The folder of one trajectory in a set of its own, as it is bundled."""
     shutil.copytree(BUNDLED / "metadata" / NAME, tmp_path / "set" / "metadata" / NAME)
     lines = (BUNDLED / "qa_set_nieh_mini.csv").read_text().splitlines(keepends=True)
-    (tmp_path / "set" / "qa_set_one.csv").write_text(lines[0] + "".join(row for row in lines if row.startswith(NAME)))
+    (tmp_path / "set" / "qa_set_one.csv").write_text(
+        lines[0] + "".join(row for row in lines if row.startswith(NAME))
+    )
     return tmp_path / "set" / "metadata" / NAME
 
 
 def requests(root: Path, task: str, **more) -> list[list[str]]:
     settings = dict(Catalog.find_packaged().tasks[task].settings["dataset_kwargs"])
     settings.pop("bundled", None)
-    found = find_samples({"data": str(root), "tokens_per_frame": 121, "seed": 0, **settings, **more})
-    assert not [item.reason for item in found.skipped if "fit" not in item.reason and "window" not in item.reason]
+    found = find_samples(
+        {"data": str(root), "tokens_per_frame": 121, "seed": 0, **settings, **more}
+    )
+    assert not [
+        item.reason
+        for item in found.skipped
+        if "fit" not in item.reason and "window" not in item.reason
+    ]
     rows = []
     for sample in found.samples:
         context, text = found.request(sample)
@@ -52,17 +68,24 @@ def as_list(folder: Path) -> None:
 
 def as_columns(folder: Path) -> None:
     listed = entries(folder)
-    (folder / "metadata.json").write_text(json.dumps({name: [e[name] for e in listed] for name in PUBLISHED_FIELDS}))
+    (folder / "metadata.json").write_text(
+        json.dumps({name: [e[name] for e in listed] for name in PUBLISHED_FIELDS})
+    )
 
 
 def as_numbers(folder: Path) -> None:
-    (folder / "metadata.json").write_text(json.dumps({"img_idx": [entry["img_idx"] for entry in entries(folder)]}))
+    (folder / "metadata.json").write_text(
+        json.dumps({"img_idx": [entry["img_idx"] for entry in entries(folder)]})
+    )
 
 
 def as_objects(folder: Path, before_the_first: int | None = None) -> None:
     """The layout of `dev`: objects with `low_idx`, null or 0 before the first action."""
     frames = [
-        {"low_idx": entry["step"] if number else before_the_first, "img_filename": entry["img_filename"]}
+        {
+            "low_idx": entry["step"] if number else before_the_first,
+            "img_filename": entry["img_filename"],
+        }
         for number, entry in enumerate(entries(folder))
     ]
     (folder / "metadata.json").write_text(json.dumps({"img_idx": frames, "traj_id": NAME}))
@@ -84,7 +107,14 @@ def with_trajectories_apart(folder: Path) -> None:
     (folder.parents[2] / "apart" / f"{NAME}.txt").write_text(json.dumps(trajectory))
 
 
-LAYOUTS = [as_list, as_columns, as_numbers, as_objects, lambda at: as_objects(at, 0), as_large_images]
+LAYOUTS = [
+    as_list,
+    as_columns,
+    as_numbers,
+    as_objects,
+    lambda at: as_objects(at, 0),
+    as_large_images,
+]
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -10,7 +10,10 @@ from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.docs import doc_of, doc_parts, doc_prompt, sample_of
 from infthor_eval.nieh.samples import find_samples, open_set
 
-QUESTIONS = [Question("a", "Is there a mug?", (1,), ("yes",)), Question("b", "Is there a sink?", (0,), ("no",))]
+QUESTIONS = [
+    Question("a", "Is there a mug?", (1,), ("yes",)),
+    Question("b", "Is there a sink?", (0,), ("no",)),
+]
 
 
 @pytest.fixture
@@ -37,9 +40,13 @@ def test_the_video_is_shown_where_there_is_one_and_else_the_frames(root, write_v
     with_video, without = found.samples
     (video,), text = context.request(found.data, with_video)
     # Four of 50 frames, at least: the first, the last and two between them.
-    assert [frame.load().getpixel((9, 9))[0] for frame in video.frames] == pytest.approx([0, 80, 165, 245], abs=4)
+    assert [frame.load().getpixel((9, 9))[0] for frame in video.frames] == pytest.approx(
+        [0, 80, 165, 245], abs=4
+    )
     assert video.fps == pytest.approx(4 / 5)
-    assert text.startswith("\nAnswer the question given the video showing the agent's trajectory over time. Do not ")
+    assert text.startswith(
+        "\nAnswer the question given the video showing the agent's trajectory over time. Do not "
+    )
     (video,), _ = context.request(found.data, without)
     assert video == Video(tuple(found.data.frames("b")[at] for at in (0, 1, 3, 4)), 4 / 5 * 10)
 
@@ -53,7 +60,9 @@ def test_the_rate_is_a_setting(root, write_video):
         n_frames.append(len(video.frames))
     assert n_frames == [8, 16]
     for wrong in (0, 11, "x"):
-        with pytest.raises(UsageError, match=r"fps is .*; it is a number of frames per second above 0, at most 10"):
+        with pytest.raises(
+            UsageError, match=r"fps is .*; it is a number of frames per second above 0, at most 10"
+        ):
             samples_of(root, fps=wrong)
 
 

@@ -5,7 +5,9 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.guesses import sample_on_clues
 
 
-def asked(traj_id: str, text: str, answer: str, clues: tuple[int, ...] = (1,), file: str = "") -> Question:
+def asked(
+    traj_id: str, text: str, answer: str, clues: tuple[int, ...] = (1,), file: str = ""
+) -> Question:
     return Question(traj_id, text, clues, (answer,), file=file)
 
 

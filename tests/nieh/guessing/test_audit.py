@@ -26,7 +26,11 @@ def audited(text, answer, *scores, file="", clues=(1,), number=0):
 
 def test_a_group_tells_its_answers_and_its_best_guesser():
     answers = ("Yes", "yes", "no", "Bed")
-    group = Group("file", "all", [audited(PRESENCE, answer, i < 1, i < 3, i < 3) for i, answer in enumerate(answers)])
+    group = Group(
+        "file",
+        "all",
+        [audited(PRESENCE, answer, i < 1, i < 3, i < 3) for i, answer in enumerate(answers)],
+    )
     assert group.answers == {"yes": 2, "no": 1, "bed": 1}
     assert group.entropy == pytest.approx(0.5 * 1 + 2 * 0.25 * 2)  # in bits: log2 of 2 and of 4
     assert group.share_yes == pytest.approx(2 / 3)
@@ -82,11 +86,16 @@ def test_a_set_is_audited_question_by_question(tmp_path):
     assert [item.scores for item in found] == [(float(i > 0),) * len(GUESSERS) for i in range(4)]
 
 
-@pytest.mark.skipif(not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data")
+@pytest.mark.skipif(
+    not PUBLISHED.is_dir(), reason="the published question files are not at ../shared/data"
+)
 def test_what_the_published_files_give_without_a_frame():
     found = audit(NiehSet(PUBLISHED))
     single, multi = groups(found, "file")
-    assert [(group.name, len(group.questions)) for group in (single, multi)] == [(SINGLE, 829), (MULTI, 474)]
+    assert [(group.name, len(group.questions)) for group in (single, multi)] == [
+        (SINGLE, 829),
+        (MULTI, 474),
+    ]
     constant, blind, learner = map(
         NAMES.index, ("one answer a file", "words (blind)", "learner: words, number of frames")
     )

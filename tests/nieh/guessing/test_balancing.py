@@ -36,20 +36,29 @@ def best_above_chance(questions):
     shares = []
     for guesser in GUESSERS:
         guesses = zip(questions, guesser.guess(on_clues(*questions)), strict=True)
-        shares.append(sum(guess == question.answers[0] for question, guess in guesses) / len(questions))
+        shares.append(
+            sum(guess == question.answers[0] for question, guess in guesses) / len(questions)
+        )
     return max(shares) - chance
 
 
 LEAKS = {
     "words": lambda traj, side, thing: presence(traj, f"{thing}{side}", ANSWERS[side]),
-    "number": lambda traj, side, thing: presence(traj, thing, ANSWERS[side], ((1, 9), (1, 5, 9))[side]),
+    "number": lambda traj, side, thing: presence(
+        traj, thing, ANSWERS[side], ((1, 9), (1, 5, 9))[side]
+    ),
     "place": lambda traj, side, thing: presence(traj, thing, ANSWERS[side], ((1,), (901,))[side]),
 }
 
 
 @pytest.mark.parametrize("leak", LEAKS)
 def test_of_a_set_with_a_leak_a_part_without_it_is_kept(leak):
-    leaky = [LEAKS[leak](traj, side, thing) for traj in range(4) for side in range(2) for thing in ("Cup", "Egg")]
+    leaky = [
+        LEAKS[leak](traj, side, thing)
+        for traj in range(4)
+        for side in range(2)
+        for thing in ("Cup", "Egg")
+    ]
     before = [*leaky, *fair(things=OBJECTS[:2])]
     assert best_above_chance(before) > MARGIN  # or there would be nothing to prune
     found = balance(before)
@@ -74,7 +83,12 @@ def test_where_there_is_nothing_to_balance_the_part_is_empty():
     one_answer = [presence(traj, "Mug", "yes") for traj in range(4)]
     for questions, kept in ((one_answer, {FORM: (0, 4)}), ([], {})):
         found = balance(questions)
-        assert (found.questions, found.chance, found.best, found.best_score) == ((), 0.0, "none", 0.0)
+        assert (found.questions, found.chance, found.best, found.best_score) == (
+            (),
+            0.0,
+            "none",
+            0.0,
+        )
         assert found.kept == kept
 
 
@@ -88,7 +102,12 @@ def test_a_form_with_one_answer_goes_and_the_others_stay():
 def test_files_are_counted_apart_but_balanced_together():
     """All yes in one file and all no in the other is no leak of the part, which is one file."""
     questions = [
-        asked(question.traj_id, question.text, question.answers[0], file="ab"[question.answers == ("no",)])
+        asked(
+            question.traj_id,
+            question.text,
+            question.answers[0],
+            file="ab"[question.answers == ("no",)],
+        )
         for question in fair()
     ]
     found = balance(questions)
@@ -112,6 +131,9 @@ def test_the_commonest_answers_are_cut_so_that_most_is_kept(sizes):
         if most <= (1 / n + MARGIN) * (total := sum(min(size, most) for size in ordered[:n]))
     ]
     assert len(left) == max(ways, default=0)
-    counts = [sum(question.answers == (f"answer {answer}",) for question in left) for answer in range(len(sizes))]
+    counts = [
+        sum(question.answers == (f"answer {answer}",) for question in left)
+        for answer in range(len(sizes))
+    ]
     kept = [count for count in counts if count]
     assert not kept or max(kept) <= (1 / len(kept) + MARGIN) * len(left)

@@ -33,7 +33,10 @@ def test_chains_go_from_the_general_to_the_particular():
 def test_number_and_place_follow_the_stem():
     (sample,) = on_clues(QUESTION)
     stem = ("stem", "is", "mug", "on")
-    assert chains_of_words_and_count(sample) == [*chains_of_words(sample), [stem, ("count", *stem[1:], 2)]]
+    assert chains_of_words_and_count(sample) == [
+        *chains_of_words(sample),
+        [stem, ("count", *stem[1:], 2)],
+    ]
     # The last clue is in the fourth hundred; they span 60 frames, a number of six bits.
     place = [[stem, ("place", *stem[1:], 3)], [stem, ("span", *stem[1:], 6)]]
     assert chains_of_words_and_place(sample) == [*chains_of_words(sample), *place]
@@ -59,9 +62,13 @@ def test_a_context_counts_less_the_more_different_answers_it_has(n_y, guess):
     (3 + 2) = 0.56. With a third y it has (1 + 2 * 18 / 21) / (4 + 2) = 0.45.
     """
     key = [("a", "x"), *[("a", "y")] * n_y, *[("c", "x")] * 17]
-    samples = on_clues(*(asked(f"t{number}", text, answer) for number, (text, answer) in enumerate(key)))
+    samples = on_clues(
+        *(asked(f"t{number}", text, answer) for number, (text, answer) in enumerate(key))
+    )
     guesser = Guesser(samples, chain_of(lambda sample: sample.question.text))
-    assert [guesser.guess(sample) for sample in on_clues(asked("new", "a", "?"), asked("new", "e", "?"))] == [
+    assert [
+        guesser.guess(sample) for sample in on_clues(asked("new", "a", "?"), asked("new", "e", "?"))
+    ] == [
         guess,
         "x",
     ]
@@ -70,7 +77,10 @@ def test_a_context_counts_less_the_more_different_answers_it_has(n_y, guess):
 def test_own_answers_are_taken_away_before_counting():
     """On trajectory t the answer after "a" is always x; the others give y after it, and x elsewhere."""
     key = [("t", "a", "x")] * 5 + [("u", "a", "y"), ("u", "b", "x"), ("v", "b", "x")]
-    samples = [Sample(asked(traj, text, answer, (number,)), (1,)) for number, (traj, text, answer) in enumerate(key)]
+    samples = [
+        Sample(asked(traj, text, answer, (number,)), (1,))
+        for number, (traj, text, answer) in enumerate(key)
+    ]
     guesser = Guesser(samples, chain_of(lambda sample: sample.question.text))
     # After "a": (0 + 1 * 2/3) / 2 = 1/3 for x and (1 + 1/3) / 2 = 2/3 for y.
     assert guesser.guess(samples[0]) == "y"
@@ -78,12 +88,16 @@ def test_own_answers_are_taken_away_before_counting():
 
 
 def test_of_equally_likely_answers_the_first_in_the_alphabet_is_guessed():
-    samples = on_clues(*(asked(f"t{i}", "Why?", answer) for i, answer in enumerate(("pear", "fig", "pear", "fig"))))
+    samples = on_clues(
+        *(asked(f"t{i}", "Why?", answer) for i, answer in enumerate(("pear", "fig", "pear", "fig")))
+    )
     guesser = Guesser(samples, chains_of_words)
     assert guesser.guess(on_clues(asked("new", "Why?", "?"))[0]) == "fig"
 
 
-@pytest.mark.parametrize("chains", [chains_of_words, chains_of_words_and_count, chains_of_words_and_place])
+@pytest.mark.parametrize(
+    "chains", [chains_of_words, chains_of_words_and_count, chains_of_words_and_place]
+)
 def test_of_one_question_nothing_is_learned(chains):
     (sample,) = on_clues(asked("t", "Why?", "x"))
     assert Guesser([sample], chains).guess(sample) == ""

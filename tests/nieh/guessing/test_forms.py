@@ -16,6 +16,8 @@ from infthor_eval.nieh.guessing.forms import form_of, question_type
         ("Why?", None, "why?", "why?"),
     ],
 )
-def test_a_question_has_the_form_of_its_words_else_its_type_else_its_first_words(text, given, form, kind):
+def test_a_question_has_the_form_of_its_words_else_its_type_else_its_first_words(
+    text, given, form, kind
+):
     question = Question("t", text, (0,), ("yes",), given)
     assert (form_of(question), question_type(question)) == (form, kind)

@@ -11,8 +11,12 @@ from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
 from .made import asked, on_clues
 
 UNIQUE = "an answer that nobody else gives"
-_TEXTS = st.sampled_from(("Is Mug on the Bed?", "Is Box on the Bed?", "Where is Mug now?", "Did you see it?"))
-_ROWS = st.tuples(st.integers(0, 3), _TEXTS, st.sampled_from(("yes", "no", "Bed")), st.integers(1, 3))
+_TEXTS = st.sampled_from(
+    ("Is Mug on the Bed?", "Is Box on the Bed?", "Where is Mug now?", "Did you see it?")
+)
+_ROWS = st.tuples(
+    st.integers(0, 3), _TEXTS, st.sampled_from(("yes", "no", "Bed")), st.integers(1, 3)
+)
 _EACH = pytest.mark.parametrize("guesser", GUESSERS, ids=lambda guesser: guesser.name)
 
 
@@ -29,13 +33,19 @@ def answered(question):
 
 @_EACH
 @settings(max_examples=8)
-@given(st.lists(_ROWS, min_size=2, max_size=10).filter(lambda rows: len({row[0] for row in rows}) > 1))
+@given(
+    st.lists(_ROWS, min_size=2, max_size=10).filter(lambda rows: len({row[0] for row in rows}) > 1)
+)
 def test_answers_on_the_own_trajectory_change_no_guess_at_it(guesser, rows):
     before = questions_of(rows)
     own = before[0].traj_id
     after = [answered(question) if question.traj_id == own else question for question in before]
-    guesses = zip(before, guesser.guess(on_clues(*before)), guesser.guess(on_clues(*after)), strict=True)
-    assert all(first == second != UNIQUE for question, first, second in guesses if question.traj_id == own)
+    guesses = zip(
+        before, guesser.guess(on_clues(*before)), guesser.guess(on_clues(*after)), strict=True
+    )
+    assert all(
+        first == second != UNIQUE for question, first, second in guesses if question.traj_id == own
+    )
 
 
 @_EACH
@@ -51,7 +61,9 @@ def test_on_one_trajectory_alone_a_question_is_left_out_itself(guesser, rows, pl
 
 @_EACH
 def test_what_the_others_answer_is_guessed(guesser):
-    samples = on_clues(*(asked(f"t{i}", "Is Mug on the Bed?", "yes" if i else "no") for i in range(5)))
+    samples = on_clues(
+        *(asked(f"t{i}", "Is Mug on the Bed?", "yes" if i else "no") for i in range(5))
+    )
     assert guesser.guess(samples) == ["yes"] * 5
 
 
@@ -62,7 +74,9 @@ def named(name):
 def test_the_constant_of_a_file_is_the_commonest_answer_elsewhere():
     # t0 sees 1 yes and 2 no elsewhere; the others 3 yes, and 1 or 2 no; equals are taken by the alphabet.
     key = [("t0", "yes"), ("t0", "yes"), ("t1", "yes"), ("t1", "no"), ("t2", "no")]
-    samples = on_clues(*(asked(traj, f"{traj} {i}?", answer) for i, (traj, answer) in enumerate(key)))
+    samples = on_clues(
+        *(asked(traj, f"{traj} {i}?", answer) for i, (traj, answer) in enumerate(key))
+    )
     assert named("one answer a file").guess(samples) == ["no", "no", "yes", "yes", "yes"]
     (alone,) = on_clues(asked("t", "Why?", "x"))
     assert named("one answer a file").guess([alone]) == [""]
@@ -72,7 +86,9 @@ def test_the_constant_of_a_form_is_the_commonest_answer_to_it():
     key = [("Is Mug on the Bed?", "no"), ("Was Box open?", "yes")]
     samples = on_clues(*(asked(f"t{i}", *key[i % 2]) for i in range(6)))
     assert named("one answer a form").guess(samples) == ["no", "yes"] * 3
-    (_, new, *_) = named("one answer a form").guess([*on_clues(asked("t9", "Why?", "x"), asked("t8", "How?", "x"))])
+    (_, new, *_) = named("one answer a form").guess(
+        [*on_clues(asked("t9", "Why?", "x"), asked("t8", "How?", "x"))]
+    )
     assert new == ""  # nobody else is asked in that form
 
 
@@ -81,7 +97,13 @@ def test_a_guesser_uses_what_it_says_it_knows(guesser):
     """The answer is in the number of clues or in their place alone; the words are the same."""
     clues = {Knowledge.NUMBER: ((1, 9), (1, 5, 9)), Knowledge.PLACE: ((1,), (501,))}
     for kind, both in clues.items():
-        questions = [asked(f"t{i}", "Is it here?", ("yes", "no")[j], both[j]) for i in range(8) for j in range(2)]
+        questions = [
+            asked(f"t{i}", "Is it here?", ("yes", "no")[j], both[j])
+            for i in range(8)
+            for j in range(2)
+        ]
         guesses = guesser.guess(on_clues(*questions))
-        right = sum(guess == question.answers[0] for guess, question in zip(guesses, questions, strict=True))
+        right = sum(
+            guess == question.answers[0] for guess, question in zip(guesses, questions, strict=True)
+        )
         assert (right == len(questions)) == (kind in guesser.knows)

@@ -8,11 +8,16 @@ import pytest
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import write_questions
-from infthor_eval.formats.user_cache import user_cache
-from infthor_eval.nieh.above_guessing import above_guessing
 from infthor_eval.nieh.guessing import guesses
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
-from infthor_eval.nieh.guessing.guesses import find_guesses, questions_by_file, sample_on_clues, visible_knowledge
+from infthor_eval.nieh.guessing.guesses import (
+    find_guesses,
+    questions_by_file,
+    sample_on_clues,
+    visible_knowledge,
+)
+from infthor_eval.nieh.results.above_guessing import above_guessing
+from infthor_eval.storage.user_cache import user_cache
 
 from ..made import record
 from .made import asked, on_clues
@@ -36,17 +41,23 @@ def constant(text, answers, clues=(1,)):
 
 def test_on_the_clue_frames_their_number_is_told_and_elsewhere_the_words_alone():
     assert visible_knowledge("clues") == Knowledge.WORDS | Knowledge.NUMBER
-    assert {visible_knowledge(name) for name in ("trajectory", "haystack", "imported")} == {Knowledge.WORDS}
+    assert {visible_knowledge(name) for name in ("trajectory", "haystack", "imported")} == {
+        Knowledge.WORDS
+    }
 
 
 def test_a_form_has_the_score_of_its_best_guesser(make_set):
     # Held out, the majority of four yes and a no is always yes; "no" is right for a single other question alone.
-    data = make_set(test=[*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))])
+    data = make_set(
+        test=[*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))]
+    )
     by_id = find_guesses(data, Knowledge.WORDS)
     by_question = [by_id[question.id] for question in data.questions]
     assert [guess.form for guess in by_question] == ["Is {} in/on {}?"] * 5 + ["Was {} open?"] * 2
     assert [guess.scores["strict"] for guess in by_question] == [1, 1, 1, 1, 0, 1, 1]
-    assert [guess.form_scores["strict"] for guess in by_question] == [pytest.approx(0.8)] * 5 + [1] * 2
+    assert [guess.form_scores["strict"] for guess in by_question] == [pytest.approx(0.8)] * 5 + [
+        1
+    ] * 2
     assert find_guesses(data, Knowledge.WORDS) is by_id
 
 
@@ -64,7 +75,9 @@ def test_guesses_are_learned_once_for_the_same_questions(make_set, monkeypatch):
 
 
 def test_a_file_is_guessed_from_itself_alone(make_set):
-    data = make_set(a=constant(PRESENCE, ("yes",) * 3, (1,)), b=constant(PRESENCE, ("no",) * 3, (2,)))
+    data = make_set(
+        a=constant(PRESENCE, ("yes",) * 3, (1,)), b=constant(PRESENCE, ("no",) * 3, (2,))
+    )
     found = find_guesses(data, Knowledge.WORDS)
     assert {guess.scores["strict"] for guess in found.values()} == {1.0}
     assert {name: len(questions) for name, questions in questions_by_file(data).items()} == {
@@ -76,7 +89,10 @@ def test_a_file_is_guessed_from_itself_alone(make_set):
 def test_what_a_guesser_may_not_know_does_not_help(make_set):
     key = [(f"t{i}", ("yes", "no")[j], ((1,), (1, 2))[j]) for i in range(6) for j in range(2)]
     data = make_set(test=[asked(traj, PRESENCE, answer, clues) for traj, answer, clues in key])
-    told, untold = (find_guesses(data, knowledge) for knowledge in map(visible_knowledge, ("clues", "trajectory")))
+    told, untold = (
+        find_guesses(data, knowledge)
+        for knowledge in map(visible_knowledge, ("clues", "trajectory"))
+    )
     assert {guess.form_scores["strict"] for guess in told.values()} == {1.0}
     assert {guess.form_scores["strict"] for guess in untold.values()} == {0.5}
 
@@ -84,7 +100,12 @@ def test_what_a_guesser_may_not_know_does_not_help(make_set):
 def test_no_guesser_is_above_guessing_and_the_best_is_there(make_set):
     answers = ("yes", "yes", "no", "yes", "no", "no", "yes", "no", "yes")
     questions = [
-        asked(f"t{i % 5}", f"Is {('Mug', 'Box', 'Pan')[i % 3]} on the Bed?", answer, (i, i + 9)[: 1 + i % 2])
+        asked(
+            f"t{i % 5}",
+            f"Is {('Mug', 'Box', 'Pan')[i % 3]} on the Bed?",
+            answer,
+            (i, i + 9)[: 1 + i % 2],
+        )
         for i, answer in enumerate(answers)
     ]
     data = make_set(test=questions)

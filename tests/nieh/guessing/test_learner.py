@@ -11,14 +11,18 @@ TEXTS = ("Is Mug on the Bed?", "Is Box on the Bed?")
 
 def right(samples, **knowledge):
     guesses = guess_by_learning(samples, **knowledge)
-    return sum(guess == sample.question.answers[0] for guess, sample in zip(guesses, samples, strict=True))
+    return sum(
+        guess == sample.question.answers[0] for guess, sample in zip(guesses, samples, strict=True)
+    )
 
 
 def of_both(clues, answers=("yes", "no")):
     """Two questions in the same words on each of six trajectories, which differ in their clues and answers."""
     each = zip(clues, answers, strict=True)
     pairs = list(each)
-    return on_clues(*(asked(f"t{i}", TEXTS[0], answer, of_one) for i in range(6) for of_one, answer in pairs))
+    return on_clues(
+        *(asked(f"t{i}", TEXTS[0], answer, of_one) for i in range(6) for of_one, answer in pairs)
+    )
 
 
 def test_words_that_give_the_answer_away_are_learned():

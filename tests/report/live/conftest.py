@@ -8,7 +8,7 @@ import pytest
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs import RunHeader
-from infthor_eval.runs.journal import Journal
+from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.suites import find_presenter, find_suite
 from tests.nieh.made import identity
 

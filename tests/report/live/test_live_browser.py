@@ -34,7 +34,10 @@ def tab(browser: Any, server: PageServer) -> Iterator[Any]:
     """A tab that is on the page; nothing may have gone wrong in it at the end."""
     opened = browser.new_page(viewport={"width": 1400, "height": 1000})
     problems: list[str] = []
-    opened.on("console", lambda message: problems.append(message.text) if message.type == "error" else None)
+    opened.on(
+        "console",
+        lambda message: problems.append(message.text) if message.type == "error" else None,
+    )
     opened.on("pageerror", lambda error: problems.append(str(error)))
     opened.goto(server.address)
     yield opened
@@ -70,13 +73,14 @@ def test_a_killed_run_is_said_to_be_none_that_goes_on(tab: Any, tmp_path: Path) 
         pytest.skip("this system has no list of locks")
     program = (
         "import sys, time\nfrom pathlib import Path\nfrom infthor_eval.nieh.records import RECORDS\n"
-        "from infthor_eval.runs.journal import Journal\nfrom tests.nieh.made import record\n"
+        "from infthor_eval.runs.journals.journal import Journal\nfrom tests.nieh.made import record\n"
         "from tests.report.live.conftest import header_of\n"
         "with Journal(Path(sys.argv[1]), header_of(), RECORDS) as journal:\n"
         "    journal.append(record(0, 'Sofa', ('Sofa',)))\n    time.sleep(600)\n"
     )
     process = subprocess.Popen(
-        [sys.executable, "-c", program, str(tmp_path / "results/m/nieh-1")], cwd=Path(__file__).parents[3]
+        [sys.executable, "-c", program, str(tmp_path / "results/m/nieh-1")],
+        cwd=Path(__file__).parents[3],
     )
     try:
         wait_for(tab, "#count", "1 of 8")
@@ -99,7 +103,9 @@ def test_hostile_text_is_text(tab: Any, open_journal) -> None:
     assert HOSTILE.strip() in tab.locator(".sample .q").last.text_content()
 
 
-def test_a_wrong_token_shows_nothing_of_the_run(browser: Any, server: PageServer, open_journal) -> None:
+def test_a_wrong_token_shows_nothing_of_the_run(
+    browser: Any, server: PageServer, open_journal
+) -> None:
     with open_journal() as journal:
         journal.append(record(0, "Sofa", ("Sofa",)))
     opened = browser.new_page()
@@ -125,7 +131,9 @@ def test_a_page_whose_server_has_ended_says_so(browser: Any, live, open_journal)
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_nothing_is_wider_than_a_phone(browser: Any, server: PageServer, open_journal, scheme: str) -> None:
+def test_nothing_is_wider_than_a_phone(
+    browser: Any, server: PageServer, open_journal, scheme: str
+) -> None:
     with open_journal(name="a-model-with-a-long-name" * 3) as journal:
         journal.append(record(0, "Sofa " * 200, ("Sofa",)))
         journal.append(record(1, "x" * 500, ("Sofa",)))

@@ -6,14 +6,16 @@ import msgspec
 import pytest
 
 from infthor_eval.report.live.state import LiveRun
-from infthor_eval.runs import journal as journals
-from infthor_eval.runs.following import is_written
+from infthor_eval.runs.journals import journal as journals
+from infthor_eval.runs.journals.following import is_written
 from infthor_eval.suites import find_presenter, find_suite
 from tests.nieh.made import record
 
 from .conftest import N_UNITS
 
-needs_locks = pytest.mark.skipif(not Path("/proc/locks").is_file(), reason="this system has no list of locks")
+needs_locks = pytest.mark.skipif(
+    not Path("/proc/locks").is_file(), reason="this system has no list of locks"
+)
 
 
 def folder_of(path: Path) -> Path:
@@ -22,7 +24,11 @@ def folder_of(path: Path) -> Path:
 
 def test_a_run_that_has_not_started_is_waited_for(live, tmp_path, open_journal) -> None:
     state = live.state()
-    assert (state.status, state.folder, state.totals.n_done) == ("waiting", str(tmp_path / "results"), 0)
+    assert (state.status, state.folder, state.totals.n_done) == (
+        "waiting",
+        str(tmp_path / "results"),
+        0,
+    )
     (tmp_path / "results" / "m").mkdir(parents=True)
     assert live.state().status == "waiting"
     with open_journal():
@@ -39,7 +45,11 @@ def test_what_is_appended_is_seen_and_summed_up(live, open_journal) -> None:
         journal.append(record(2, None, ("Bed",), failure="m fails"))
         live._metrics_due = 0.0  # a moment later
         second = live.state()
-    assert (first.status, first.totals.n_done, [sample.reply for sample in first.newest]) == ("running", 1, ["Sofa"])
+    assert (first.status, first.totals.n_done, [sample.reply for sample in first.newest]) == (
+        "running",
+        1,
+        ["Sofa"],
+    )
     assert second.totals.n_done == 3
     assert [sample.outcome for sample in second.newest] == ["failed", "wrong", "right"]
     assert [(sample.id, sample.reason) for sample in second.failures] == [("q2", "m fails")]
@@ -50,7 +60,12 @@ def test_what_is_appended_is_seen_and_summed_up(live, open_journal) -> None:
 
 def test_the_metrics_at_the_end_are_those_of_the_results(run, tmp_path, make_nieh_set) -> None:
     data = make_nieh_set(size=56)
-    assert run("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")[0] == 0
+    assert (
+        run("--model", "blind", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out")[
+            0
+        ]
+        == 0
+    )
     state = LiveRun(tmp_path / "out", find_suite, find_presenter).state()
     (results,) = (tmp_path / "out").rglob("results.json")
     stored = msgspec.json.decode(results.read_bytes())["primary_metrics"]
@@ -73,7 +88,9 @@ def test_a_half_written_line_is_left_for_later(live, open_journal, tmp_path) -> 
 
 
 @pytest.mark.parametrize("length", [0, 10])
-def test_a_header_that_is_not_whole_is_a_run_that_has_not_started(live, open_journal, tmp_path, length: int) -> None:
+def test_a_header_that_is_not_whole_is_a_run_that_has_not_started(
+    live, open_journal, tmp_path, length: int
+) -> None:
     with open_journal():
         pass
     shard = folder_of(tmp_path) / "journal" / "worker-0.jsonl"
@@ -143,11 +160,15 @@ def test_a_bad_line_is_told_in_one_line(live, open_journal, tmp_path) -> None:
         assert "worker-0.jsonl, line 3: not a line of a journal" in live.state().problem
 
 
-def test_watching_leaves_the_folder_as_it_was_and_holds_no_lock(live, open_journal, tmp_path) -> None:
+def test_watching_leaves_the_folder_as_it_was_and_holds_no_lock(
+    live, open_journal, tmp_path
+) -> None:
     with open_journal() as journal:
         journal.append(record(0, "Sofa", ("Sofa",)))
     paths = sorted((tmp_path / "results").rglob("*"))
-    before = [(path, path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in paths]
+    before = [
+        (path, path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in paths
+    ]
     for path in (*paths, tmp_path / "results"):
         path.chmod(0o555 if path.is_dir() else 0o444)
     try:
@@ -155,7 +176,9 @@ def test_watching_leaves_the_folder_as_it_was_and_holds_no_lock(live, open_journ
     finally:
         for path in (tmp_path / "results", *paths):
             path.chmod(0o755 if path.is_dir() else 0o644)
-    after = [(path, path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in paths]
+    after = [
+        (path, path.stat().st_mtime_ns, path.is_file() and path.read_bytes()) for path in paths
+    ]
     assert after == before
     assert not is_written(folder_of(tmp_path))
     with open_journal():  # refused if somebody holds it
@@ -179,7 +202,9 @@ def test_a_run_that_is_moved_away_is_waited_for(live, open_journal, tmp_path) ->
     assert (live.state().totals.n_done, live.state().problem) == (1, "")
 
 
-def test_what_the_system_refuses_is_told_in_one_line(live, open_journal, tmp_path, monkeypatch) -> None:
+def test_what_the_system_refuses_is_told_in_one_line(
+    live, open_journal, tmp_path, monkeypatch
+) -> None:
     with open_journal() as journal:
         journal.append(record(0, "Sofa", ("Sofa",)))
 

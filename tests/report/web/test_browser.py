@@ -5,7 +5,7 @@ from urllib.parse import parse_qs, quote
 import msgspec
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
+from infthor_eval.storage.packaged import packaged_folder
 
 from .conftest import HOSTILE
 
@@ -25,7 +25,9 @@ def test_it_opens_without_errors_and_fetches_nothing(page, open_page):
     opened = open_page(page)
     assert count(opened.tab) == f"{len(page.samples)} of {len(page.samples)}"
     assert opened.tab.locator("#sample h3").inner_text() == page.samples[0].title
-    assert opened.tab.locator("figure.chart svg").count() == sum(len(section.charts) for section in page.sections)
+    assert opened.tab.locator("figure.chart svg").count() == sum(
+        len(section.charts) for section in page.sections
+    )
     assert opened.errors == []
     assert all(url.startswith(("file:", "data:")) for url in opened.requests)
 
@@ -40,10 +42,14 @@ def test_filters_show_what_they_say(page, open_page):
     assert tab.locator("#sample h3").inner_text() == wrong[0].title
     tab.keyboard.press("Escape")
     tab.wait_for_function(
-        "document.getElementById('count').textContent.startsWith(" + repr(f"{len(page.samples)} of") + ")"
+        "document.getElementById('count').textContent.startsWith("
+        + repr(f"{len(page.samples)} of")
+        + ")"
     )
     tab.check("#disagree")
-    disagreed = sum(any(len(set(it.scores.values())) > 1 for it in sample.results) for sample in page.samples)
+    disagreed = sum(
+        any(len(set(it.scores.values())) > 1 for it in sample.results) for sample in page.samples
+    )
     assert count(tab).startswith(f"{disagreed} of")
     tab.uncheck("#disagree")
     tab.check("#differ")
@@ -57,7 +63,9 @@ def test_filters_show_what_they_say(page, open_page):
 def test_pictures_of_a_sample_load(page, open_page):
     tab = open_page(page).tab
     tab.locator("#sample").scroll_into_view_if_needed()
-    tab.eval_on_selector_all("#sample img", "them => Promise.all(them.map(it => it.decode())).then(() => true)")
+    tab.eval_on_selector_all(
+        "#sample img", "them => Promise.all(them.map(it => it.decode())).then(() => true)"
+    )
     widths = tab.eval_on_selector_all("#sample img", "them => them.map(it => it.naturalWidth)")
     assert len(widths) == len(page.samples[0].timeline.frames)
     assert all(width > 100 for width in widths)
@@ -65,7 +73,11 @@ def test_pictures_of_a_sample_load(page, open_page):
 
 def test_an_absence_has_five_frames_and_no_clue(page, open_page):
     tab = open_page(page).tab
-    place = next(at for at, sample in enumerate(page.samples) if "no frame is evidence" in sample.timeline.note)
+    place = next(
+        at
+        for at, sample in enumerate(page.samples)
+        if "no frame is evidence" in sample.timeline.note
+    )
     tab.fill("#search", page.samples[place].title)
     tab.select_option("#clues", "absence")
     assert tab.locator("#sample .frames figure").count() == 5
@@ -80,18 +92,24 @@ def test_samples_of_a_suite_have_its_runs_alone(make_page, nieh_runs, scripted_r
     labels = {suite: {page.runs[at].label for at in it.runs} for suite, it in page.suites.items()}
     for suite, task in (("nieh", "nieh_mini_gt"), ("plans", "infthor_plans")):
         tab.select_option("#task", task)
-        assert set(tab.locator("#sample .results tbody tr td:first-child").all_inner_texts()) == labels[suite]
+        assert (
+            set(tab.locator("#sample .results tbody tr td:first-child").all_inner_texts())
+            == labels[suite]
+        )
         assert tab.locator(".item >> nth=0").locator(".mark").count() == len(labels[suite])
         assert "not evaluated" not in tab.locator("#sample").inner_text()
 
 
-def test_a_run_without_the_task_of_a_sample_is_not_listed_and_one_that_stopped_before_it_is(page, open_page):
+def test_a_run_without_the_task_of_a_sample_is_not_listed_and_one_that_stopped_before_it_is(
+    page, open_page
+):
     def only(sample, place):
         results = tuple(result if at == place else None for at, result in enumerate(sample.results))
         return msgspec.structs.replace(sample, results=results)
 
     first, second, third = (
-        msgspec.structs.replace(page.samples[at], task=task) for at, task in enumerate(("a", "a", "b"))
+        msgspec.structs.replace(page.samples[at], task=task)
+        for at, task in enumerate(("a", "a", "b"))
     )
     samples = [first, only(second, 0), only(third, 1)]
     tab = open_page(page.__class__(**(vars(page) | {"samples": samples}))).tab
@@ -127,7 +145,9 @@ def test_a_sample_has_an_address_that_opens_it(page, open_page):
     tab.goto("about:blank")
     tab.goto(address)
     assert title(tab) == before.title
-    assert tab.locator('[aria-selected="true"]').get_attribute("data-place") == str(len(page.samples) - 2)
+    assert tab.locator('[aria-selected="true"]').get_attribute("data-place") == str(
+        len(page.samples) - 2
+    )
     assert opened.errors == []
 
 
@@ -135,7 +155,10 @@ def test_the_address_survives_filters_that_its_sample_passes(page, open_page):
     tab = open_page(page).tab
     tab.locator(".item >> nth=4").click()
     address, sample = tab.url, page.samples[4]
-    for change in (lambda: tab.select_option("#task", sample.task), lambda: tab.fill("#search", sample.title)):
+    for change in (
+        lambda: tab.select_option("#task", sample.task),
+        lambda: tab.fill("#search", sample.title),
+    ):
         change()
         assert (tab.url, title(tab)) == (address, sample.title)
     tab.fill("#search", "no such words")
@@ -150,7 +173,9 @@ def test_the_address_survives_filters_that_its_sample_passes(page, open_page):
 def test_an_address_is_followed_on_the_open_page_and_past_filters(page, open_page):
     tab = open_page(page).tab
     tab.fill("#search", "no such words")
-    tab.evaluate("address => { location.hash = address }", f"sample={quote(page.samples[7].id, safe='')}")
+    tab.evaluate(
+        "address => { location.hash = address }", f"sample={quote(page.samples[7].id, safe='')}"
+    )
     tab.wait_for_selector("#sample h3")
     assert title(tab) == page.samples[7].title
     assert count(tab).startswith(f"{len(page.samples)} of")
@@ -197,7 +222,12 @@ def test_a_frame_opens_large_with_its_step_and_the_arrows_go_on(page, open_page)
     assert enlarged(tab)["in view"] == ", ".join(facts.objects)
     assert enlarged(tab)["agent"] == facts.pose
     shown = [enlarged(tab)["frame"]]
-    for key in ("ArrowRight", "ArrowLeft", "ArrowLeft", "ArrowLeft"):  # the first one has none before it
+    for key in (
+        "ArrowRight",
+        "ArrowLeft",
+        "ArrowLeft",
+        "ArrowLeft",
+    ):  # the first one has none before it
         tab.keyboard.press(key)
         shown.append(enlarged(tab)["frame"])
     at = [f"{frame.index}, a clue" if frame.is_clue else str(frame.index) for frame in frames]
@@ -218,7 +248,9 @@ def go_to_episode(tab, page):
     return page.samples[place].results[0]
 
 
-def test_a_frame_of_an_episode_opens_large_with_its_action(make_page, scripted_run, scripted_data, open_page):
+def test_a_frame_of_an_episode_opens_large_with_its_action(
+    make_page, scripted_run, scripted_data, open_page
+):
     page = make_page(scripted_run, data=scripted_data, episodes=2)
     opened = open_page(page)
     episode = go_to_episode(opened.tab, page)
@@ -233,7 +265,9 @@ def test_keys_go_through_the_samples(page, open_page):
     opened = open_page(page)
     for key, place in (("j", 1), ("j", 2), ("k", 1)):
         opened.tab.keyboard.press(key)
-        assert opened.tab.locator('[aria-selected="true"]').get_attribute("data-place") == str(place)
+        assert opened.tab.locator('[aria-selected="true"]').get_attribute("data-place") == str(
+            place
+        )
         assert opened.tab.locator("#sample h3").inner_text() == page.samples[place].title
     opened.tab.keyboard.press("/")
     opened.tab.keyboard.type("jk")  # letters of a search, not keys
@@ -251,21 +285,36 @@ def test_text_can_be_read_in_both_schemes(page, open_page, scheme):
         tab.evaluate(f"getComputedStyle(document.body).{name}").removeprefix("rgb(").split(",")[0]
         for name in ("color", "backgroundColor")
     )
-    assert (int(ink) > 200, int(paper) < 60) == ((True, True) if scheme == "dark" else (False, False))
-    in_chart = tab.evaluate("getComputedStyle(document.querySelector('figure.chart svg text')).fill")
+    assert (int(ink) > 200, int(paper) < 60) == (
+        (True, True) if scheme == "dark" else (False, False)
+    )
+    in_chart = tab.evaluate(
+        "getComputedStyle(document.querySelector('figure.chart svg text')).fill"
+    )
     assert in_chart == tab.evaluate("getComputedStyle(document.body).color")
 
 
 def test_hostile_text_stays_text(page, open_page):
     sample = page.samples[0]
     results = tuple(
-        msgspec.structs.replace(it, reply=HOSTILE, reason=HOSTILE, faults=(HOSTILE,)) for it in sample.results
+        msgspec.structs.replace(it, reply=HOSTILE, reason=HOSTILE, faults=(HOSTILE,))
+        for it in sample.results
     )
     hostile = msgspec.structs.replace(
-        sample, title=HOSTILE, target=HOSTILE, kind=HOSTILE, cluster=HOSTILE, variant=HOSTILE, results=results
+        sample,
+        title=HOSTILE,
+        target=HOSTILE,
+        kind=HOSTILE,
+        cluster=HOSTILE,
+        variant=HOSTILE,
+        results=results,
     )
-    runs = [page.runs[0].__class__(HOSTILE, ((HOSTILE, HOSTILE),), HOSTILE, HOSTILE) for _ in page.runs]
-    opened = open_page(page.__class__(**(vars(page) | {"samples": [hostile], "runs": runs, "title": HOSTILE})))
+    runs = [
+        page.runs[0].__class__(HOSTILE, ((HOSTILE, HOSTILE),), HOSTILE, HOSTILE) for _ in page.runs
+    ]
+    opened = open_page(
+        page.__class__(**(vars(page) | {"samples": [hostile], "runs": runs, "title": HOSTILE}))
+    )
     assert opened.tab.locator("#sample h3").inner_text().startswith("</script><img")
     assert opened.tab.evaluate("window.hacked") is None
     assert opened.tab.locator("#sample img[onerror], #list img, main img[src=x]").count() == 0
@@ -293,5 +342,8 @@ def test_of_many_samples_only_those_in_view_are_elements(page, open_page):
     tab.keyboard.press("k")
     chosen = tab.locator('[aria-selected="true"]')
     assert chosen.get_attribute("data-place") == str(last - 1)
-    assert (chosen.get_attribute("aria-posinset"), chosen.get_attribute("aria-setsize")) == (str(last), str(last + 1))
+    assert (chosen.get_attribute("aria-posinset"), chosen.get_attribute("aria-setsize")) == (
+        str(last),
+        str(last + 1),
+    )
     assert opened.errors == []

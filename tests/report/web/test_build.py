@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.nieh.samples import open_set
 from infthor_eval.report.runs import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
+from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.suites import find_presenter, find_suite
 
 DATA = packaged_folder("sets/nieh_mini")
@@ -32,7 +32,12 @@ def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
         clues = {frame.index for frame in sample.timeline.frames if frame.is_clue}
         assert clues == (set() if question.absence else set(question.clues))
         assert all(frame.picture is not None for frame in sample.timeline.frames)
-        beside = {near for at in clues for near in (at - 1, at + 1) if 0 <= near < sample.timeline.n_frames}
+        beside = {
+            near
+            for at in clues
+            for near in (at - 1, at + 1)
+            if 0 <= near < sample.timeline.n_frames
+        }
         assert {frame.index for frame in sample.timeline.frames} >= beside
 
 
@@ -65,14 +70,30 @@ def test_the_sections_have_their_pictures_and_tables(page):
     titles = [chart.title for chart in sections["nieh"].charts]
     assert "nieh_mini_gt: accuracy by number of clues" in titles
     assert "oracle: accuracy by depth and size of the context" in titles
-    assert all(chart.svg.startswith("<svg") and "viewBox" in chart.svg for chart in sections["nieh"].charts)
-    assert any("Table 4" in row.cells[1] for table in sections["nieh"].tables for row in table.rows if row.is_published)
+    assert all(
+        chart.svg.startswith("<svg") and "viewBox" in chart.svg for chart in sections["nieh"].charts
+    )
+    assert any(
+        "Table 4" in row.cells[1]
+        for table in sections["nieh"].tables
+        for row in table.rows
+        if row.is_published
+    )
     primary_metrics = {row.cells[:2]: row.cells[3] for row in sections["results"].tables[0].rows}
     assert primary_metrics["oracle", "nieh_mini_gt"] == "100.0"
 
 
 def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run):
-    words = ("--model", "oracle", "--tasks", "nieh_mini_gt", "--limit", "12", "--frames", "shown,blank")
+    words = (
+        "--model",
+        "oracle",
+        "--tasks",
+        "nieh_mini_gt",
+        "--limit",
+        "12",
+        "--frames",
+        "shown,blank",
+    )
     assert run(*words, "--output", tmp_path)[0] == 0
     page = make_page(*sorted((tmp_path / "oracle").iterdir()))
     (questions,) = (section for section in page.sections if section.key == "nieh")
@@ -85,9 +106,13 @@ def test_frames_that_there_is_no_room_for_are_counted_and_clues_come_first(make_
     page = make_page(nieh_runs[0], data=DATA, pictures=100_000)
     assert sum(map(len, page.pictures)) <= 100_000
     assert any("pictures left out" in note for note in page.notes)
-    frames = [(sample.cluster, frame) for sample in page.samples for frame in sample.timeline.frames]
+    frames = [
+        (sample.cluster, frame) for sample in page.samples for frame in sample.timeline.frames
+    ]
     clues = {(trajectory, frame.index) for trajectory, frame in frames if frame.is_clue}
-    pictured = {(trajectory, frame.index) for trajectory, frame in frames if frame.picture is not None}
+    pictured = {
+        (trajectory, frame.index) for trajectory, frame in frames if frame.picture is not None
+    }
     assert pictured < clues
 
 
@@ -123,7 +148,12 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
 
 def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scripted_data):
     page = make_page(scripted_run, data=scripted_data, episodes=3)
-    assert {section.key for section in page.sections} >= {"results", "plans", "rewards-infthor_plans", "cost"}
+    assert {section.key for section in page.sections} >= {
+        "results",
+        "plans",
+        "rewards-infthor_plans",
+        "cost",
+    }
     seen = [sample for sample in page.samples if sample.results[0].map is not None]
     assert len(seen) == 3
     for sample in seen:
@@ -131,7 +161,9 @@ def test_plans_have_their_steps_and_what_was_seen(make_page, scripted_run, scrip
         assert result.start is not None
         assert all(step.picture is not None for step in result.steps)
         assert not result.note  # it went as it was recorded
-    unseen = next(sample for sample in page.samples if sample.results[0].steps and sample not in seen)
+    unseen = next(
+        sample for sample in page.samples if sample.results[0].steps and sample not in seen
+    )
     assert unseen.results[0].steps[0].action
 
 
@@ -147,5 +179,10 @@ def test_what_takes_long_is_counted_to_its_end(nieh_runs, scripted_run, scripted
 
     runs = read_report_runs([*nieh_runs, scripted_run], find_suite, find_presenter)
     build_page(runs, PageRequest(episodes=1), Watching())
-    assert set(begun) == {"runs summarised", "frames read", "runs with their prompts", "episodes replayed"}
+    assert set(begun) == {
+        "runs summarised",
+        "frames read",
+        "runs with their prompts",
+        "episodes replayed",
+    }
     assert counted == begun

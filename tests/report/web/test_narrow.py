@@ -2,8 +2,8 @@
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.report.web.sections import Section
+from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.tables import Column, Row, Table
 
 DATA = packaged_folder("sets/nieh_mini")
@@ -29,7 +29,10 @@ def test_nothing_is_wider_than_the_page_and_every_section_has_its_link(phone, pa
     tab = phone(title="a title of a run with a name that is long " * 3)
     assert tab.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     links = tab.locator("nav a")
-    assert links.all_inner_texts()[1:-1] == ["Runs", *(section.title for section in page.sections[1:])]
+    assert links.all_inner_texts()[1:-1] == [
+        "Runs",
+        *(section.title for section in page.sections[1:]),
+    ]
     for at in range(links.count()):
         box = links.nth(at).bounding_box()
         assert box["x"] >= 0 and box["x"] + box["width"] <= PHONE["width"]
@@ -39,7 +42,9 @@ def test_replies_have_the_width_of_the_page_and_numbers_their_names(phone):
     tab = phone()
     assert tab.locator("#sample .reply").first.bounding_box()["width"] > 350
     assert tab.locator("#sample .results thead").is_hidden()
-    name = tab.locator("#sample .results td.n").first.evaluate("it => getComputedStyle(it, '::before').content")
+    name = tab.locator("#sample .results td.n").first.evaluate(
+        "it => getComputedStyle(it, '::before').content"
+    )
     assert name == '"strict "'
 
 
@@ -50,7 +55,9 @@ def test_tables_that_scroll_say_so(phone, page):
     scrolls = tab.locator("#wide .scroll")
     tab.wait_for_selector("#wide .scroll[data-wide]")
     assert [scrolls.nth(at).get_attribute("data-wide") for at in range(2)] == ["", None]
-    assert "scrolls sideways" in scrolls.first.evaluate("it => getComputedStyle(it, '::before').content")
+    assert "scrolls sideways" in scrolls.first.evaluate(
+        "it => getComputedStyle(it, '::before').content"
+    )
 
 
 def test_parts_of_a_section_have_no_link_and_long_titles_leave_room_for_the_others(page, open_page):
@@ -60,7 +67,9 @@ def test_parts_of_a_section_have_no_link_and_long_titles_leave_room_for_the_othe
         Section("part", "part of it", notes=("x",), is_linked=False),
         Section("last", "Last", notes=("x",)),
     ]
-    tab = open_page(page.__class__(**(vars(page) | {"sections": sections, "title": "long title " * 20}))).tab
+    tab = open_page(
+        page.__class__(**(vars(page) | {"sections": sections, "title": "long title " * 20}))
+    ).tab
     assert [text[:7] for text in tab.locator("nav a").all_inner_texts()] == [
         "Results",
         "Runs",

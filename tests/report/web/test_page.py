@@ -16,7 +16,9 @@ from infthor_eval.tables import Column, Row, Table
 
 from .conftest import HOSTILE
 
-TEXT = st.text(st.characters(blacklist_categories=["Cs"]), min_size=1, max_size=40) | st.just(HOSTILE)
+TEXT = st.text(st.characters(blacklist_categories=["Cs"]), min_size=1, max_size=40) | st.just(
+    HOSTILE
+)
 
 
 def page_of(text, n_samples=1):

@@ -14,13 +14,22 @@ from ...runs.toy import Sum, ToySuite
 
 def record(a, b, answer, **more):
     return UnitRecord(
-        task="sums", id=f"{a}+{b}", cluster=f"from {a}", fingerprint="f", payload=Sum((a, b), answer), **more
+        task="sums",
+        id=f"{a}+{b}",
+        cluster=f"from {a}",
+        fingerprint="f",
+        payload=Sum((a, b), answer),
+        **more,
     )
 
 
 def run(name, *records):
-    header = RunHeader(suite="toy", name=name, config={"model": {"name": name}, "tasks": {"sums": {}}})
-    return ReportRun(Path(name), name, name, ToySuite(), PlainPresenter(), header, records, NOTHING, 0)
+    header = RunHeader(
+        suite="toy", name=name, config={"model": {"name": name}, "tasks": {"sums": {}}}
+    )
+    return ReportRun(
+        Path(name), name, name, ToySuite(), PlainPresenter(), header, records, NOTHING, 0
+    )
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +44,10 @@ def test_it_has_the_suites_tables_and_primary_metric(page):
     assert sections["toy"].title == "Toy"
     assert [row.cells for row in sections["toy"].tables[0].rows] == [("right", "2"), ("wrong", "1")]
     rows = [row.cells[:4] for row in sections["results"].tables[0].rows]
-    assert rows == [("right", "sums", "primary metric", "100.0"), ("wrong", "sums", "primary metric", "50.0")]
+    assert rows == [
+        ("right", "sums", "primary metric", "100.0"),
+        ("wrong", "sums", "primary metric", "50.0"),
+    ]
     (comparison,) = sections["comparison"].tables
     assert comparison.rows[0].cells[:6] == ("sums", "right", "%", "100.00", "0.00", "-100.00")
 
@@ -50,7 +62,10 @@ def test_its_samples_have_outcomes_scores_and_all_that_the_records_hold(page):
         {"numbers": "[1, 3]", "answer": "9"},
     ]
     assert [result.outcome for result in second.results] == ["right", "failed"]
-    assert (second.results[1].reason, second.results[1].details) == ("the abacus is broken", {"numbers": "[1, 4]"})
+    assert (second.results[1].reason, second.results[1].details) == (
+        "the abacus is broken",
+        {"numbers": "[1, 4]"},
+    )
 
 
 def test_a_long_field_is_cut(page):
@@ -63,7 +78,9 @@ def test_a_long_field_is_cut(page):
     assert len(PlainPresenter().details(long)["text"]) == 2001
 
 
-@pytest.mark.parametrize(("scores", "is_share"), [([0.0, 1.0], True), ([0.5, 1.5], False), ([-1.0, 0.0], False)])
+@pytest.mark.parametrize(
+    ("scores", "is_share"), [([0.0, 1.0], True), ([0.5, 1.5], False), ([-1.0, 0.0], False)]
+)
 def test_a_metric_beyond_a_share_is_shown_as_it_is(scores, is_share):
     assert PlainPresenter().is_share("reward", scores) == is_share
 

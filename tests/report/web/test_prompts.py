@@ -6,9 +6,9 @@ import shutil
 import msgspec
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.runs import UnitKey
-from infthor_eval.runs.tracebacks import TracebackFile
+from infthor_eval.runs.journals.tracebacks import TracebackFile
+from infthor_eval.storage.packaged import packaged_folder
 
 from .conftest import HOSTILE
 
@@ -25,10 +25,14 @@ def test_equal_prompts_are_there_once_and_none_is_guessed(page):
     assert used == set(range(len(page.prompts)))
     assert not any(prompt.problem for prompt in page.prompts)
     for sample in page.samples:
-        assert len({result.prompt for result in sample.results}) == 1  # both runs were asked the same
+        assert (
+            len({result.prompt for result in sample.results}) == 1
+        )  # both runs were asked the same
 
 
-def test_without_the_set_the_page_says_that_the_prompt_is_not_known(make_page, nieh_runs, make_nieh_set, open_page):
+def test_without_the_set_the_page_says_that_the_prompt_is_not_known(
+    make_page, nieh_runs, make_nieh_set, open_page
+):
     page = make_page(nieh_runs[0], data=make_nieh_set())
     tab = open_page(page).tab
     tab.select_option("#task", "nieh_haystack_8k")
@@ -52,18 +56,28 @@ def test_the_whole_prompt_unfolds_with_its_frames_in_their_places(page, open_pag
 
 def test_clues_that_a_context_left_out_are_marked(page, open_page):
     # A window that ends before the clue of the sample.
-    sample = next(it for it in page.samples if sum(frame.is_clue for frame in it.timeline.frames) == 1)
+    sample = next(
+        it for it in page.samples if sum(frame.is_clue for frame in it.timeline.frames) == 1
+    )
     (clue,) = (frame for frame in sample.timeline.frames if frame.is_clue)
     number = len(page.prompts)
     cut = msgspec.structs.replace(page.prompts[0], shown=((clue.index + 1, clue.index + 9),))
     first, second = sample.results
     for results, caption in (
         ((first, msgspec.structs.replace(second, prompt=number)), "clue, not shown to all"),
-        (tuple(msgspec.structs.replace(it, prompt=number) for it in sample.results), "clue, not shown"),
+        (
+            tuple(msgspec.structs.replace(it, prompt=number) for it in sample.results),
+            "clue, not shown",
+        ),
     ):
         changed = msgspec.structs.replace(sample, results=results)
-        opened = open_page(page.__class__(**(vars(page) | {"samples": [changed], "prompts": [*page.prompts, cut]})))
-        assert opened.tab.locator("#sample .frames .clue figcaption").inner_text() == f"{clue.index} {caption}"
+        opened = open_page(
+            page.__class__(**(vars(page) | {"samples": [changed], "prompts": [*page.prompts, cut]}))
+        )
+        assert (
+            opened.tab.locator("#sample .frames .clue figcaption").inner_text()
+            == f"{clue.index} {caption}"
+        )
         opened.tab.locator("#sample .frames .clue button").click()
         without = opened.tab.locator("#enlarged dd").last.inner_text()
         labels = [run.label for run in page.runs]
@@ -106,7 +120,10 @@ def test_tracebacks_of_failures_unfold_as_text(make_page, nieh_runs, tmp_path, o
     opened.tab.select_option("#outcome", "failed")
     for _ in at:
         opened.tab.click("details.traceback summary")
-        assert "ZeroDivisionError: </script><img" in opened.tab.locator("details.traceback pre").inner_text()
+        assert (
+            "ZeroDivisionError: </script><img"
+            in opened.tab.locator("details.traceback pre").inner_text()
+        )
         opened.tab.keyboard.press("j")
     assert opened.tab.evaluate("window.hacked") is None
     assert opened.errors == []

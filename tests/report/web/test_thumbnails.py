@@ -27,10 +27,14 @@ def test_each_picture_is_there_once_small_and_large():
 
 
 @pytest.mark.parametrize(("side", "large"), [(132, None), (300, (300, 300)), (768, (480, 480))])
-def test_an_enlarged_picture_is_no_larger_than_the_frame_and_only_there_if_it_shows_more(side, large):
+def test_an_enlarged_picture_is_no_larger_than_the_frame_and_only_there_if_it_shows_more(
+    side, large
+):
     store = ThumbnailStore(10_000_000)
     store.add("a", lambda: noise(0, side))
-    assert [size_of(store.encoded[number]) for number in store.large.values()] == ([large] if large else [])
+    assert [size_of(store.encoded[number]) for number in store.large.values()] == (
+        [large] if large else []
+    )
 
 
 def test_thumbnails_take_the_room_of_enlarged_pictures_and_the_first_ones_keep_theirs():

@@ -53,7 +53,11 @@ def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
 
     with serving(answer) as url:
         (step,) = _act(url + ending, plain_frames[1], image=image, unnorm_key="bridge_orig")
-    assert (step.translation, step.rotation, step.gripper) == ((0.1, 0.2, 0.3), (-0.1, -0.2, -0.3), 1.0)
+    assert (step.translation, step.rotation, step.gripper) == (
+        (0.1, 0.2, 0.3),
+        (-0.1, -0.2, -0.3),
+        1.0,
+    )
     (request,) = asked
     assert request.keys() == {"image", "instruction", "unnorm_key"}
     assert (request["instruction"], request["unnorm_key"]) == ("pick up the mug", "bridge_orig")
@@ -74,7 +78,9 @@ def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
         assert len(_act(url, plain_frames[0], execute="2")) == 2
 
 
-def test_a_policy_behind_a_server_acts_as_it_does_here(policies: dict[str, VlaPolicy], plain_frames: Frames) -> None:
+def test_a_policy_behind_a_server_acts_as_it_does_here(
+    policies: dict[str, VlaPolicy], plain_frames: Frames
+) -> None:
     with serving(policy_answers(policies["openvla"])) as url:
         policy: Any = load("vla-http", {"url": url}, 0)
         check_adapter(policy)
@@ -97,7 +103,9 @@ def test_a_policy_behind_a_server_acts_as_it_does_here(policies: dict[str, VlaPo
         ([10**400, *ACTION[1:]], "answers without an action of numbers"),
     ],
 )
-def test_a_reply_that_is_no_action_is_refused(reply: Any, message: str, plain_frames: Frames) -> None:
+def test_a_reply_that_is_no_action_is_refused(
+    reply: Any, message: str, plain_frames: Frames
+) -> None:
     assert message in _refused(lambda *_: reply, plain_frames[0])
 
 
@@ -109,12 +117,16 @@ def test_an_error_of_the_server_is_told_and_not_tried_again(plain_frames: Frames
         n_asked += 1
         send(handler, 500, b"CUDA out\nof memory")
 
-    assert "answers 500 Internal Server Error: 'CUDA out of memory'" in _refused(answer, plain_frames[0])
+    assert "answers 500 Internal Server Error: 'CUDA out of memory'" in _refused(
+        answer, plain_frames[0]
+    )
     assert n_asked == 1
 
 
 def test_what_is_no_json_is_refused(plain_frames: Frames) -> None:
-    message = _refused(lambda _, handler: send(handler, 200, b"<html>hello</html>"), plain_frames[0])
+    message = _refused(
+        lambda _, handler: send(handler, 200, b"<html>hello</html>"), plain_frames[0]
+    )
     assert "answers with something that is not JSON: '<html>hello</html>'" in message
 
 
@@ -154,7 +166,9 @@ def test_a_server_that_takes_too_long_is_not_waited_for(slow: str, plain_frames:
     ],
     ids=["closed", "cut off"],
 )
-def test_a_lost_connection_is_tried_again(fail: Callable[[Any], None], plain_frames: Frames) -> None:
+def test_a_lost_connection_is_tried_again(
+    fail: Callable[[Any], None], plain_frames: Frames
+) -> None:
     n_asked = 0
 
     def answer(_request: Any, handler: BaseHTTPRequestHandler) -> Any:
@@ -170,7 +184,9 @@ def test_a_lost_connection_is_tried_again(fail: Callable[[Any], None], plain_fra
         assert _act(url, plain_frames[0], retries="2")
         assert n_asked == 3
         n_asked = 0
-        with pytest.raises(ModelError, match=r"/act cannot be reached in 2 attempts .*; is the server up\?"):
+        with pytest.raises(
+            ModelError, match=r"/act cannot be reached in 2 attempts .*; is the server up\?"
+        ):
             _act(url, plain_frames[0], retries="1")
 
 
@@ -182,9 +198,13 @@ def test_a_server_that_is_not_there_is_one_line(plain_frames: Frames) -> None:
             _act(url, plain_frames[0])
 
 
-def test_a_reply_without_end_is_not_read(monkeypatch: pytest.MonkeyPatch, plain_frames: Frames) -> None:
+def test_a_reply_without_end_is_not_read(
+    monkeypatch: pytest.MonkeyPatch, plain_frames: Frames
+) -> None:
     monkeypatch.setattr(client, "_LARGEST", 1000)
-    message = _refused(lambda _, handler: send(handler, 200, b"[" + b"0.1," * 5000), plain_frames[0])
+    message = _refused(
+        lambda _, handler: send(handler, 200, b"[" + b"0.1," * 5000), plain_frames[0]
+    )
     assert "answers more than 1000 bytes" in message
 
 

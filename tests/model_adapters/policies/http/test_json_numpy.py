@@ -25,7 +25,11 @@ def test_an_array_that_is_a_view_is_written_in_its_own_order() -> None:
 
 
 NUMBERS = [0.5, -1.0, 2.0]
-ARRAY = {"__numpy__": base64.b64encode(struct.pack("<3d", *NUMBERS)).decode(), "dtype": "<f8", "shape": [3]}
+ARRAY = {
+    "__numpy__": base64.b64encode(struct.pack("<3d", *NUMBERS)).decode(),
+    "dtype": "<f8",
+    "shape": [3],
+}
 
 
 @pytest.mark.parametrize(

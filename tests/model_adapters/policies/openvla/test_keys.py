@@ -14,7 +14,11 @@ from model_adapters.policies.openvla.network import OpenVLAWeights, weights_layo
 from model_adapters.policies.openvla.vision import TOWERS
 from model_adapters.policies.weights import Layout, Shape, empty_parameters
 
-DINO, SIGLIP, LLAMA = "vision_backbone.featurizer", "vision_backbone.fused_featurizer", "language_model.model"
+DINO, SIGLIP, LLAMA = (
+    "vision_backbone.featurizer",
+    "vision_backbone.fused_featurizer",
+    "language_model.model",
+)
 
 SHAPES: dict[str, Shape] = {
     "language_model.lm_head.weight": (32_064, 4096),
@@ -106,8 +110,17 @@ def test_it_is_a_model_of_seven_billion(layout: Layout) -> None:
 
 def test_the_defaults_that_the_published_config_leaves_out_are_llama_2_s() -> None:
     config = LlamaConfig()
-    sizes = (config.hidden_size, config.intermediate_size, config.num_hidden_layers, config.num_attention_heads)
+    sizes = (
+        config.hidden_size,
+        config.intermediate_size,
+        config.num_hidden_layers,
+        config.num_attention_heads,
+    )
     assert sizes == (4096, 11_008, 32, 32)
     assert config.num_key_value_heads == 32
     assert config.rope_parameters["rope_theta"] == 10_000.0
-    assert (config.hidden_act, config.attention_bias, config.tie_word_embeddings) == ("silu", False, False)
+    assert (config.hidden_act, config.attention_bias, config.tie_word_embeddings) == (
+        "silu",
+        False,
+        False,
+    )

@@ -23,7 +23,10 @@ def network(policies: dict[str, VlaPolicy]) -> OpenVLANetwork:
 
 
 def test_the_prompt_is_the_one_of_training_in_lower_case() -> None:
-    assert prompt("Pick up the Mug") == "In: What action should the robot take to pick up the mug?\nOut:"
+    assert (
+        prompt("Pick up the Mug")
+        == "In: What action should the robot take to pick up the mug?\nOut:"
+    )
 
 
 def test_the_space_before_actions_ends_the_prompt_once(network: OpenVLANetwork) -> None:
@@ -72,15 +75,21 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
     written: list[int] = []
     for _ in range(7):
         text = embed_ids(model, [*ids, *written])
-        scores = model(inputs_embeds=torch.cat([text[:, :1], patches, text[:, 1:]], dim=1)).logits[0, -1]
+        scores = model(inputs_embeds=torch.cat([text[:, :1], patches, text[:, 1:]], dim=1)).logits[
+            0, -1
+        ]
         written.append(31_744 + int(scores[31_744:32_000].argmax()))
     assert len(set(written)) > 1
     expected = network.bins.decode(written)
     assert (network.predict(image, "pick up the mug", constrained=True) == expected).all()
 
 
-def test_without_the_constraint_a_policy_still_acts(policy_checkpoints: dict[str, Path], plain_frames: Any) -> None:
+def test_without_the_constraint_a_policy_still_acts(
+    policy_checkpoints: dict[str, Path], plain_frames: Any
+) -> None:
     from model_adapters import check_adapter, load
 
-    policy = load("openvla", {"pretrained": str(policy_checkpoints["openvla"]), "constrained": "false"}, 0)
+    policy = load(
+        "openvla", {"pretrained": str(policy_checkpoints["openvla"]), "constrained": "false"}, 0
+    )
     check_adapter(policy)  # type: ignore[arg-type]

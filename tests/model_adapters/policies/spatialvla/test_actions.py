@@ -47,13 +47,19 @@ def test_the_gripper_is_closed_or_open(bins: SpatialBins) -> None:
         ("r", 6, 1.03105),  # (0.9228 + 1.1393) / 2
     ],
 )
-def test_the_outer_bins_of_each_spherical_axis(bins: SpatialBins, axis: str, number: int, middle: float) -> None:
+def test_the_outer_bins_of_each_spherical_axis(
+    bins: SpatialBins, axis: str, number: int, middle: float
+) -> None:
     place = {"theta": 0, "phi": 0, "r": 0, axis: number}
     token = BEGIN + (place["theta"] * 32 + place["phi"]) * 8 + place["r"]
     at = {"theta": 0.35335, "phi": -2.8507, "r": 0.0984, axis: middle}
     x, y, z = bins.decode([token, *STILL])[0, :3]
     sine, cosine = math.sin(at["theta"]), math.cos(at["theta"])
-    expected = at["r"] * sine * math.cos(at["phi"]), at["r"] * sine * math.sin(at["phi"]), at["r"] * cosine
+    expected = (
+        at["r"] * sine * math.cos(at["phi"]),
+        at["r"] * sine * math.sin(at["phi"]),
+        at["r"] * cosine,
+    )
     assert (x, y, z) == pytest.approx(expected, abs=1e-9)
 
 
@@ -66,7 +72,11 @@ def test_every_bin_lies_between_its_borders(bins: SpatialBins, axis: str) -> Non
     borders = BINS[axis]
     for number in range(len(borders) - 1):
         x, y, z = bins.decode([BEGIN + base + number * step, *STILL])[0, :3].tolist()
-        value = {"theta": math.atan2(math.hypot(x, y), z), "phi": math.atan2(y, x), "r": math.hypot(x, y, z)}[axis]
+        value = {
+            "theta": math.atan2(math.hypot(x, y), z),
+            "phi": math.atan2(y, x),
+            "r": math.hypot(x, y, z),
+        }[axis]
         clipped = axis == "r" and number == 7
         middle = (borders[number] + borders[number + 1]) / 2
         assert clipped or value == pytest.approx(middle, abs=1e-9)
@@ -81,7 +91,10 @@ def test_a_translation_beyond_one_is_clipped(bins: SpatialBins) -> None:
 @pytest.mark.parametrize(
     ("token", "expected"),
     [
-        (0, (-0.85605, -0.83925, -0.8455)),  # (-1 - 0.7121) / 2, (-1 - 0.6785) / 2, (-1 - 0.691) / 2
+        (
+            0,
+            (-0.85605, -0.83925, -0.8455),
+        ),  # (-1 - 0.7121) / 2, (-1 - 0.6785) / 2, (-1 - 0.691) / 2
         (1, (-0.85605, -0.83925, -0.6112)),  # yaw counts fastest: (-0.691 - 0.5314) / 2
         (16, (-0.85605, -0.59765, -0.8455)),  # then pitch: (-0.6785 - 0.5168) / 2
         (256, (-0.6343, -0.83925, -0.8455)),  # then roll: (-0.7121 - 0.5565) / 2
@@ -89,7 +102,9 @@ def test_a_translation_beyond_one_is_clipped(bins: SpatialBins) -> None:
     ],
 )
 def test_rotations(bins: SpatialBins, token: int, expected: tuple[float, float, float]) -> None:
-    assert bins.decode([BEGIN, ROTATIONS + token, GRIPPERS])[0, 3:6] == pytest.approx(expected, abs=1e-9)
+    assert bins.decode([BEGIN, ROTATIONS + token, GRIPPERS])[0, 3:6] == pytest.approx(
+        expected, abs=1e-9
+    )
 
 
 def _config(**changes: Any) -> ProcessorConfig:
@@ -133,6 +148,8 @@ def test_bins_are_read_from_the_processor_s_config(bins: SpatialBins) -> None:
         ({}, 8190, "mine has 8190 action tokens and 8194 bins"),
     ],
 )
-def test_bins_that_do_not_fit_the_tokens_are_refused(changes: dict[str, Any], n_tokens: int, message: str) -> None:
+def test_bins_that_do_not_fit_the_tokens_are_refused(
+    changes: dict[str, Any], n_tokens: int, message: str
+) -> None:
     with pytest.raises(ModelError, match=message):
         SpatialBins.of(_config(**changes), BEGIN, n_tokens, "mine")

@@ -36,7 +36,9 @@ def test_the_field_of_view_is_vertical() -> None:
     # f = 100 / tan 30 = 173.205 pixels of a frame of 400 x 200; squashed to 224: 96.9948 across, 193.9897 down.
     intrinsics = thor_intrinsics(60, (400, 200), 224)
     focal = 100 / math.tan(math.pi / 6)
-    assert [intrinsics[0, 0], intrinsics[1, 1]] == pytest.approx([focal * 224 / 400, focal * 224 / 200])
+    assert [intrinsics[0, 0], intrinsics[1, 1]] == pytest.approx(
+        [focal * 224 / 400, focal * 224 / 200]
+    )
     assert [intrinsics[0, 2], intrinsics[1, 2]] == [112, 112]
 
 
@@ -45,7 +47,9 @@ def test_the_option_is_read() -> None:
     assert parse_field_of_view("thor:59.7") == 59.7
 
 
-@pytest.mark.parametrize("text", ["thor", "thor:", "thor:0", "thor:180", "thor:nan", "unity:90", "90", ""])
+@pytest.mark.parametrize(
+    "text", ["thor", "thor:", "thor:0", "thor:180", "thor:nan", "unity:90", "90", ""]
+)
 def test_another_form_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="is not default or thor:DEGREES"):
         parse_field_of_view(text)
@@ -53,8 +57,14 @@ def test_another_form_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize(
     "cameras",
-    [{}, {"default": CameraIntrinsics(0, 480, DEFAULT.intrinsic)}, {"default": CameraIntrinsics(9, 9, [[1]])}],
+    [
+        {},
+        {"default": CameraIntrinsics(0, 480, DEFAULT.intrinsic)},
+        {"default": CameraIntrinsics(9, 9, [[1]])},
+    ],
 )
 def test_a_checkpoint_without_a_camera_is_refused(cameras: dict[str, CameraIntrinsics]) -> None:
-    with pytest.raises(ModelError, match=r"mine has no intrinsics for bridge and no default; give intrinsics=thor:"):
+    with pytest.raises(
+        ModelError, match=r"mine has no intrinsics for bridge and no default; give intrinsics=thor:"
+    ):
         published_intrinsics(cameras, "bridge", 224, "mine")

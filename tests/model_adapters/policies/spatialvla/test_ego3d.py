@@ -18,8 +18,24 @@ def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None
     points = back_project(depth, INTRINSICS, patch=14, resolution=2)
     assert points.shape == (1, 4, 12)
     # Middles of cells of 7 pixels: 3.5, 10.5, 17.5, 24.5; x = 2 (u - 14) / 10, y = 2 (v - 14) / 20, z = 2.
-    x, y = [2 * (u - 14) / 10 for u in (3.5, 10.5, 17.5, 24.5)], [2 * (v - 14) / 20 for v in (3.5, 10.5, 17.5, 24.5)]
-    first = [x[0], y[0], 2, x[1], y[0], 2, x[0], y[1], 2, x[1], y[1], 2]  # row by row within the patch
+    x, y = (
+        [2 * (u - 14) / 10 for u in (3.5, 10.5, 17.5, 24.5)],
+        [2 * (v - 14) / 20 for v in (3.5, 10.5, 17.5, 24.5)],
+    )
+    first = [
+        x[0],
+        y[0],
+        2,
+        x[1],
+        y[0],
+        2,
+        x[0],
+        y[1],
+        2,
+        x[1],
+        y[1],
+        2,
+    ]  # row by row within the patch
     second = [x[2], y[0], 2, x[3], y[0], 2, x[2], y[1], 2, x[3], y[1], 2]  # the patch to its right
     assert points[0, 0].tolist() == pytest.approx(first)
     assert points[0, 1].tolist() == pytest.approx(second)
@@ -27,7 +43,9 @@ def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None
 
 def test_pixels_are_as_coarse_as_the_weights() -> None:
     unit = torch.eye(3)
-    coarse = back_project(torch.ones(1, 1, 224, 224, dtype=torch.bfloat16), unit, patch=14, resolution=2)
+    coarse = back_project(
+        torch.ones(1, 1, 224, 224, dtype=torch.bfloat16), unit, patch=14, resolution=2
+    )
     fine = back_project(torch.ones(1, 1, 224, 224), unit, patch=14, resolution=2)
     assert coarse.dtype == fine.dtype == torch.float32
     assert fine[0, -1, -3:].tolist() == [220.5, 220.5, 1.0]
@@ -69,5 +87,9 @@ def test_coordinates_are_taken_around_two_metres_ahead_and_encoded_by_frequencie
     module.register_parameter("dtype_of", nn.Parameter(torch.zeros(1)))
     (features,) = module(torch.tensor([[[1.0, -2.0, 3.0]]]))[0].tolist()
     near = (0.5, -1.0, 0.5)  # (x, y, z - 2) / 2
-    expected = [value for a in near for value in (a, math.sin(a), math.sin(2 * a), math.cos(a), math.cos(2 * a))]
+    expected = [
+        value
+        for a in near
+        for value in (a, math.sin(a), math.sin(2 * a), math.cos(a), math.cos(2 * a))
+    ]
     assert features == pytest.approx(expected, abs=1e-6)

@@ -25,7 +25,10 @@ SHAPES: dict[str, Shape] = {
     "language_model.model.layers.0.mlp.gate_proj.weight": (9216, 2304),
     "spatial_embed_tokens.weight": (8194, 2304),
     "multi_modal_projector.linear.weight": (2304, 1152),
-    "position_embedding_3d.position_embedding_head.0.weight": (1152, 204),  # 4 points, 3 axes, 17 numbers each
+    "position_embedding_3d.position_embedding_head.0.weight": (
+        1152,
+        204,
+    ),  # 4 points, 3 axes, 17 numbers each
     "position_embedding_3d.position_embedding_head.1.weight": (1152,),
     "position_embedding_3d.position_embedding_head.3.weight": (1152, 1152),
     f"{SIGLIP}.embeddings.patch_embedding.weight": (1152, 3, 14, 14),
@@ -45,13 +48,20 @@ SHAPES: dict[str, Shape] = {
     f"{BEIT}.output.dense.weight": (1024, 4096),
     f"{BEIT}.lambda_1": (1024,),
     f"{BEIT}.layernorm_after.bias": (1024,),
-    "vision_zoe_model.neck.fusion_stage.layers.3.residual_layer2.convolution1.weight": (256, 256, 3, 3),
+    "vision_zoe_model.neck.fusion_stage.layers.3.residual_layer2.convolution1.weight": (
+        256,
+        256,
+        3,
+        3,
+    ),
     "vision_zoe_model.metric_head.seed_bin_regressors.kitti.conv2.weight": (64, 64, 1, 1),
 }
 
 
 def _layout(**text: object) -> Layout:
-    config = msgspec.convert(CONFIG | {"text_config": CONFIG["text_config"] | text}, SpatialVLAConfig)
+    config = msgspec.convert(
+        CONFIG | {"text_config": CONFIG["text_config"] | text}, SpatialVLAConfig
+    )
     with empty_parameters():
         return SpatialVLAWeights(config, "eager").layout()
 
@@ -79,7 +89,9 @@ def test_how_many_there_are_of_each_part(layout: Layout) -> None:
 
 
 def test_it_is_a_model_of_four_billion(layout: Layout) -> None:
-    assert sum(math.prod(shape) for shape in layout.all_shapes().values()) == pytest.approx(4.03e9, rel=0.005)
+    assert sum(math.prod(shape) for shape in layout.all_shapes().values()) == pytest.approx(
+        4.03e9, rel=0.005
+    )
 
 
 def test_nothing_is_unused_and_no_key_means_two_parameters(layout: Layout) -> None:
@@ -103,7 +115,10 @@ def test_tied_embeddings_have_one_key() -> None:
     ("name", "key"),
     [
         ("vision_tower.post_layernorm.bias", "vision_tower.vision_model.post_layernorm.bias"),
-        ("vision_tower.vision_model.post_layernorm.bias", "vision_tower.vision_model.post_layernorm.bias"),
+        (
+            "vision_tower.vision_model.post_layernorm.bias",
+            "vision_tower.vision_model.post_layernorm.bias",
+        ),
         (
             "vision_zoe_model.backbone.beit.layers.7.mlp.fc1.bias",
             "vision_zoe_model.backbone.encoder.layer.7.intermediate.dense.bias",

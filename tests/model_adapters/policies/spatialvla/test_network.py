@@ -23,16 +23,24 @@ def network(policies: dict[str, VlaPolicy]) -> SpatialVLANetwork:
     return result
 
 
-def test_the_prompt_stands_behind_the_image_tokens_and_ends_a_line(network: SpatialVLANetwork) -> None:
+def test_the_prompt_stands_behind_the_image_tokens_and_ends_a_line(
+    network: SpatialVLANetwork,
+) -> None:
     ids = network.prompt_ids("pick up the Mug")
     assert ids[:N_PATCHES] == [network.image_id] * N_PATCHES
     assert ids[N_PATCHES] == network.tokenizer.token_to_id("<bos>")
     text = network.tokenizer.decode(ids[N_PATCHES + 1 :])
-    assert text == "What action should the robot take to pick up the Mug?\n" == f"{prompt('pick up the Mug')}\n"
+    assert (
+        text
+        == "What action should the robot take to pick up the Mug?\n"
+        == f"{prompt('pick up the Mug')}\n"
+    )
 
 
 def test_a_tokenizer_without_image_tokens_is_refused(network: SpatialVLANetwork) -> None:
-    other = SpatialVLANetwork(network.weights, network.tokenizer, network.bins, 4, network.image_id + 1, network.view)
+    other = SpatialVLANetwork(
+        network.weights, network.tokenizer, network.bins, 4, network.image_id + 1, network.view
+    )
     with pytest.raises(ModelError, match="the tokenizer has no <image> of id"):
         other.prompt_ids("x")
 
@@ -68,12 +76,20 @@ def test_actions_with_a_cache_are_those_of_reading_all_anew(
         mask[: len(ids), : len(ids)] = 0
         output = model(
             inputs_embeds=fed,
-            attention_mask={"full_attention": mask[None, None], "sliding_attention": mask[None, None]},
+            attention_mask={
+                "full_attention": mask[None, None],
+                "sliding_attention": mask[None, None],
+            },
             position_ids=torch.arange(1, length + 1)[None],
         )
         action_ids = network.bins.action_ids[place % 3]
-        written.append(action_ids.start + int(output.logits[0, -1, action_ids.start : action_ids.stop].argmax()))
-    assert (network.predict(image, "pick up the mug", constrained=True) == network.bins.decode(written)).all()
+        written.append(
+            action_ids.start
+            + int(output.logits[0, -1, action_ids.start : action_ids.stop].argmax())
+        )
+    assert (
+        network.predict(image, "pick up the mug", constrained=True) == network.bins.decode(written)
+    ).all()
 
 
 def test_the_camera_changes_what_is_seen(
@@ -81,7 +97,11 @@ def test_the_camera_changes_what_is_seen(
 ) -> None:
     seen = []
     for intrinsics in ("default", "thor:60", "thor:90"):
-        given = {"pretrained": str(policy_checkpoints["spatialvla"]), "device": "cpu", "intrinsics": intrinsics}
+        given = {
+            "pretrained": str(policy_checkpoints["spatialvla"]),
+            "device": "cpu",
+            "intrinsics": intrinsics,
+        }
         policy = load("spatialvla", given, 0)
         assert policy.identity()["intrinsics"] == intrinsics
         with torch.inference_mode():
@@ -91,5 +111,9 @@ def test_the_camera_changes_what_is_seen(
 
 
 def test_without_the_constraint_a_policy_still_acts(policy_checkpoints: dict[str, Path]) -> None:
-    policy = load("spatialvla", {"pretrained": str(policy_checkpoints["spatialvla"]), "constrained": "false"}, 0)
+    policy = load(
+        "spatialvla",
+        {"pretrained": str(policy_checkpoints["spatialvla"]), "constrained": "false"},
+        0,
+    )
     check_adapter(policy)  # type: ignore[arg-type]

@@ -18,14 +18,23 @@ def installed() -> None:
 
 
 @pytest.fixture
-def start(checkpoints: dict[str, Path], monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Any]]:
+def start(
+    checkpoints: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[..., Any]]:
     """Starts a model of a tiny checkpoint in vLLM, and ends it with the test."""
     monkeypatch.setenv("VLLM_CPU_KVCACHE_SPACE", "1")
     started: list[Any] = []
 
     def start(family: str = "qwen2.5-vl", name: str | None = None, **options: object) -> Any:
-        given = {"pretrained": checkpoints[family], "dtype": "float32", "enforce_eager": True, **options}
-        started.append(load(f"{name or family}@vllm", {key: str(value) for key, value in given.items()}, 0))
+        given = {
+            "pretrained": checkpoints[family],
+            "dtype": "float32",
+            "enforce_eager": True,
+            **options,
+        }
+        started.append(
+            load(f"{name or family}@vllm", {key: str(value) for key, value in given.items()}, 0)
+        )
         return started[-1]
 
     yield start

@@ -27,18 +27,31 @@ def _keys(folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("family", ["llava-onevision", "llava"])
 def test_towers_of_both_forms_are_loaded(
-    family: str, start: Start, in_process: Start, checkpoints: dict[str, Path], frames: list[FrameRef], tmp_path: Path
+    family: str,
+    start: Start,
+    in_process: Start,
+    checkpoints: dict[str, Path],
+    frames: list[FrameRef],
+    tmp_path: Path,
 ) -> None:
     flat = Path(shutil.copytree(checkpoints[family], tmp_path / "flat"))
     weights = load_file(flat / "model.safetensors")
-    renamed = {name.replace("vision_tower.vision_model.", "vision_tower."): item for name, item in weights.items()}
+    renamed = {
+        name.replace("vision_tower.vision_model.", "vision_tower."): item
+        for name, item in weights.items()
+    }
     save_file(renamed, flat / "model.safetensors", metadata={"format": "pt"})
-    levelled = {name.replace("vision_tower.", "vision_tower.vision_model."): item for name, item in renamed.items()}
+    levelled = {
+        name.replace("vision_tower.", "vision_tower.vision_model."): item
+        for name, item in renamed.items()
+    }
     published = Path(shutil.copytree(checkpoints[family], tmp_path / "published"))
     save_file(levelled, published / "model.safetensors", metadata={"format": "pt"})
     assert _keys(flat) != _keys(published)
     name = adapter_of(family)
-    expected = in_process(family, name).answer(user(*frames, "Where is the mug?"), up_to(20)).token_ids
+    expected = (
+        in_process(family, name).answer(user(*frames, "Where is the mug?"), up_to(20)).token_ids
+    )
     for folder in (flat, published):
         model = start(family, name, pretrained=folder)
         assert model.answer(user(*frames, "Where is the mug?"), up_to(20)).token_ids == expected
@@ -54,5 +67,7 @@ def test_heads_that_a_cpu_has_no_kernel_for_are_refused_at_the_start(
     config = json.loads((small / "config.json").read_text())
     config["text_config"]["head_dim"] = 16
     (small / "config.json").write_text(json.dumps(config))
-    with pytest.raises(ModelError, match=r"attention heads have 16 numbers, .* kernels for 32, 64, .* transformers"):
+    with pytest.raises(
+        ModelError, match=r"attention heads have 16 numbers, .* kernels for 32, 64, .* transformers"
+    ):
         start("pixtral", pretrained=small)

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.runs import UnitRecord
+from infthor_eval.storage.packaged import packaged_folder
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 from tests.plans.cut import CANDLE, FORK, cut, write
 from tests.waiting import PATIENCE_S, wait_until
@@ -27,7 +27,17 @@ Run = Callable[..., list[UnitRecord[Any]]]
 def _arguments(engine: str, output: Path, *more: object) -> list[str]:
     given = f"pretrained={packaged_folder(FOLDER)},dtype=float32"
     given += ",enforce_eager=true" if engine == "vllm" else ",device=cpu"
-    typed = ["--model", "qwen2.5-vl", "--engine", engine, "--model-args", given, "--output", output, *more]
+    typed = [
+        "--model",
+        "qwen2.5-vl",
+        "--engine",
+        engine,
+        "--model-args",
+        given,
+        "--output",
+        output,
+        *more,
+    ]
     return list(map(str, typed))
 
 
@@ -46,31 +56,46 @@ def asked(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
 
 
 def test_questions_are_answered_alike(asked: Run) -> None:
-    ours, theirs = (asked(engine, "--tasks", "nieh_mini_gt,nieh_mini_full", "--limit", 40) for engine in ENGINES)
+    ours, theirs = (
+        asked(engine, "--tasks", "nieh_mini_gt,nieh_mini_full", "--limit", 40) for engine in ENGINES
+    )
     assert [record.payload for record in ours] == [record.payload for record in theirs]
-    assert [record.tokens.context for record in ours] == [record.tokens.context for record in theirs]
-    read, cached = (sum(getattr(record.tokens, name) for record in ours) for name in ("context", "cached"))
+    assert [record.tokens.context for record in ours] == [
+        record.tokens.context for record in theirs
+    ]
+    read, cached = (
+        sum(getattr(record.tokens, name) for record in ours) for name in ("context", "cached")
+    )
     assert cached > 0.5 * read
 
 
 @pytest.mark.parametrize("more", [("--greedy",), ("--greedy", "--constrained")])
 def test_plans_are_carried_out_alike(more: tuple[str, ...], asked: Run, tmp_path: Path) -> None:
     data = write(tmp_path / "data", cut(FORK, 6), cut(CANDLE, 4))
-    ours, theirs = (asked(engine, "--tasks", "infthor_plans", "--data", data, *more) for engine in ENGINES)
+    ours, theirs = (
+        asked(engine, "--tasks", "infthor_plans", "--data", data, *more) for engine in ENGINES
+    )
     assert len(ours) == 10
     assert [record.payload for record in ours] == [record.payload for record in theirs]
 
 
 def test_two_workers_answer_as_one(asked: Run) -> None:
-    one, two = (asked("vllm", "--tasks", "nieh_mini_gt", "--limit", 24, *more) for more in ((), ("--workers", 2)))
-    assert {record.key: record.payload for record in one} == {record.key: record.payload for record in two}
+    one, two = (
+        asked("vllm", "--tasks", "nieh_mini_gt", "--limit", 24, *more)
+        for more in ((), ("--workers", 2))
+    )
+    assert {record.key: record.payload for record in one} == {
+        record.key: record.payload for record in two
+    }
 
 
 def test_plans_are_carried_out_by_workers(asked: Run, tmp_path: Path) -> None:
     data = write(tmp_path / "data", cut(FORK, 3), cut(CANDLE, 3))
     words = ("--tasks", "infthor_plans", "--data", data, "--greedy")
     one, two = (asked("vllm", *words, *more) for more in ((), ("--workers", 2)))
-    assert {record.key: record.payload for record in one} == {record.key: record.payload for record in two}
+    assert {record.key: record.payload for record in one} == {
+        record.key: record.payload for record in two
+    }
 
 
 def test_a_run_that_was_killed_goes_on(asked: Run, tmp_path: Path) -> None:
@@ -82,12 +107,18 @@ def test_a_run_that_was_killed_goes_on(asked: Run, tmp_path: Path) -> None:
     def n_lines() -> int:
         return sum(path.read_bytes().count(b"\n") for path in output.rglob("worker-0.jsonl"))
 
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment)
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
+    )
     wait_until(lambda: n_lines() >= 5 or process.poll() is not None)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     assert 5 <= n_lines() < 40, "it was not killed in the middle"
-    again = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=PATIENCE_S, check=False)
+    again = subprocess.run(
+        command, capture_output=True, text=True, env=environment, timeout=PATIENCE_S, check=False
+    )
     assert again.returncode == 0, again.stderr
     assert "resumed from the journal" in again.stderr + again.stdout
-    assert [record.payload for record in records_in(output)] == [record.payload for record in asked("vllm", *words)]
+    assert [record.payload for record in records_in(output)] == [
+        record.payload for record in asked("vllm", *words)
+    ]

@@ -34,7 +34,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     def layout() -> Layout:
         towers = tuple(TOWERS.values())
         with empty_parameters():
-            weights = OpenVLAWeights(towers, SIZE, msgspec.convert(config, OpenVLAConfig).language("sdpa"))
+            weights = OpenVLAWeights(
+                towers, SIZE, msgspec.convert(config, OpenVLAConfig).language("sdpa")
+            )
         return weights_layout(weights, towers)
 
     checkpoint = tmp_path_factory.mktemp("openvla")
@@ -50,7 +52,11 @@ def test_actions_are_those_of_the_native_port(
     options = {"pretrained": str(folder), "dtype": "float32"}
     ours: Any = load("openvla@vllm", {**options, "enforce_eager": "true"}, 0)
     theirs: Any = load("openvla", {**options, "device": "cpu"}, 0)
-    asked = [(frame, text) for frame in make_frames(2, 300, 300) for text in ("pick up the Mug", "close the fridge")]
+    asked = [
+        (frame, text)
+        for frame in make_frames(2, 300, 300)
+        for text in ("pick up the Mug", "close the fridge")
+    ]
     actions = [[each.act(frame, text) for frame, text in asked] for each in (ours, theirs)]
     ours.close()
     assert actions[0] == actions[1]

@@ -39,7 +39,12 @@ def test_replies_are_those_of_transformers(
 def test_replies_in_small_steps_and_blocks_are_the_same(
     start: Start, in_process: Start, frames: list[FrameRef]
 ) -> None:
-    small = {"max_num_seqs": 2, "max_num_batched_tokens": 256, "block_size": 32, "mm_encoder_tp_mode": "data"}
+    small = {
+        "max_num_seqs": 2,
+        "max_num_batched_tokens": 256,
+        "block_size": 32,
+        "mm_encoder_tp_mode": "data",
+    }
     models = (start(**small, threads=2), in_process("qwen2.5-vl"))
     asked = [[*parts] for parts in _prompts(frames)]
     replies = [model.conversation().replies(asked, up_to(50)) for model in models]
@@ -62,10 +67,14 @@ def test_of_continuations_the_others_find_the_prefix_of_the_first(
         replies.append(talk.replies(asked, up_to(8)))
     assert [facts(reply) for reply in replies[0]] == [facts(reply) for reply in replies[1]]
     assert replies[0][0].n_cached_tokens == 0
-    assert all(reply.n_cached_tokens >= 128 for reply in replies[0][1:])  # a block of vLLM's on a CPU
+    assert all(
+        reply.n_cached_tokens >= 128 for reply in replies[0][1:]
+    )  # a block of vLLM's on a CPU
 
 
-def test_a_reply_is_held_to_choices(start: Start, in_process: Start, frames: list[FrameRef]) -> None:
+def test_a_reply_is_held_to_choices(
+    start: Start, in_process: Start, frames: list[FrameRef]
+) -> None:
     decoding = up_to(30, choices=("on the table", "in the sink", "in the fridge"))
     ours, theirs = start(), in_process("qwen2.5-vl")
     for frame in frames:
@@ -81,17 +90,24 @@ def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
     # An untrained model writes halves of characters, too, which vLLM holds back and transformers decodes.
     plain = [letter for letter in theirs.answer(turns, up_to(12)).text if letter.isascii()]
     for stop in (plain[2], plain[-1], "never"):
-        replies = [model.answer(turns, up_to(12, stop=("not this", stop))) for model in (ours, theirs)]
+        replies = [
+            model.answer(turns, up_to(12, stop=("not this", stop))) for model in (ours, theirs)
+        ]
         assert facts(replies[0]) == facts(replies[1])
 
 
 def test_draws_repeat_with_their_seed(start: Start, frames: list[FrameRef]) -> None:
     model, turns = start(), user(frames[0], "Say it.")
-    replies = [model.answer(turns, up_to(20, temperature=1.5, top_p=0.9, seed=seed)).text for seed in (3, 4, 3)]
+    replies = [
+        model.answer(turns, up_to(20, temperature=1.5, top_p=0.9, seed=seed)).text
+        for seed in (3, 4, 3)
+    ]
     assert replies[0] == replies[2] != replies[1]
 
 
-@pytest.mark.parametrize(("family", "rope"), [("qwen2.5-vl", "yarn:4"), ("pixtral", "yarn:2"), ("pixtral", "linear:2")])
+@pytest.mark.parametrize(
+    ("family", "rope"), [("qwen2.5-vl", "yarn:4"), ("pixtral", "yarn:2"), ("pixtral", "linear:2")]
+)
 def test_an_extended_model_answers_as_in_transformers(
     family: str, rope: str, start: Start, in_process: Start, frames: list[FrameRef]
 ) -> None:

@@ -13,8 +13,8 @@ import pytest
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.formats.packaged import packaged_folder
 from infthor_eval.runs import UnitRecord
+from infthor_eval.storage.packaged import packaged_folder
 from model_adapters import load
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 from tests.plans.cut import CANDLE, FORK, cut, write
@@ -32,13 +32,33 @@ MOST_FRAMES = 200  # more than a context of `nieh_mini_full` has
 @contextmanager
 def _server(port: int, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
     """vLLM's server with the small trained model, on a port."""
-    limits = ["--max-model-len", "32768", "--limit-mm-per-prompt", f'{{"image": {MOST_FRAMES}, "video": 0}}']
+    limits = [
+        "--max-model-len",
+        "32768",
+        "--limit-mm-per-prompt",
+        f'{{"image": {MOST_FRAMES}, "video": 0}}',
+    ]
     pixels = ["--mm-processor-kwargs", '{"use_fast": false}', "--enable-prompt-tokens-details"]
     where = ["--host", "127.0.0.1", "--port", str(port)]
-    command = [sys.executable, "-m", SERVER, "--model", MODEL, "--dtype", "float32", "--enforce-eager", *limits]
-    environment = os.environ | {"VLLM_CPU_KVCACHE_SPACE": "1", "VLLM_CPU_OMP_THREADS_BIND": "nobind"}
+    command = [
+        sys.executable,
+        "-m",
+        SERVER,
+        "--model",
+        MODEL,
+        "--dtype",
+        "float32",
+        "--enforce-eager",
+        *limits,
+    ]
+    environment = os.environ | {
+        "VLLM_CPU_KVCACHE_SPACE": "1",
+        "VLLM_CPU_OMP_THREADS_BIND": "nobind",
+    }
     with log.open("w") as said:
-        server = subprocess.Popen([*command, *pixels, *where], stdout=said, stderr=said, env=environment)
+        server = subprocess.Popen(
+            [*command, *pixels, *where], stdout=said, stderr=said, env=environment
+        )
         try:
             wait_for_server(f"http://127.0.0.1:{port}/health", server, log)
             yield server
@@ -56,7 +76,9 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]
 
 
 @pytest.fixture
-def both(served: dict[str, str], tmp_path: Path, run: Any) -> Callable[..., list[list[UnitRecord[Any]]]]:
+def both(
+    served: dict[str, str], tmp_path: Path, run: Any
+) -> Callable[..., list[list[UnitRecord[Any]]]]:
     """Runs the same tasks behind the server and in this process; the records of both."""
 
     def both(*arguments: object, **more: str) -> list[list[UnitRecord[Any]]]:
@@ -65,7 +87,17 @@ def both(served: dict[str, str], tmp_path: Path, run: Any) -> Callable[..., list
         for model, given in (("openai", served | more), ("qwen2.5-vl", here)):
             options = ",".join(f"{name}={value}" for name, value in given.items())
             code, _, err = run(
-                *("--model", model, "--model-args", options, "--name", model, "--output", tmp_path / "out"), *arguments
+                *(
+                    "--model",
+                    model,
+                    "--model-args",
+                    options,
+                    "--name",
+                    model,
+                    "--output",
+                    tmp_path / "out",
+                ),
+                *arguments,
             )
             assert code == 0, err
             records.append(records_in(tmp_path / "out" / model))
@@ -74,13 +106,17 @@ def both(served: dict[str, str], tmp_path: Path, run: Any) -> Callable[..., list
     return both
 
 
-def test_questions_are_answered_as_in_this_process(both: Callable[..., list[list[UnitRecord[Any]]]]) -> None:
+def test_questions_are_answered_as_in_this_process(
+    both: Callable[..., list[list[UnitRecord[Any]]]],
+) -> None:
     behind, here = both("--tasks", "nieh_mini_gt,nieh_mini_full", "--limit", 20)
     assert [record.payload.reply for record in behind] == [record.payload.reply for record in here]
     assert sum(record.tokens.cached or 0 for record in behind) > 0
 
 
-def test_plans_stop_at_special_tokens(both: Callable[..., list[list[UnitRecord[Any]]]], tmp_path: Path) -> None:
+def test_plans_stop_at_special_tokens(
+    both: Callable[..., list[list[UnitRecord[Any]]]], tmp_path: Path
+) -> None:
     data = write(tmp_path / "data", cut(FORK, 3), cut(CANDLE, 2))
     behind, here = both("--tasks", "infthor_plans", "--data", data, "--greedy")
     assert [record.payload for record in behind] == [record.payload for record in here]
@@ -90,7 +126,10 @@ def test_choices_hold(served: dict[str, str], frames: list[FrameRef]) -> None:
     model: Any = load("openai", served | {"guided": "vllm"}, 0)
     talk = model.conversation()
     talk.append(frames[0], "Where is the mug?")
-    assert talk.reply(up_to(20, choices=("on the table", "in the sink"))).text in ("on the table", "in the sink")
+    assert talk.reply(up_to(20, choices=("on the table", "in the sink"))).text in (
+        "on the table",
+        "in the sink",
+    )
     model.close()
 
 
@@ -100,7 +139,9 @@ def test_more_frames_than_the_server_takes_are_refused_with_its_option(
     model: Any = load("openai", served, 0)
     talk = model.conversation()
     talk.append(*make_frames(MOST_FRAMES + 1, 28, 28), "What is it?")
-    with pytest.raises(ModelError, match=r"/v1 answers 400 Bad Request: .* --limit-mm-per-prompt .* fewer frames"):
+    with pytest.raises(
+        ModelError, match=r"/v1 answers 400 Bad Request: .* --limit-mm-per-prompt .* fewer frames"
+    ):
         talk.reply(up_to(4))
     model.close()
 
@@ -110,15 +151,30 @@ def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_
 ) -> None:
     port, output = free_port(), tmp_path / "out"
     given = f"base_url=http://127.0.0.1:{port}/v1,model={MODEL},retries=1,max_in_flight=1"
-    words = ["--model", "openai", "--model-args", given, "--tasks", "nieh_mini_full", "--limit", "40"]
+    words = [
+        "--model",
+        "openai",
+        "--model-args",
+        given,
+        "--tasks",
+        "nieh_mini_full",
+        "--limit",
+        "40",
+    ]
     command = [sys.executable, "-c", OURS, *words, "--output", str(output)]
 
     def n_answered() -> int:
-        lines = [line for path in output.rglob("worker-*.jsonl") for line in path.read_text().splitlines()]
+        lines = [
+            line
+            for path in output.rglob("worker-*.jsonl")
+            for line in path.read_text().splitlines()
+        ]
         return sum('"type":"unit"' in line.replace(" ", "") for line in lines)
 
     with _server(port, tmp_path / "first") as server:
-        asking = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        asking = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
         wait_until(lambda: n_answered() >= 5)
         for each in [*psutil.Process(server.pid).children(recursive=True), server]:
             each.kill()
@@ -133,4 +189,6 @@ def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_
     records = records_in(output)
     assert len(records) == 40
     assert [record.failure for record in records] == [None] * 40
-    assert all(record.payload == before[record.key].payload for record in records if record.key in before)
+    assert all(
+        record.payload == before[record.key].payload for record in records if record.key in before
+    )

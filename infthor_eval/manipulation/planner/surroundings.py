@@ -1,0 +1,194 @@
+"""The surroundings of an agent that is to put an object down, and beliefs about what in them is an obstacle."""
+
+import math
+from enum import IntEnum
+
+import numpy as np
+
+from infthor_eval.manipulation.environment import ArmEnvironment
+from infthor_eval.manipulation.geometry import Corners, Point, corners_of
+from infthor_eval.manipulation.planner.linkage import Linkage, Parts
+from infthor_eval.manipulation.planner.obstacles import (
+    Obstacles,
+    cavity,
+    clearances,
+    columns,
+    obstacles_of,
+)
+from infthor_eval.manipulation.planner.places import (
+    Entry,
+    Places,
+    entry_of,
+    is_entered,
+    others_on,
+    places_of,
+)
+from infthor_eval.thor.view import ThorObject
+
+__all__ = ["Belief", "Surroundings"]
+
+_REACH = 1.5  # metres from the wrist within which things are obstacles
+_FLOOR_EXTENT = 3.0  # metres of the floor to each side
+_SUNK = 0.02  # metres that places may be inside a box that they are only beside
+_UNEXPLAINED = 0.03  # metres from all known boxes: a collision there is with something else
+_ASIDE = 0.25  # of an opening's width: an origin so far from its middle is at the hinge
+_LEFT = {
+    "Microwave"
+}  # doors that hang on the left; others hang on the right, if their origin does not tell
+
+_Boxes = list[tuple[str, Corners]]
+
+
+class Belief(IntEnum):
+    """Which boxes are believed to be obstacles: furniture is partly empty, which the metadata do not tell."""
+
+    NOTHING = 0
+    RECEPTACLE = 1  # the parts of the receptacle that the object is to be put into
+    COLLIDED = 2  # also the whole boxes of things that the arm collided with
+    FILLED = 3  # also the parts of all furniture below its places
+    WHOLE = 4  # the whole boxes of all furniture, except those that the arm is in
+
+
+class Surroundings:
+    """Obstacles around an agent.
+
+    Attributes:
+        places: places of the receptacle; None if it has none.
+        entry: its opening; None if it is not entered from the front.
+    """
+
+    def __init__(self, environment: ArmEnvironment, linkage: Linkage, floor: float) -> None:
+        """Collect the boxes around an environment that was reset to an episode; `floor` is a height in metres."""
+        self._environment, self._linkage = environment, linkage
+        self._item = environment.view.objects[str(environment.start.receptacle_id)]
+        self.places = places_of(environment, self._item)
+        self.entry = (
+            None if self.places is None else entry_of(environment.view, self._item, self.places)
+        )
+        self._hinges = _hinges(self._item, self.places, self.entry)
+        self._n_refuted = [0] * len(
+            self._hinges
+        )  # collisions that each side of the door cannot explain
+        x, _, z = linkage.shoulder.tolist()
+        self._floor = Corners(
+            (x - _FLOOR_EXTENT, floor - 1.0, z - _FLOOR_EXTENT),
+            (x + _FLOOR_EXTENT, floor, z + _FLOOR_EXTENT),
+        )
+        self._collided: set[str] = set()
+        self._around = {
+            belief: self._boxes_around(belief) for belief in (Belief.FILLED, Belief.WHOLE)
+        }
+
+    def obstacles(self, belief: Belief) -> Obstacles:
+        """Return the obstacles of a belief, with the door on the side that collisions have refuted least often."""
+        if belief == Belief.NOTHING:
+            return obstacles_of(())
+        hinge = self._hinges[self._n_refuted.index(min(self._n_refuted))]
+        around = self._around.get(belief, [])
+        if belief == Belief.COLLIDED:
+            around = [
+                (name, box) for name, box in self._around[Belief.WHOLE] if name in self._collided
+            ]
+        return obstacles_of([*self._receptacle(hinge), *around])
+
+    def others(self) -> list[Corners]:
+        """Return boxes that may be on the receptacle's places, or cover them: loose objects, and furniture nearby."""
+        loose = others_on(self._environment.view, self._item, self._environment.start.object_id)
+        return [*map(corners_of, loose), *(box for _, box in self._around[Belief.FILLED])]
+
+    def add_collision(self, parts: Parts, error: str) -> bool:
+        """Take a collision; one with the receptacle counts against each side of the door that does not explain it.
+
+        Args:
+            parts: parts of the arm in the colliding pose (1).
+
+        Returns:
+            Whether the arm collided with the receptacle.
+        """
+        objects = self._environment.view.objects
+        self._collided.update(name for name, item in objects.items() if f"'{item.name}'" in error)
+        if f"'{self._item.name}'" not in error:
+            return False
+        for number, hinge in enumerate(self._hinges):
+            obstacles = obstacles_of(self._receptacle(hinge))
+            if len(obstacles.names) and clearances(parts, obstacles).min() > _UNEXPLAINED:
+                self._n_refuted[number] += 1
+        return True
+
+    def _receptacle(self, hinge: int) -> _Boxes:
+        if self._item.pickupable or self.places is None:
+            return []
+        if self.entry is None:
+            boxes = columns(self._item, self.places)
+        else:
+            boxes = cavity(self._item, self.places, self.entry, hinge)
+        return [(self._item.object_id, box) for box in boxes]
+
+    def _boxes_around(self, belief: Belief) -> _Boxes:
+        """Return the boxes of the floor, and of everything nearby that cannot be picked up."""
+        view = self._environment.view
+        wrist: Point = tuple(self._linkage.now.world()[0].tolist())
+        around = [("Floor", self._floor)]
+        for name, item in view.objects.items():
+            if item.pickupable or item.object_type == "Floor" or name == self._item.object_id:
+                continue
+            box = corners_of(item)
+            if _distance_to_box(wrist, box) > _REACH:
+                continue
+            is_whole = belief == Belief.WHOLE and not self._is_in(box)
+            boxes = [box] if is_whole else self._boxes_of(item)
+            around += [(name, part) for part in boxes if not self._has_places_in(part)]
+        return around
+
+    def _has_places_in(self, box: Corners) -> bool:
+        """Return whether a box has places of the receptacle, and so is partly empty: a shelf in a table's box."""
+        if self.places is None:
+            return False
+        points = self.places.points
+        return bool(
+            ((points > np.array(box.low) + _SUNK) & (points < np.array(box.high) - _SUNK))
+            .all(axis=1)
+            .any()
+        )
+
+    def _is_in(self, box: Corners) -> bool:
+        """Return whether the arm is in a box, which is then partly empty."""
+        return bool(
+            clearances(self._linkage.parts(self._linkage.now), obstacles_of([("", box)])).min() < 0
+        )
+
+    def _boxes_of(self, item: ThorObject) -> list[Corners]:
+        """Return boxes of a piece of furniture without the room in an open cupboard, or below a counter."""
+        hollow = item.is_open if is_entered(item) and item.openable else not item.openable
+        places = places_of(self._environment, item) if item.receptacle and hollow else None
+        if places is None:
+            return [corners_of(item)]
+        entry = entry_of(self._environment.view, item, places)
+        if entry is None:
+            return columns(item, places)
+        return cavity(item, places, entry, _hinges(item, places, entry)[0])
+
+
+def _distance_to_box(point: Point, box: Corners) -> float:
+    """Return the metres from a point to a box."""
+    return math.hypot(
+        *(max(a - v, v - b, 0.0) for a, v, b in zip(box.low, point, box.high, strict=True))
+    )
+
+
+def _hinges(item: ThorObject, places: Places | None, entry: Entry | None) -> list[int]:
+    """Return the edges of an opening that the door may hang on, the likeliest first; see `cavity`.
+
+    The origin of a cupboard is at its hinge.
+    """
+    if entry is None or places is None or not item.openable:
+        return [0]
+    across = 2 - entry.axis
+    low, high = float(places.points[:, across].min()), float(places.points[:, across].max())
+    aside = (item.position.x if across == 0 else item.position.z) - (low + high) / 2
+    right = entry.sign if entry.axis == 0 else -entry.sign
+    if abs(aside) > _ASIDE * (high - low):
+        first = 1 if aside > 0 else -1
+    else:
+        first = -right if item.object_type in _LEFT else right
+    return [first, -first, 0]

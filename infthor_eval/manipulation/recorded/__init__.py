@@ -1,0 +1,1 @@
+"""Recorded runs of arms: their curves and their replay."""

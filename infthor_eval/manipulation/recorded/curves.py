@@ -1,0 +1,68 @@
+"""Cumulative reward along trajectories in which an arm does the expert's pick-ups and puts, from journals alone.
+
+Every episode begins in the expert's own state, so after a failed one the next is independent of it. An episode's place
+is the expert's low-level action that it replaces.
+"""
+
+from collections.abc import Sequence
+
+from infthor_eval.episodes.curves import (
+    Earned,
+    Facet,
+    Functions,
+    RewardCurves,
+    StepFunction,
+    compute_curves,
+)
+from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
+from infthor_eval.manipulation.recorded.runs import ArmRun, shared_episodes, task_kinds
+from infthor_eval.manipulation.records import ArmRecord
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["ALL", "arm_curves"]
+
+ALL = "all"  # name of the facet of both kinds together
+_OVER = "the expert's step (low-level action)"
+_END = "at step"
+
+
+def arm_curves(runs: Sequence[ArmRun], tasks: str | None = None) -> RewardCurves:
+    """Compute the curves of runs (at least one) in tasks, separated by commas (None: all shared); see `compute_curves`.
+
+    The mean is over the same trajectories in every facet, so that the curves of the kinds add up to that of both.
+    Episodes that a run excludes are left out of all of them.
+
+    Raises:
+        UsageError: they share no task or several of a kind, or their successes earn differently.
+        DataError: they share no trajectory, or a journal is damaged.
+    """
+    shared = shared_episodes(runs, tasks)
+    facets = _facets(list(task_kinds(runs, shared.tasks)))
+
+    def functions(trajectories: Sequence[Earned[ArmRecord]]) -> Functions:
+        return {name: [_function(units, name) for units in trajectories] for name in facets}
+
+    return compute_curves(runs, shared, facets, functions, _count)
+
+
+def _facets(kinds: Sequence[ManipulationKind]) -> dict[str, Facet]:
+    if len(kinds) == 1:
+        return {str(kinds[0]): Facet(_OVER, KIND_NAMES[kinds[0]], end_at=_END)}
+    title = " and ".join(KIND_NAMES[kind].lower() for kind in kinds).capitalize()
+    by_kind = {
+        str(kind): Facet(_OVER, KIND_NAMES[kind], earned=f"of {KIND_NAMES[kind].lower()}s")
+        for kind in kinds
+    }
+    return {ALL: Facet(_OVER, title, end_at=_END), **by_kind}
+
+
+def _function(units: Earned[ArmRecord], facet: str) -> StepFunction:
+    chosen = [(r.payload.index, reward) for r, reward in units if facet in (ALL, r.payload.kind)]
+    return StepFunction.of(chosen, start=0.0)
+
+
+def _count(episodes: Sequence[UnitRecord[ArmRecord]]) -> dict[str, int]:
+    return {
+        "episodes": len(episodes),
+        "failed": sum(record.failure is not None for record in episodes),
+    }

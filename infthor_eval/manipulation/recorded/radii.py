@@ -1,0 +1,141 @@
+"""Success over the radius of the hand's sphere, from the journals of runs with different radii."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from infthor_eval.episodes.shared_units import SharedUnits
+from infthor_eval.errors import UsageError
+from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.recorded.runs import ArmRun, shared_episodes, task_kinds
+from infthor_eval.manipulation.records import ArmRecord
+from infthor_eval.rates import Rate, clustered_rate
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["RadiusLine", "SuccessByRadius", "success_by_radius"]
+
+Record = UnitRecord[ArmRecord]
+Points = tuple[tuple[float, Rate], ...]
+
+
+@dataclass(frozen=True)
+class RadiusLine:
+    """One model in episodes of one kind.
+
+    Attributes:
+        is_bound: whether it is the planner, which bounds the others.
+        is_embedded: whether its numbers are from the embedded simulator.
+        points: share of successes by radius in metres, ascending.
+        n_failed: episodes of all radii on which the model failed; they count as no success.
+    """
+
+    label: str
+    kind: ManipulationKind
+    is_bound: bool
+    is_embedded: bool
+    points: Points
+    n_failed: int = 0
+
+
+@dataclass(frozen=True)
+class SuccessByRadius:
+    """Success of several models.
+
+    Attributes:
+        lines: lines by kind, then in the order of the runs, the planner's last.
+        floor: share of pick-ups whose object is in the sphere at the start, by radius: successes without a movement.
+            Empty if there are no pick-ups.
+    """
+
+    task: str
+    lines: tuple[RadiusLine, ...]
+    floor: Points
+    n_trajectories: int
+    notes: tuple[str, ...]
+
+
+def success_by_radius(runs: Sequence[ArmRun], tasks: str | None = None) -> SuccessByRadius:
+    """Compute the success of models by radius, on the episodes that all runs have.
+
+    Runs of one label are one model with several radii. Episodes that a run excludes are left out of all of them.
+
+    Args:
+        runs: at least one run.
+        tasks: names of the tasks, separated by commas; None for all that the runs share.
+
+    Raises:
+        UsageError: two runs have one label and radius, or see `shared_episodes`.
+        DataError: see `shared_episodes`.
+    """
+    shared = shared_episodes(runs, tasks, one_radius=False)
+    kinds = task_kinds(runs, shared.tasks)
+    lines = [line for kind, task in kinds.items() for line in _lines(kind, task, runs, shared)]
+    return SuccessByRadius(
+        task=" and ".join(shared.tasks),
+        lines=tuple(lines),
+        floor=_floor(kinds.get(ManipulationKind.PICKUP), runs, shared),
+        n_trajectories=len(shared.trajectories),
+        notes=shared.notes,
+    )
+
+
+def _lines(
+    kind: ManipulationKind, task: str, runs: Sequence[ArmRun], shared: SharedUnits[ArmRecord]
+) -> list[RadiusLine]:
+    models: dict[str, dict[float, tuple[ArmRun, list[Record]]]] = {}
+    for number, run in enumerate(runs):
+        radius = run.config.tasks[task].radius
+        radii = models.setdefault(run.label, {})
+        if radius in radii:
+            raise UsageError(
+                f"two runs are called {run.label} and have a radius of {radius:g} m; leave one of them out"
+            )
+        radii[radius] = run, _records_of(task, shared, number)
+    lines = [_line(label, kind, radii) for label, radii in models.items()]
+    return sorted((line for line in lines if line.points), key=lambda line: line.is_bound)
+
+
+def _line(
+    label: str, kind: ManipulationKind, radii: Mapping[float, tuple[ArmRun, list[Record]]]
+) -> RadiusLine:
+    runs = [run for run, _ in radii.values()]
+    return RadiusLine(
+        label=label,
+        kind=kind,
+        is_bound=all(run.is_planner for run in runs),
+        is_embedded=any(run.is_embedded for run in runs),
+        points=_points({
+            radius: [(float(r.failure is None and r.payload.done), r) for r in records]
+            for radius, (_, records) in radii.items()
+        }),
+        n_failed=sum(record.failure is not None for _, records in radii.values() for record in records),
+    )  # fmt: skip
+
+
+def _floor(task: str | None, runs: Sequence[ArmRun], shared: SharedUnits[ArmRecord]) -> Points:
+    """Return the share of pick-ups by radius that begin in the sphere, as the first run that acted recorded them."""
+    if task is None:
+        return ()
+    radii: dict[float, dict[str, Record]] = {}
+    for number, run in enumerate(runs):
+        episodes = radii.setdefault(run.config.tasks[task].radius, {})
+        for record in _records_of(task, shared, number):
+            if record.failure is None:
+                episodes.setdefault(record.id, record)
+    return _points({
+        radius: [(float(r.payload.starts_inside), r) for r in episodes.values()] for radius, episodes in radii.items()
+    })  # fmt: skip
+
+
+def _records_of(task: str, shared: SharedUnits[ArmRecord], run: int) -> list[Record]:
+    return [record for records in shared.records[run] for record in records if record.task == task]
+
+
+def _points(radii: Mapping[float, Sequence[tuple[float, Record]]]) -> Points:
+    rates = (
+        (
+            radius,
+            clustered_rate([value for value, _ in units], [record.cluster for _, record in units]),
+        )
+        for radius, units in sorted(radii.items())
+    )
+    return tuple((radius, rate) for radius, rate in rates if rate is not None)

@@ -1,0 +1,351 @@
+"""Having questions answered, by a model through its conversation or by a baseline from the answer key.
+
+This is the one way from a sample to its record, whoever drives it: our own run, or lm-eval as the host.
+"""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
+from typing import Any, Protocol
+
+from msgspec.structs import replace as replace_fields
+
+from infthor_eval.errors import DataError, ModelError, UserCodeError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.question import Answer
+from infthor_eval.formats.video import Video
+from infthor_eval.memory import Write
+from infthor_eval.nieh.asking.baselines import Predict
+from infthor_eval.nieh.asking.notebook import Notebook
+from infthor_eval.nieh.asking.recalling import Recaller, apply_recall
+from infthor_eval.nieh.contexts import ContextPart
+from infthor_eval.nieh.contexts.video import as_images
+from infthor_eval.nieh.metrics import MetricError
+from infthor_eval.nieh.records import NiehAnswer, NiehRecall
+from infthor_eval.nieh.shown_clues import shown_clues
+from infthor_eval.nieh.task import PreparedTask
+from infthor_eval.nieh.units import NiehUnit
+from infthor_eval.runs import NOTHING, Session, Tokens, UnitRecord, Usage
+from infthor_eval.storage.digests import fingerprint
+from model_adapters import (
+    Attended,
+    Decoding,
+    Model,
+    Notice,
+    Part,
+    Reply,
+    answer_of,
+    wrap_request_errors,
+)
+
+__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "answer_units", "request_fingerprint"]
+
+
+@dataclass(frozen=True)
+class _UnitRequest:
+    """A unit with its request: the context, and the text with the question."""
+
+    unit: NiehUnit
+    prepared: PreparedTask
+    context: tuple[Part, ...]
+    text: str
+
+    @classmethod
+    def of(cls, unit: NiehUnit, prepared: PreparedTask, answerer: "Answerer") -> "_UnitRequest":
+        context, text = prepared.task_samples.request(unit.sample)
+        return cls(unit, prepared, answerer.read(context), text)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """See `request_fingerprint`."""
+        return request_fingerprint(
+            self.context, self.text, self.unit.payload.answers, self.decoding.document()
+        )
+
+    @property
+    def decoding(self) -> Decoding:
+        """The task's decoding, with the seed of the repetition."""
+        decoding = self.prepared.decoding
+        return replace(decoding, seed=decoding.seed + self.unit.key.repeat - 1)
+
+    def record(
+        self,
+        reply: Reply,
+        seconds: float,
+        faults: tuple[str, ...],
+        usage: Usage,
+        session: Session[NiehAnswer],
+    ) -> UnitRecord[NiehAnswer]:
+        """Return the record of a reply; a failed one, with the reply, if the task's own metrics fail on it."""
+        scores, failure = {}, None
+        thinking, answer = answer_of(reply)
+        answer = self.prepared.cut(answer)
+        try:
+            scores = self.prepared.metrics.scores(
+                self.prepared.task_samples, self.unit.sample, answer
+            )
+        except MetricError as error:
+            failure = session.describe_failure(self.unit, error)
+        return self.unit.record(
+            self.fingerprint,
+            self.unit.payload.with_reply(answer, scores, thinking, reply.n_watched),
+            failure=failure,
+            faults=(*faults, *reply.faults),
+            seconds=round(seconds, 4),
+            tokens=Tokens(reply.n_context_tokens, reply.n_cached_tokens, reply.n_reply_tokens),
+            usage=usage,
+        )
+
+
+class Answerer(Protocol):
+    """Gives the replies to units."""
+
+    @property
+    def batch_size(self) -> int:
+        """Number of units worth answering at once."""
+
+    @property
+    def batch_contexts(self) -> bool:
+        """True if these may have different contexts."""
+
+    @property
+    def write(self) -> Write | None:
+        """What asks the model for texts for its memory; None if it has no memory, as it reads no context."""
+
+    def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
+        """Return a context as the model is given it: films as images, unless it has a video input."""
+
+    def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
+        """Return the replies to units that share their decoding, and their context unless contexts are batched.
+
+        Raises:
+            DataError: a frame cannot be read; nothing is answered then.
+            ModelError: the model cannot take one of the requests; nothing is answered then.
+        """
+
+    def usage(self, reply: Reply) -> Usage:
+        """Return the usage of a reply."""
+
+
+class ModelAnswerer:
+    """A model with one conversation, so that units in the same context share what is encoded of it."""
+
+    def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
+        self.batch_size = model.capabilities.batch_size
+        self.batch_contexts = model.capabilities.batch_contexts
+        self._name = model.name
+        self._person = model if isinstance(model, Attended) else None
+        self._video_input = model.capabilities.video_input
+        self.write: Write | None = Notebook(model, session).write
+        self._conversation = model.conversation()
+        self._start = self._conversation.mark()
+        self._after_context = self._start
+        self._context: tuple[Part, ...] | None = None
+
+    def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
+        """See `Answerer`."""
+        return tuple(context if self._video_input else as_images(context))
+
+    def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
+        """See `Answerer`."""
+        context, decoding = requests[0].context, requests[0].decoding
+        if self._person is not None:
+            self._person.tell(
+                Notice(title="Question", words=requests[0].prepared.task_samples.words)
+            )
+        with wrap_request_errors(self._name):
+            if any(item.context != context for item in requests[1:]):
+                self._go_to(())
+                return self._conversation.replies(
+                    [[*item.context, item.text] for item in requests], decoding
+                )
+            self._go_to(context)
+            return self._conversation.replies([[item.text] for item in requests], decoding)
+
+    def _go_to(self, context: tuple[Part, ...]) -> None:
+        """Let the conversation be this context."""
+        if context != self._context:
+            self._conversation.rewind(self._start)
+            self._context = None
+            self._conversation.append(*context)
+            self._context, self._after_context = context, self._conversation.mark()
+        self._conversation.rewind(self._after_context)
+
+    def usage(self, reply: Reply) -> Usage:
+        """See `Answerer`."""
+        return Usage.of([reply])
+
+
+class BaselineAnswerer:
+    """A baseline, which reads no context and has no memory."""
+
+    batch_size = 1
+    batch_contexts = False
+    write = None
+
+    def __init__(self, predict: Predict) -> None:
+        self._predict = predict
+
+    def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
+        """See `Answerer`."""
+        return tuple(context)
+
+    def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
+        """See `Answerer`."""
+        return [Reply(self._predict(item.unit.sample)) for item in requests]
+
+    def usage(self, reply: Reply) -> Usage:
+        """See `Answerer`."""
+        return NOTHING
+
+
+def answer_units(
+    units: Sequence[NiehUnit],
+    prepared: PreparedTask,
+    answerer: Answerer,
+    session: Session[NiehAnswer],
+) -> Iterator[UnitRecord[NiehAnswer]]:
+    """Yield the records of units on one trajectory.
+
+    Those with one context are answered together, and all of them if the answerer batches contexts.
+    Neighbours share as long a prefix as there is, which a model's conversation encodes once; so do the repetitions of
+    a question. The order depends on the units alone, so it is the same when a run is resumed.
+    """
+    requests = []
+    for unit, recalled in _recall_all(units, prepared, answerer, session):
+        try:
+            if isinstance(recalled, Exception):
+                raise recalled
+            requests.append(_UnitRequest.of(recalled, prepared, answerer))
+        except (DataError, ModelError, UserCodeError) as error:
+            yield unit.record_failure(session.describe_failure(unit, error))
+    waiting: list[_UnitRequest] = []
+    for _, in_one_context in groupby(sorted(requests, key=_names), key=_names):
+        waiting += in_one_context
+        if not answerer.batch_contexts:
+            yield from _answer_in_batches(waiting, answerer, session)
+            waiting = []
+    yield from _answer_in_batches(waiting, answerer, session)
+
+
+def request_fingerprint(
+    context: Sequence[Part], text: str, answers: Sequence[Answer], decoding: Mapping[str, Any]
+) -> str:
+    """Return the hash of a request: context with the frames' content, text, gold answers, decoding.
+
+    Raises:
+        DataError: a frame cannot be read.
+    """
+    contents = [_content(part) for part in context]
+    return fingerprint(
+        {"context": contents, "text": text, "answers": list(answers), "decoding": decoding}
+    )
+
+
+def _content(part: Part) -> Any:
+    """Return a part as JSON values, frames by the digests of their content."""
+    if isinstance(part, Video):
+        return {"video": [frame.digest for frame in part.frames], "fps": part.fps}
+    return [part.digest] if isinstance(part, FrameRef) else part
+
+
+def _names(request: _UnitRequest) -> list[str]:
+    return [name for part in request.context for name in _names_in(part)]
+
+
+def _names_in(part: Part) -> list[str]:
+    if isinstance(part, Video):
+        return [f"video of {part.fps} fps", *(frame.path.name for frame in part.frames)]
+    return [part.path.name if isinstance(part, FrameRef) else part]
+
+
+def _recall_all(
+    units: Sequence[NiehUnit],
+    prepared: PreparedTask,
+    answerer: Answerer,
+    session: Session[NiehAnswer],
+) -> list[tuple[NiehUnit, NiehUnit | Exception]]:
+    """Return each unit with what its memory recalled, or why that failed; as they are if there is nothing to recall."""
+    if answerer.write is None or not any(unit.sample.awaits_recall for unit in units):
+        return [(unit, unit) for unit in units]
+    recaller = Recaller(
+        prepared.task_samples,
+        answerer.write,
+        find=lambda inputs: session.find_artifact(inputs, NiehRecall),
+        keep=session.cache_artifact,
+    )
+    with recaller.in_use():
+        return [(unit, _recall(unit, recaller, prepared)) for unit in units]
+
+
+def _recall(unit: NiehUnit, recaller: Recaller, prepared: PreparedTask) -> NiehUnit | Exception:
+    try:
+        recall = recaller.recall(unit.sample)
+    except (DataError, ModelError, UserCodeError) as error:
+        return error
+    sample = apply_recall(unit.sample, recall)
+    payload = replace_fields(
+        unit.payload, recall=recall, shown_clues=shown_clues(prepared.task_samples, sample)
+    )
+    return replace(unit, sample=sample, payload=payload)
+
+
+def _answer_in_batches(
+    requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer]
+) -> Iterator[UnitRecord[NiehAnswer]]:
+    # A batch has the same requests when a run is resumed, as replies can differ by rounding with those beside them.
+    for batch in _batches(requests, answerer.batch_size):
+        waiting = []
+        for item in batch:
+            record = _find_record(item, session)
+            if record is None:
+                waiting.append(item)
+            else:
+                yield record
+        if waiting:
+            yield from _answer(waiting, answerer, session)
+
+
+def _batches(requests: Sequence[_UnitRequest], size: int) -> Iterator[Sequence[_UnitRequest]]:
+    """Yield batches of requests with one decoding: all first requests, then all second ones."""
+    for repeat in sorted({item.unit.key.repeat for item in requests}):
+        same = [item for item in requests if item.unit.key.repeat == repeat]
+        yield from (same[at : at + size] for at in range(0, len(same), size))
+
+
+def _find_record(
+    request: _UnitRequest, session: Session[NiehAnswer]
+) -> UnitRecord[NiehAnswer] | None:
+    """Return the record of a unit that needs no answer: an earlier run has it, or a frame cannot be read."""
+    try:
+        return session.find_record(request.unit, request.fingerprint)
+    except DataError as error:
+        return request.unit.record_failure(session.describe_failure(request.unit, error))
+
+
+def _answer(
+    requests: Sequence[_UnitRequest],
+    answerer: Answerer,
+    session: Session[NiehAnswer],
+    faults: tuple[str, ...] = (),
+) -> Iterator[UnitRecord[NiehAnswer]]:
+    start = time.perf_counter()
+    try:
+        replies = answerer.answer(requests)
+    except (DataError, ModelError) as error:
+        if len(requests) == 1:
+            (item,) = requests
+            yield item.unit.record_failure(
+                session.describe_failure(item.unit, error), item.fingerprint, faults=faults
+            )
+            return
+        for item in requests:  # one of them may be to blame; the others are answered
+            yield from _answer(
+                [item], answerer, session, (f"asked with {len(requests) - 1} others: {error}",)
+            )
+        return
+    seconds = (time.perf_counter() - start) / len(requests)
+    for item, reply in zip(requests, replies, strict=True):
+        yield item.record(reply, seconds, faults, answerer.usage(reply), session)

@@ -1,0 +1,105 @@
+"""Baselines that see no frame: the answer key itself, the best guess from the question alone, and chance."""
+
+import random
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.docs import doc_target
+from infthor_eval.nieh.guessing.chains import (
+    Chain,
+    Guesser,
+    chains_of_words,
+    chains_of_words_and_count,
+)
+from infthor_eval.nieh.guessing.forms import question_type
+from infthor_eval.runs.baseline import BaselineSubject
+from infthor_eval.storage.digests import seed_of
+from model_adapters import Subject
+
+__all__ = ["BASELINES", "Baseline", "Predict"]
+
+Predict = Callable[[Sample], str]
+
+
+@runtime_checkable
+class Baseline(Subject, Protocol):
+    """A subject that answers from the answer key, without frames; the data's fingerprint covers the key."""
+
+    def fit(self, samples: Sequence[Sample]) -> Predict:
+        """Read the whole answer key of one task, and return a function that answers its samples."""
+
+
+class Oracle(BaselineSubject):
+    """The answer key itself: the score of a perfect model."""
+
+    name = "oracle"
+
+    def fit(self, samples: Sequence[Sample]) -> Predict:
+        """See `Baseline`; every question carries its key."""
+        return lambda sample: doc_target(sample.question)
+
+
+class Blind(BaselineSubject):
+    """The best guess from the question's words, learned on the other trajectories: the score without looking."""
+
+    name = "blind"
+    _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
+
+    def fit(self, samples: Sequence[Sample]) -> Predict:
+        """See `Guesser`; each file of a set is learned alone, as the published scripts ask one at a time."""
+        by_file: dict[str, list[Sample]] = defaultdict(list)
+        for sample in samples:
+            by_file[sample.question.file].append(sample)
+        guessers = {file: Guesser(of_file, self._chains) for file, of_file in by_file.items()}
+        return lambda sample: guessers[sample.question.file].guess(sample)
+
+
+class BlindCount(Blind):
+    """`Blind` that also knows the number of shown frames."""
+
+    name = "blind-count"
+    _chains = staticmethod(chains_of_words_and_count)
+
+
+class Random(BaselineSubject):
+    """An answer drawn from those of the question's type, each as likely as it is frequent."""
+
+    name = "random"
+
+    def identity(self) -> dict[str, Any]:
+        """Return name and seed."""
+        return {"baseline": self.name, "seed": self._seed}
+
+    def fit(self, samples: Sequence[Sample]) -> Predict:
+        """See `Baseline`; a draw depends on the seed and the question alone, not on the order of asking."""
+        seen: dict[str, Counter[str]] = defaultdict(Counter)
+        for question in {sample.question.id: sample.question for sample in samples}.values():
+            seen[question_type(question)][doc_target(question)] += 1
+
+        def predict(sample: Sample) -> str:
+            counts = _counts(seen, sample.question)
+            draw, answers = (
+                random.Random(seed_of(f"{self._seed}\n{sample.question.id}")),
+                sorted(counts),
+            )
+            return draw.choices(answers, weights=[counts[text] for text in answers])[0]
+
+        return predict
+
+
+def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str]:
+    asked = question_type(question)
+    if asked not in seen:
+        raise ModelError(
+            f"no question of type {asked!r} was in the answer key; fit the baseline to the whole key"
+        )
+    return seen[asked]
+
+
+BASELINES: Mapping[str, Callable[[int], Baseline]] = {
+    kind.name: kind for kind in (Oracle, Blind, BlindCount, Random)
+}

@@ -1,0 +1,234 @@
+"""Recalling what a memory shows of a trajectory, for each question on it.
+
+The memory observes the trajectory once, up to the step before the last, and recalls for every question. What it
+recalled is in the run's journal, so that a resumed run shows the same and needs no memory for it.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from infthor_eval.errors import InfthorError, ModelError, UsageError
+from infthor_eval.formats.step_log import read_steps
+from infthor_eval.memory import (
+    Memory,
+    Observation,
+    Query,
+    TrajectoryFacts,
+    Write,
+    check_recalled,
+    memory_identity,
+    open_memory,
+    wrap_memory_errors,
+)
+from infthor_eval.nieh.asking.recall_settings import RecallSettings
+from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.contexts.base import clue_positions
+from infthor_eval.nieh.records import NiehRecall
+from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.storage.digests import fingerprint
+
+__all__ = ["FindRecall", "KeepRecall", "Recaller", "apply_recall", "recall_all"]
+
+FindRecall = Callable[
+    [str], NiehRecall | None
+]  # looks up what was recalled from the same inputs, by their hash
+KeepRecall = Callable[[str, NiehRecall], None]
+
+_IN_USE = threading.Lock()  # memories are shared by a process, and serve one trajectory at a time
+
+
+class _Built(NamedTuple):
+    """A memory that has observed a trajectory up to the step before the last: steps as it sees them, seconds taken."""
+
+    traj_id: str
+    settings: RecallSettings
+    memory: Memory
+    steps: Sequence[Observation]
+    seconds: float
+
+
+class Recaller:
+    """Recalls for questions, trajectory by trajectory, while `in_use` reserves the memories of this process."""
+
+    def __init__(
+        self, task_samples: TaskSamples, write: Write | None, find: FindRecall, keep: KeepRecall
+    ) -> None:
+        """Take a task's samples, what asks the model under test, and where recalls are kept.
+
+        Args:
+            task_samples: the samples.
+            write: asks the model under test; None if there is none, then memories that need one are refused.
+            find: finds an earlier recall.
+            keep: keeps a new one.
+        """
+        self._task_samples, self._write, self._find, self._keep = task_samples, write, find, keep
+        self._built: _Built | None = None
+        self._identities: dict[RecallSettings, dict[str, Any]] = {}
+        self._observed: dict[
+            str, tuple[list[Observation], list[str]]
+        ] = {}  # steps and digests of their frames
+
+    @contextmanager
+    def in_use(self) -> Iterator[None]:
+        """Reserve the memories of this process within the context; what this has built is not used afterwards."""
+        with _IN_USE:
+            yield
+            self._built = None
+
+    def recall(self, sample: Sample) -> NiehRecall:
+        """Return what is recalled for a sample.
+
+        Raises:
+            DataError: a frame or the trajectory's metadata cannot be read.
+            ModelError: the model under test cannot write what the memory asks for, or the memory recalls what it may
+                not: beyond its budget, or what it has not observed.
+            UserCodeError: the memory fails.
+        """
+        settings, question = sample.recall, sample.question
+        if settings is None:
+            raise ValueError("the sample's context has no memory")
+        steps, digests = self._observations(sample)
+        inputs = self._fingerprint(sample, settings, digests)
+        known = self._find(inputs)
+        if known is not None:
+            return known
+        built = self._build(question.traj_id, settings, steps)
+        memory, past, present = built.memory, built.steps[:-1], built.steps[-1]
+        clues = clue_positions(self._task_samples.data, question) if not question.absence else ()
+        query = Query(
+            text=question.text,
+            present=present,
+            clues=clues if memory.capabilities.privileged else None,
+        )
+        start = time.perf_counter()
+        with wrap_memory_errors(settings.memory):
+            recalled = list(memory.recall(query, settings.budget))
+        recall_s = time.perf_counter() - start
+        check_recalled(recalled, past, settings.memory, settings.budget, settings.tokens_per_frame)
+        result = NiehRecall(
+            recalled=tuple(item if isinstance(item, str) else item.number for item in recalled),
+            build_s=round(built.seconds, 4),
+            recall_s=round(recall_s, 4),
+        )
+        self._keep(inputs, result)
+        return result
+
+    def _observations(self, sample: Sample) -> tuple[list[Observation], list[str]]:
+        traj_id = sample.question.traj_id
+        if traj_id not in self._observed:
+            steps = _observations(self._task_samples, sample)
+            self._observed[traj_id] = steps, [step.frame.digest for step in steps]
+        return self._observed[traj_id]
+
+    def _identity(self, settings: RecallSettings) -> dict[str, Any]:
+        if settings not in self._identities:  # it reads the source of a memory of one's own
+            self._identities[settings] = memory_identity(settings.memory, settings.options)
+        return self._identities[settings]
+
+    def _fingerprint(self, sample: Sample, settings: RecallSettings, digests: Sequence[str]) -> str:
+        return fingerprint(
+            {
+                "memory": self._identity(settings),
+                "budget": [settings.budget, settings.tokens_per_frame],
+                "seed": settings.seed,
+                "frames": digests,
+                "question": sample.question.text,
+                "clues": list(sample.question.clues),
+                "data": self._task_samples.data.fingerprint,
+            }
+        )
+
+    def _build(
+        self, traj_id: str, settings: RecallSettings, steps: Sequence[Observation]
+    ) -> _Built:
+        """Return the memory with the trajectory observed."""
+        if self._built is None or (self._built.traj_id, self._built.settings) != (
+            traj_id,
+            settings,
+        ):
+            memory = open_memory(settings.memory, settings.options)
+            write = self._write if memory.capabilities.writes else None
+            if memory.capabilities.writes and write is None:
+                raise ModelError(
+                    f"the memory {settings.memory} asks the model under test, and there is none"
+                )
+            facts = TrajectoryFacts(
+                name=traj_id,
+                tokens_per_frame=settings.tokens_per_frame,
+                seed=settings.seed,
+                write=write,
+            )
+            seen = _visible(steps, memory)
+            start = time.perf_counter()
+            with wrap_memory_errors(settings.memory):
+                memory.begin(facts)
+                for step in seen[:-1]:
+                    memory.observe(step)
+            self._built = _Built(traj_id, settings, memory, seen, time.perf_counter() - start)
+        return self._built
+
+
+def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:
+    """Return a sample with what was recalled for it: these frames and the last one are shown."""
+    frames = [item for item in recall.recalled if isinstance(item, int)]
+    return replace(sample, frames=(*frames, sample.frames[-1]), recalled=recall.recalled)
+
+
+def recall_all(task_samples: TaskSamples) -> list[Sample]:
+    """Return the samples of a task, with what their memory recalls, for models that are none of ours.
+
+    Raises:
+        UsageError: the memory asks the model under test, or recalling fails.
+    """
+    if not any(sample.awaits_recall for sample in task_samples.samples):
+        return list(task_samples.samples)
+    kept: dict[str, NiehRecall] = {}
+    recaller = Recaller(task_samples, None, kept.get, kept.__setitem__)
+    by_trajectory = sorted(
+        enumerate(task_samples.samples), key=lambda item: item[1].question.traj_id
+    )
+    with recaller.in_use():
+        try:
+            recalled = {
+                number: apply_recall(sample, recaller.recall(sample))
+                for number, sample in by_trajectory
+            }
+        except InfthorError as error:
+            raise UsageError(
+                f"{error}; run the task with `infthor-eval run`, or with --model infthor"
+            ) from error
+    return [recalled[number] for number in range(len(recalled))]
+
+
+def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:
+    """Return the steps as the memory may see them: the simulator's metadata only if it is privileged."""
+    return (
+        list(steps)
+        if memory.capabilities.privileged
+        else [replace(step, log=None) for step in steps]
+    )
+
+
+def _observations(task_samples: TaskSamples, sample: Sample) -> list[Observation]:
+    """Return all steps of a sample's trajectory."""
+    data, traj_id = task_samples.data, sample.question.traj_id
+    frames = task_samples.all_frames(sample)
+    steps = sorted(read_steps(data.folder(traj_id)), key=lambda step: step.img_idx)
+    outline = data.outline(traj_id)
+    actions = outline.actions if outline else []
+    goals = {number: goal for goal, span in (outline.tasks if outline else []) for number in span}
+    return [
+        Observation(
+            number=number,
+            frame=frame,
+            action=step.action
+            or (actions[step.step] if number and step.step < len(actions) else None),
+            goal=goals.get(step.step),
+            log=step.object_log,
+        )
+        for number, (frame, step) in enumerate(zip(frames, steps, strict=True))
+    ]

@@ -1,0 +1,79 @@
+"""The published NIEH data: downloading it from the Hugging Face hub, and the folder where it is kept."""
+
+from pathlib import Path
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.archive import unpack_tar
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.storage.user_cache import user_cache
+
+__all__ = ["NIEH_REPOSITORY", "default_folder", "fetch_nieh"]
+
+NIEH_REPOSITORY = "PEARLS-Lab/infini-thor-nieh"
+_FILES = ["qa_set_nieh_single_clue.csv", "qa_set_nieh_multi_clue.csv", "metadata.tar"]
+
+
+def default_folder() -> Path:
+    """Return the default folder of the published data, in the user's cache."""
+    return user_cache("nieh")
+
+
+def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = None) -> NiehSet:
+    """Download, unpack and check the published NIEH data; files that exist are not downloaded again.
+
+    An interrupted download is resumed. The archive is deleted once it is unpacked and the set is checked.
+
+    Args:
+        folder: folder of the set.
+        token: access token; None for the one that `hf auth login` stored.
+        endpoint: URL of another hub; None for the public one.
+
+    Raises:
+        DataError: there is no network or no access, or the data are malformed.
+    """
+    if not (folder / "metadata").is_dir():
+        _download(folder, token, endpoint)
+        unpack_tar(folder / "metadata.tar", folder / "metadata")
+    data = NiehSet(folder)
+    if not data.questions:
+        reasons = "; ".join(reason for reason, _ in data.reasons().most_common(3))
+        raise DataError(
+            f"{folder}: none of its questions can be asked ({reasons}); delete the folder and fetch again"
+        )
+    (folder / "metadata.tar").unlink(missing_ok=True)
+    return data
+
+
+def _download(folder: Path, token: str | None, endpoint: str | None) -> None:
+    from huggingface_hub import snapshot_download
+    from huggingface_hub.errors import (
+        GatedRepoError,
+        HfHubHTTPError,
+        LocalEntryNotFoundError,
+        RepositoryNotFoundError,
+    )
+
+    try:
+        snapshot_download(
+            NIEH_REPOSITORY,
+            repo_type="dataset",
+            local_dir=folder,
+            allow_patterns=_FILES,
+            token=token,
+            endpoint=endpoint,
+        )
+    except (GatedRepoError, RepositoryNotFoundError) as error:
+        raise DataError(
+            f"{NIEH_REPOSITORY}: no access; request it on the hub's page, then log in with `hf auth login`"
+        ) from error
+    except (LocalEntryNotFoundError, HfHubHTTPError, OSError) as error:
+        cause = " ".join(str(error).split())[:120]
+        raise DataError(
+            f"{NIEH_REPOSITORY}: cannot be fetched ({cause}); go online, or copy the set to {folder} "
+            "from a machine that has it"
+        ) from error
+    missing = [name for name in _FILES if not (folder / name).is_file()]
+    if missing:
+        raise DataError(
+            f"{NIEH_REPOSITORY}: has no {', '.join(missing)}; the data set has changed, report it"
+        )

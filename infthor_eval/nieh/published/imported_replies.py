@@ -1,0 +1,300 @@
+"""Replies that others made, as runs: scored, with a journal and results like those of our own runs."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question, SkippedQuestion
+from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
+from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
+from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.published.asked_prompt import asked_prompt
+from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
+from infthor_eval.nieh.scoring import SCORERS, scores
+from infthor_eval.runs import Catalog, RunHeader, Session, Tokens, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.run_config import run_config
+from infthor_eval.storage.digests import digest_of_file, fingerprint
+
+__all__ = ["ImportedRun", "Refusal", "import_logs"]
+
+_PUBLISHED_NAME = re.compile(
+    r"eval_(?P<file>qa_set_.+?_clue)_(?P<model>.+?)_(?:full_traj.*)\.log(?:\.gz)?$"
+)
+_RATE = re.compile(r"_fps(?P<fps>\d+)")
+_PUBLISHED_TASK = (
+    "nieh_published_"  # begins the names of tasks that ask as published logs were asked
+)
+# Published modes: the task of ours, and its context.
+_MODES = {
+    None: ("nieh_full", "trajectory"),
+    "full_traj": ("nieh_full", "trajectory"),
+    "truncate_head": ("nieh_truncate_head", "truncate_head"),
+    "clip_retrieval": ("nieh_clip_retrieval", "clip_retrieval"),
+    "video": ("nieh_video", "video"),
+}
+_WHOLE = (None, "full_traj")  # modes that show all frames; early logs name no mode
+_OTHER = ("imported", "imported")  # of logs that name no mode
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A row that is not imported, with its place and the reason."""
+
+    log: Path
+    line: int
+    reason: str
+
+
+@dataclass
+class ImportedRun:
+    """The replies of one model in one mode.
+
+    Attributes:
+        model: name of the model.
+        task: name of the task of ours that the mode is; "imported" if the log names none.
+        settings: settings of the task's context, as `dataset_kwargs` of a task file has them; of published logs with
+            the prompt that they were asked with, None if their counts of tokens do not tell.
+        logs: the logs.
+        records: a record per imported reply.
+        refused: the rows that are not imported.
+        rescored: rows whose logged score is not that of the reference scorer.
+        question_ids: ids of the questions that the logs are about.
+    """
+
+    model: str
+    task: str
+    settings: Mapping[str, Any]
+    logs: list[Path] = field(default_factory=list)
+    records: list[UnitRecord[NiehAnswer]] = field(default_factory=list)
+    refused: list[Refusal] = field(default_factory=list)
+    rescored: list[Refusal] = field(default_factory=list)
+    question_ids: set[str] = field(default_factory=set)
+
+    @property
+    def n_missing(self) -> int:
+        """Number of questions without a reply."""
+        return len(self.question_ids) - len(self.records)
+
+    def make_records(self, _: Session[NiehAnswer]) -> list[UnitRecord[NiehAnswer]]:
+        """Return the records, see `store_run`."""
+        return self.records
+
+    def header(self, data: NiehSet) -> RunHeader:
+        """Return the header of the run: the model's name, the mode, and the digests of the logs."""
+        task = {
+            "config": {"task": self.task, "dataset_kwargs": dict(self.settings)},
+            "decoding": {"max_new_tokens": None},
+            "metrics": {"names": list(SCORERS)},
+            "data": data.fingerprint,
+            "simulator": data.simulator,
+            "sources": {"logs": {log.name: digest_of_file(log) for log in self.logs}},
+            "n_samples": len(self.question_ids),
+            "skipped": [],
+        }
+        workload = {
+            "tasks": {self.task: task},
+            "k_tokens": None,
+            "tokens_per_frame": None,
+            "frames": SHOWN,
+        }
+        config = run_config("nieh", {"name": self.model, "imported": True}, {}, workload)
+        return RunHeader(suite="nieh", name=self.model, config=config)
+
+
+def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -> list[ImportedRun]:
+    """Return the runs that some logs hold: logs of one model in one mode, on different questions, are one run.
+
+    Args:
+        logs: files with replies (`infthor_eval.formats.reply_logs`).
+        data: the set that they answer.
+        model: name of the model; None for the one in the names of published logs.
+
+    Raises:
+        UsageError: a log names no model and none is given, or no row of a log answers a question of the set.
+        DataError: a log cannot be read.
+    """
+    runs: dict[tuple[str, str, str], ImportedRun] = {}
+    rows_of = {log: list(read_reply_log(log)) for log in dict.fromkeys(logs)}
+    replies_of = {
+        log: [row for row in rows if isinstance(row, LoggedReply)] for log, rows in rows_of.items()
+    }
+    n_frames = _trajectory_lengths(reply for replies in replies_of.values() for reply in replies)
+    for log in logs:
+        name = _PUBLISHED_NAME.match(log.name)
+        if model is None and name is None:
+            raise UsageError(f"{log}: its name has no model; give one with --model")
+        of_model, (task, settings) = (
+            model or (name and name["model"]) or "",
+            _mode_of(replies_of[log], log),
+        )
+        if task != _OTHER[0]:
+            settings["prompt"] = asked_prompt(replies_of[log])
+            task = _published_task(settings) or task
+        run = runs.setdefault(
+            (of_model, task, repr(settings)), ImportedRun(of_model, task, settings)
+        )
+        guesses = find_guesses(data, visible_knowledge(settings["context"]))
+        _add_log(run, log, rows_of[log], _questions_of(data, name), _Known(guesses, n_frames))
+    return list(runs.values())
+
+
+def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
+    """Return the numbers of frames of trajectories, from published rows on whole ones or on their ends."""
+    lengths: dict[str, int] = {}
+    for reply in replies:
+        n_frames = None
+        if reply.mode in _WHOLE:
+            n_frames = reply.n_frames
+        elif reply.mode == "truncate_head" and reply.frames:
+            n_frames = max(reply.frames) + 1
+        if reply.published and n_frames:
+            lengths[reply.published.traj_id] = n_frames
+    return lengths
+
+
+def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, Any]]:
+    """Return task and context settings of a log, from its first row; a log that is not published names none."""
+    first = next((reply for reply in replies if reply.published), None)
+    if first is None:
+        return _OTHER[0], {"context": _OTHER[1]}
+    if first.mode not in _MODES:
+        raise UsageError(
+            f"{log}: the mode {first.mode!r:.40} is unknown; there are {', '.join(filter(None, _MODES))}"
+        )
+    task, context = _MODES[first.mode]
+    if context == "truncate_head" and first.size:
+        return f"{task}_{first.size:g}k", {"context": context, "ctx_size": first.size}
+    rate = _RATE.search(log.name)
+    if context == "video" and rate:
+        fps = float(rate["fps"])
+        return task if fps == 1 else f"{task}_{fps:g}fps", {"context": context, "fps": fps}
+    if context == "clip_retrieval" and first.n_frames:
+        return task, {"context": context, "top_k": max(reply.n_frames or 0 for reply in replies)}
+    return task, {"context": context}
+
+
+def _published_task(settings: Mapping[str, Any]) -> str | None:
+    """Return the task of ours that asks as a published row was made; None if there is none with these settings."""
+    tasks = [
+        task
+        for name, task in Catalog.find_packaged().tasks.items()
+        if name.startswith(_PUBLISHED_TASK)
+    ]
+    return next((task.name for task in tasks if task.settings["dataset_kwargs"] == settings), None)
+
+
+def _questions_of(
+    data: NiehSet, name: re.Match[str] | None
+) -> Sequence[Question | SkippedQuestion]:
+    """Return the rows that a log counts: those of the file in its name, else of the whole set."""
+    if name is None or name["file"] not in data.files:
+        return [question for questions in data.files.values() for question in questions]
+    return data.files[name["file"]]
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What is known of the questions: guesses by question, and numbers of frames by trajectory."""
+
+    guesses: Mapping[str, Guess]
+    n_frames: Mapping[str, int]
+
+
+def _add_log(
+    run: ImportedRun,
+    log: Path,
+    rows: Sequence[LoggedReply | UnreadRow],
+    questions: Sequence[Question | SkippedQuestion],
+    known: _Known,
+) -> None:
+    by_id = {question.id: question for question in questions if isinstance(question, Question)}
+    answered = {record.id for record in run.records}
+    n_before, refused = len(run.records), []
+    for row in rows:
+        question = _find_question(row, questions, by_id)
+        if isinstance(question, str):
+            refused.append(Refusal(log, row.line, question))
+        elif question.id in answered:
+            refused.append(
+                Refusal(log, row.line, f"answers {question.id} again; the first reply is kept")
+            )
+        elif isinstance(row, LoggedReply):
+            answered.add(question.id)
+            run.records.append(_record(run.task, question, row, known))
+            run.rescored += _compare_scores(log, row, run.records[-1])
+    if len(run.records) == n_before:
+        reasons = "; ".join(dict.fromkeys(item.reason for item in refused[:3])) or "it is empty"
+        raise UsageError(
+            f"{log}: no row answers a question of this set ({reasons}); give the set that it is about"
+        )
+    run.logs.append(log)
+    run.refused += refused
+    run.question_ids.update(by_id)
+
+
+def _find_question(
+    row: LoggedReply | UnreadRow,
+    questions: Sequence[Question | SkippedQuestion],
+    by_id: Mapping[str, Question],
+) -> Question | str:
+    """Return the question of a row, or the reason why it has none."""
+    if isinstance(row, UnreadRow):
+        return row.reason
+    if row.question_id is not None:
+        return (
+            by_id.get(row.question_id)
+            or f"answers {row.question_id!r:.80}, which is not in the set"
+        )
+    if row.row is None or not 0 <= row.row < len(questions):
+        return f"answers question {row.row}; the file has {len(questions)}"
+    question, said = questions[row.row], row.published
+    if isinstance(question, SkippedQuestion):
+        return question.reason
+    if said and (said.traj_id, said.text, said.clues, said.answers) != (
+        question.traj_id,
+        question.text,
+        question.clues,
+        question.answers,
+    ):
+        return f"answers another question than row {row.row} of the file"
+    return question
+
+
+def _record(
+    task: str, question: Question, reply: LoggedReply, known: _Known
+) -> UnitRecord[NiehAnswer]:
+    shown = _shown_clues(question, reply, known.n_frames.get(question.traj_id))
+    payload = NiehAnswer.of(question, known.guesses.get(question.id), shown)
+    unit = Unit(UnitKey(task, question.id), question.traj_id, payload)
+    return unit.record(
+        fingerprint({"question": question.id, "reply": reply.text}),
+        unit.payload.with_reply(reply.text, scores(reply.text, question.answers)),
+        seconds=reply.seconds,
+        tokens=Tokens(context=reply.n_context_tokens, reply=reply.n_reply_tokens),
+    )
+
+
+def _shown_clues(question: Question, reply: LoggedReply, n_frames: int | None) -> ShownClues | None:
+    """Return the clue frames that the model saw; None if the row does not tell, or if no frame is evidence."""
+    clues = set(question.clues)
+    is_whole = reply.published is not None and reply.mode in _WHOLE
+    if question.absence or (reply.frames is None and not is_whole):
+        return None
+    n_shown = len(clues if reply.frames is None else clues.intersection(reply.frames))
+    # A log of a model that takes only some frames counts these alone, and a clue can lie beyond.
+    n_after = None if n_frames is None or n_frames <= max(clues) else n_frames - 1 - max(clues)
+    return ShownClues(n_shown=n_shown, n_clues=len(clues), n_after=n_after)
+
+
+def _compare_scores(
+    log: Path, reply: LoggedReply, record: UnitRecord[NiehAnswer]
+) -> Iterator[Refusal]:
+    ours = record.payload.scores["reference"]
+    if reply.score is not None and abs(reply.score - ours) > 1e-9:
+        yield Refusal(
+            log, reply.line, f"has the score {reply.score:g}; the reference scorer gives {ours:g}"
+        )

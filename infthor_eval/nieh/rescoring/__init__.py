@@ -1,0 +1,1 @@
+"""Replies scored again: by today's scorers, one's own, or a judge."""

@@ -1,0 +1,110 @@
+"""The requests of a stored run, made again from its header and its set.
+
+A journal has the hash of each request, not the request. A request that was made again is returned only if it has that
+hash, so what is shown is what was sent.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from infthor_eval.errors import DataError
+from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.asking.answering import request_fingerprint
+from infthor_eval.nieh.asking.recalling import apply_recall
+from infthor_eval.nieh.contexts import MEMORY, ContextPart, ContextSettings, Sample, context_named
+from infthor_eval.nieh.contexts.video import as_images
+from infthor_eval.nieh.frame_ablations import FrameAblation
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.samples import TaskSamples
+from infthor_eval.runs import RunHeader, UnitRecord
+
+__all__ = ["RebuiltRequest", "RequestRebuilder"]
+
+_RETRIEVED = "clip_retrieval"
+# Settings of contexts that a run gives to all its tasks.
+_OF_RUN = ("k_tokens", "tokens_per_frame", "frames", "prompt", "seed")
+
+
+class RebuiltRequest(NamedTuple):
+    """A request as it was sent.
+
+    Attributes:
+        context: what the model saw, frames as references.
+        text: the text after it, which ends with the question.
+        positions: where in the trajectory's time order the shown frames are, from 0 on.
+    """
+
+    context: tuple[ContextPart, ...]
+    text: str
+    positions: Sequence[int]
+
+
+class RequestRebuilder:
+    """Makes the requests of one task of a stored run again."""
+
+    def __init__(self, header: RunHeader, task: str, data: NiehSet) -> None:
+        """Take the run's header, the name of the task, and its set, unchanged since the run.
+
+        Raises:
+            UsageError: a setting of the task is not valid.
+        """
+        about: Mapping[str, Any] = header.config["tasks"][task]
+        dataset = about["config"]["dataset_kwargs"]
+        given = {name: header.config.get(name) for name in _OF_RUN}
+        self._settings = ContextSettings.read(given | dataset)
+        self._context = context_named(dataset["context"])
+        ablation = FrameAblation(self._settings.frames, self._settings.seed)
+        self._samples = TaskSamples(
+            data, dataset["context"], self._context, (), (), {}, ablation, self._settings.prompt
+        )
+        self._decoding: Mapping[str, Any] = about["decoding"]
+        self._shows_images = about.get("film") == "images"
+
+    def rebuild(self, record: UnitRecord[NiehAnswer]) -> RebuiltRequest:
+        """Return the request of a record.
+
+        Raises:
+            DataError: it cannot be made again, or not exactly; the message says why.
+        """
+        sample = self._find_sample(record)
+        parts, text = self._samples.request(sample)
+        context = tuple(as_images(parts) if self._shows_images else parts)
+        decoding = {**self._decoding, "seed": self._decoding["seed"] + record.repeat - 1}
+        if (
+            request_fingerprint(context, text, record.payload.answers, decoding)
+            != record.fingerprint
+        ):
+            raise DataError("made again, it is another request than the one that was sent")
+        return RebuiltRequest(context, text, self._context.positions(self._samples.data, sample))
+
+    def _find_sample(self, record: UnitRecord[NiehAnswer]) -> Sample:
+        question = self._questions.get(record.id)
+        if question is None:
+            raise DataError("its question is not in the set")
+        if not record.fingerprint:
+            raise DataError("it was not made: its inputs could not be read")
+        sample = next(
+            (it for it in self._variants(question, record) if it.variant == record.variant), None
+        )
+        if sample is None:
+            raise DataError("the set has no such context of its question")
+        return sample
+
+    def _variants(self, question: Question, record: UnitRecord[NiehAnswer]) -> Iterator[Sample]:
+        data, name = self._samples.data, self._samples.context_name
+        if name == _RETRIEVED:  # by a model, which may not be there, and takes minutes
+            raise DataError(
+                "its frames were retrieved by a model, and the journal does not have them"
+            )
+        if name != MEMORY:
+            samples = self._context.samples(data, question, self._settings)
+            yield from (sample for sample in samples if isinstance(sample, Sample))
+        elif record.payload.recall is not None:
+            every = tuple(range(len(data.frames(question.traj_id))))
+            yield apply_recall(Sample(question, every), record.payload.recall)
+
+    @cached_property
+    def _questions(self) -> Mapping[str, Question]:
+        return {question.id: question for question in self._samples.data.questions}

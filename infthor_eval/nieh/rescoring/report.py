@@ -1,0 +1,190 @@
+"""What scoring replies again has changed, and how a judge agrees with the rules: `rescored.json`, and tables."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.rescoring.judging import JUDGED, Agreement, Verdicts
+from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.runs import UnitKey, UnitRecord
+from infthor_eval.tables import Column, Row, Table
+
+__all__ = [
+    "Change",
+    "ChangedScore",
+    "RescoringReport",
+    "agreement_table",
+    "change_table",
+    "find_changes",
+    "sources_of",
+]
+
+Record = UnitRecord[NiehAnswer]
+
+_N_EXAMPLES = 3  # of replies whose score has changed, for each metric
+
+
+class ChangedScore(msgspec.Struct, frozen=True):
+    """A reply whose score today is not the one in the journal."""
+
+    question: str
+    reply: str
+    before: float
+    now: float
+
+
+class Change(msgspec.Struct, frozen=True, kw_only=True):
+    """A metric of a task today, against the journal.
+
+    Attributes:
+        n: number of replies with a score today.
+        mean: their mean today; None without any.
+        n_before: number of these that have a score of this metric in the journal.
+        mean_before: mean of those scores; None without any.
+        n_differ: number of replies of which the two scores differ.
+        examples: the first of them.
+    """
+
+    n: int
+    mean: float | None
+    n_before: int
+    mean_before: float | None
+    n_differ: int
+    examples: list[ChangedScore]
+
+
+class RescoringReport(msgspec.Struct, frozen=True, kw_only=True):
+    """What scoring the replies of a run again has changed.
+
+    Attributes:
+        n_scored: replies with scores.
+        n_without_reply: records without a reply, which stay failed.
+        n_failed: replies on which the own scorer failed.
+        n_missing: units without a record.
+        left_out: metrics of the journal that are none of today's, by task.
+        tasks: changes by task and metric.
+        judge: what the judge says; None for no judge.
+    """
+
+    n_scored: int
+    n_without_reply: int
+    n_failed: int
+    n_missing: int
+    left_out: dict[str, list[str]]
+    tasks: dict[str, dict[str, Change]]
+    judge: Agreement | None
+
+
+def find_changes(
+    before: Mapping[UnitKey, Mapping[str, float]], records: Sequence[Record], names: Sequence[str]
+) -> dict[str, Change]:
+    """Compare the scores of a task's records with those before, by unit: a change for each metric."""
+    return {
+        name: _change(before, [r for r in records if name in r.payload.scores], name)
+        for name in names
+    }
+
+
+def _change(
+    before: Mapping[UnitKey, Mapping[str, float]], records: Sequence[Record], name: str
+) -> Change:
+    now = [record.payload.scores[name] for record in records]
+    both = [
+        (r, before[r.key][name], r.payload.scores[name]) for r in records if name in before[r.key]
+    ]
+    differing = [
+        ChangedScore(r.id, r.payload.reply or "", old, new) for r, old, new in both if old != new
+    ]
+    return Change(
+        n=len(now),
+        mean=_mean(now),
+        n_before=len(both),
+        mean_before=_mean([old for _, old, _ in both]),
+        n_differ=len(differing),
+        examples=differing[:_N_EXAMPLES],
+    )
+
+
+def _mean(scores: Sequence[float]) -> float | None:
+    return sum(scores) / len(scores) if scores else None
+
+
+def sources_of(config: Mapping[str, Any]) -> dict[str, str]:
+    """Return for each metric of a rescored run's config by whom it is, in words; {} for any other run."""
+    if "rescored" not in config:
+        return {}
+    by: dict[str, str] = dict(
+        zip(SCORERS, ("the published scorer", "our strict scorer"), strict=True)
+    )
+    scorer, judge = config["rescored"]["scorer"], config["rescored"]["judge"]
+    if scorer:
+        by |= {
+            name: f"{scorer['name']} in {scorer.get('file') or scorer['package']}"
+            for name in scorer["metrics"]
+        }
+    if judge:
+        by[JUDGED] = f"strict, and {judge['label']} where the rules are unsure"
+    return by
+
+
+def change_table(report: RescoringReport, sources: Mapping[str, str]) -> Table:
+    """Return the means today and in the journal, a row for each task and metric, with by whom a metric is."""
+    rows = [
+        Row((task, *cells))
+        for task, changes in report.tasks.items()
+        for cells in _change_cells(changes, sources)
+    ]
+    numbers = ("replies", "in the journal", "today", "scores that differ")
+    columns = (
+        Column("task", False),
+        Column("metric", False),
+        Column("by", False),
+        *map(Column, numbers),
+    )
+    return Table("Scores of the replies, mean in %", columns, tuple(rows))
+
+
+def _change_cells(
+    changes: Mapping[str, Change], sources: Mapping[str, str]
+) -> Iterator[tuple[str, ...]]:
+    for name, change in changes.items():
+        differ = str(change.n_differ) if change.n_before else "-"
+        yield (
+            name,
+            sources[name],
+            str(change.n),
+            _percent(change.mean_before),
+            _percent(change.mean),
+            differ,
+        )
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.2f}"
+
+
+def agreement_table(agreement: Agreement, judge: str) -> Table:
+    """Return what a judge of that name says: where the rules are unsure, and where they are sure."""
+    rows = (
+        _verdicts_row("the rules are unsure of", agreement.unsure),
+        _verdicts_row("are right by the rules (sample)", agreement.right),
+        _verdicts_row("are wrong by the rules (sample)", agreement.wrong),
+    )
+    numbers = ("n", "right", "partly", "wrong", "neither", "not asked")
+    columns = (Column("open-ended replies that", False), *map(Column, numbers))
+    note = f"Judge and rules agree on {_percent(agreement.share)} % of the sample."
+    return Table(f"Verdicts of {judge}", columns, rows, (note,))
+
+
+def _verdicts_row(name: str, counts: Verdicts) -> Row:
+    numbers = (
+        counts.n,
+        counts.n_right,
+        counts.n_partly,
+        counts.n_wrong,
+        counts.n_neither,
+        counts.n_not_asked,
+    )
+    return Row((name, *map(str, numbers)))

@@ -1,0 +1,218 @@
+"""Scores of today's scorers over the replies in a run's journal, as a run of its own.
+
+The journal alone is needed: its records have the gold answers. So runs can be scored again whose model or set is no
+longer there, and runs of imported replies.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+import infthor_eval
+from infthor_eval.errors import UsageError
+from infthor_eval.nieh.metrics import MetricError
+from infthor_eval.nieh.own_scorers import OwnScorer, OwnScores
+from infthor_eval.nieh.records import RECORDS, NiehAnswer
+from infthor_eval.nieh.rescoring.judging import JUDGED, Judge, Judgement, Track, judge_replies
+from infthor_eval.nieh.rescoring.report import RescoringReport, find_changes
+from infthor_eval.nieh.scoring import SCORERS, scores
+from infthor_eval.nieh.suite import NiehSuite
+from infthor_eval.runs import NOTHING, RunHeader, Session, Unit, UnitRecord, read_header, read_run
+from infthor_eval.runs.results import write_document
+from infthor_eval.runs.run_config import as_json_values
+from infthor_eval.runs.stored.writing import Stored, store_run
+from infthor_eval.storage.digests import fingerprint
+
+__all__ = ["RESCORED", "Rescored", "Rescoring", "Source", "read_source", "score_again"]
+
+RESCORED = "rescored.json"  # in the run's folder: what has changed
+
+_SUFFIX = "-rescored"  # of the run's name
+
+Record = UnitRecord[NiehAnswer]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A run whose replies are scored again: its header, and the latest record of each unit."""
+
+    header: RunHeader
+    records: Sequence[Record]
+
+    @property
+    def n_missing(self) -> int:
+        """Number of units without a record."""
+        return sum(task["n_samples"] for task in self.header.config["tasks"].values()) - len(
+            self.records
+        )
+
+    @property
+    def replied(self) -> list[Record]:
+        """The records with a reply."""
+        return [record for record in self.records if record.payload.reply is not None]
+
+
+@dataclass(frozen=True)
+class Rescored:
+    """A run with today's scores, stored.
+
+    Attributes:
+        run: its folder, summary and usage.
+        report: what has changed.
+        records: its records.
+        judgement: what the judge says; None for no judge.
+    """
+
+    run: Stored
+    report: RescoringReport
+    records: Sequence[Record]
+    judgement: Judgement | None
+
+
+@dataclass(frozen=True)
+class Rescoring:
+    """A run with today's scores, before it is stored.
+
+    Attributes:
+        source: the run that it comes from.
+        scorer: a scorer of one's own; None for none.
+        own: its scores; None for none.
+        judge: the judge; None for none.
+    """
+
+    source: Source
+    scorer: OwnScorer | None
+    own: OwnScores | None
+    judge: Judge | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The metrics."""
+        return (*SCORERS, *(self.own.names if self.own else ()), *((JUDGED,) if self.judge else ()))
+
+    @cached_property
+    def header(self) -> RunHeader:
+        """The header of the run: that of its source, with what it comes from and who scores it."""
+        source = self.source.header
+        tasks = source.config["tasks"].items()
+        config = source.config | {
+            "infthor_eval": infthor_eval.__version__,
+            "tasks": {task: about | {"metrics": {"names": self.names}} for task, about in tasks},
+            "rescored": {
+                "from": {"name": source.name, "config": fingerprint(source.config)},
+                "scorer": self._scorer_config(),
+                "judge": self.judge.config() if self.judge else None,
+            },
+        }
+        name = f"{source.name.removesuffix(_SUFFIX)}{_SUFFIX}"
+        return RunHeader(suite=source.suite, name=name, config=as_json_values(config))
+
+    def store(self, output: Path, track: Track = list) -> Rescored:
+        """Score the replies and store the run below a folder, with `rescored.json`.
+
+        Args:
+            output: folder above those of runs.
+            track: see `judge_replies`.
+
+        Raises:
+            UsageError: another process writes the run.
+            DataError: something cannot be written.
+        """
+        records: list[Record] = []
+        judgements: list[Judgement] = []
+
+        def make_records(session: Session[NiehAnswer]) -> list[Record]:
+            records.extend(self._score(record, session) for record in self.source.records)
+            if self.judge is not None:
+                judgements.append(judge_replies(records, self.judge, session, track))
+                records[:] = [_with_verdict(record, judgements[0]) for record in records]
+            return records
+
+        run = store_run(output, self.header, NiehSuite(), make_records, self.source.n_missing)
+        judgement = judgements[0] if judgements else None
+        report = self._report(records, judgement)
+        write_document(run.folder / RESCORED, report)
+        return Rescored(run, report, records, judgement)
+
+    def _scorer_config(self) -> dict[str, Any] | None:
+        if self.scorer is None or self.own is None:
+            return None
+        return {"name": self.scorer.name, "metrics": list(self.own.names), **self.scorer.source}
+
+    def _score(self, record: Record, session: Session[NiehAnswer]) -> Record:
+        """Return a record with today's scores by rule; failed without a reply, or if the own scorer fails on it."""
+        today = msgspec.structs.replace(record, usage=NOTHING, attempt=1)
+        if record.payload.reply is None:
+            return today
+        own = self.own.by_unit[record.key] if self.own else {}
+        if isinstance(own, MetricError):
+            failure = session.describe_failure(
+                Unit(record.key, record.cluster, record.payload), own
+            )
+            return msgspec.structs.replace(_with_scores(today, {}), failure=failure)
+        by_rule = scores(record.payload.reply, record.payload.answers)
+        return msgspec.structs.replace(_with_scores(today, by_rule | own), failure=None)
+
+    def _report(self, records: Sequence[Record], judgement: Judgement | None) -> RescoringReport:
+        before = {record.key: record.payload.scores for record in self.source.records}
+        tasks = self.source.header.config["tasks"]
+        left_out = {
+            task: [n for n in tasks[task]["metrics"]["names"] if n not in self.names]
+            for task in tasks
+        }
+        n_scored = sum(bool(record.payload.scores) for record in records)
+        return RescoringReport(
+            n_scored=n_scored,
+            n_without_reply=len(records) - len(self.source.replied),
+            n_failed=len(self.source.replied) - n_scored,
+            n_missing=self.source.n_missing,
+            left_out={task: names for task, names in left_out.items() if names},
+            tasks={
+                task: find_changes(before, [r for r in records if r.task == task], self.names)
+                for task in tasks
+            },
+            judge=judgement.agreement if judgement else None,
+        )
+
+
+def read_source(folder: Path) -> Source:
+    """Read the run in a folder.
+
+    Raises:
+        UsageError: it is a run of another suite.
+        DataError: there is no journal, or one with a bad line, or of another format.
+    """
+    header = read_header(folder)
+    if header.suite != NiehSuite.name:
+        raise UsageError(
+            f"{folder}: is a run of {header.suite}; give a run of {NiehSuite.name}, which has replies"
+        )
+    return Source(*read_run(folder, RECORDS))
+
+
+def score_again(
+    source: Source, scorer: OwnScorer | None = None, judge: Judge | None = None
+) -> Rescoring:
+    """Set up a run with the scores of both scorers today, and of a scorer of one's own and a judge if there are any.
+
+    Raises:
+        UsageError: the own scorer calls a metric as one of ours is called.
+    """
+    own = scorer.score_all(source.replied, (*SCORERS, JUDGED)) if scorer else None
+    return Rescoring(source, scorer, own, judge)
+
+
+def _with_verdict(record: Record, judgement: Judgement) -> Record:
+    if record.key not in judgement.scores:
+        return record
+    return _with_scores(record, record.payload.scores | {JUDGED: judgement.scores[record.key]})
+
+
+def _with_scores(record: Record, by_metric: dict[str, float]) -> Record:
+    return msgspec.structs.replace(
+        record, payload=msgspec.structs.replace(record.payload, scores=by_metric)
+    )

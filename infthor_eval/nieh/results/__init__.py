@@ -1,0 +1,1 @@
+"""What NIEH runs amount to: the summary of a journal, and its tables."""

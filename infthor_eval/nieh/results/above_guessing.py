@@ -1,0 +1,110 @@
+"""The share of what could not be guessed that a run got: 0 for a guesser, 1 for all right.
+
+Of a form of questions with the score s and the guess g it is (s - g) / (1 - g); forms are pooled by their questions.
+That equals the mean over questions of (their score - their guess) / (1 - g), so it has intervals, and runs can be
+paired. A form that is in two files counts as two.
+docs/reference/metrics.md says what it assumes.
+"""
+
+from collections.abc import Sequence
+
+import msgspec
+
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.runs import UnitRecord
+from infthor_eval.statistics import bootstrap_interval
+
+__all__ = ["SOLVED", "AboveGuessing", "FormScore", "above_guessing", "score_above_guessing"]
+
+# A form with a better guess counts as solved by guessing: what is left of it is a few questions, and a run that errs on
+# one of them more than the guesser would lose more than it could win on all others.
+SOLVED = 0.95
+
+
+class FormScore(msgspec.Struct, frozen=True):
+    """The questions of a form: their number, the run's mean score, and the mean of the best guesser on them."""
+
+    n: int
+    score: float
+    guess: float
+
+
+class AboveGuessing(msgspec.Struct, frozen=True):
+    """The score above guessing of n questions, at most 1; None if there is none.
+
+    Attributes:
+        low: lower end of the 95 % interval over resampled trajectories; None with fewer than two.
+        high: its upper end.
+        n: number of questions that count.
+        n_solved: number of questions that do not, as guessing solves their form.
+        n_unknown: number of questions whose guess is not known.
+        forms: all forms with a guess.
+        solved_forms: those that guessing solves.
+    """
+
+    mean: float | None
+    low: float | None
+    high: float | None
+    n: int
+    n_solved: int
+    n_unknown: int
+    forms: dict[str, FormScore]
+    solved_forms: list[str]
+
+
+def score_above_guessing(payload: NiehAnswer, scorer: str) -> float | None:
+    """Return what one question adds to the mean above guessing; None if it does not count."""
+    guess = payload.guess
+    if guess is None or scorer not in guess.form_scores or guess.form_scores[scorer] > SOLVED:
+        return None
+    if payload.scores and scorer not in payload.scores:  # the task has not this scorer
+        return None
+    # 0 if the model failed
+    return (payload.scores.get(scorer, 0.0) - guess.scores[scorer]) / (
+        1 - guess.form_scores[scorer]
+    )
+
+
+def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> AboveGuessing:
+    """Return the score above guessing of some records under a scorer."""
+    known = [
+        record
+        for record in records
+        if record.payload.guess and scorer in record.payload.guess.scores
+    ]
+    pairs = [(score_above_guessing(record.payload, scorer), record.cluster) for record in known]
+    counted = [(score, cluster) for score, cluster in pairs if score is not None]
+    scores, clusters = [score for score, _ in counted], [cluster for _, cluster in counted]
+    low, high = (bootstrap_interval(scores, clusters) if scores else None) or (None, None)
+    return AboveGuessing(
+        mean=sum(scores) / len(scores) if scores else None,
+        low=low,
+        high=high,
+        n=len(scores),
+        n_solved=len(known) - len(scores),
+        n_unknown=len(records) - len(known),
+        forms=_by_form(known, scorer),
+        solved_forms=sorted(
+            {_form(item) for item in known if score_above_guessing(item.payload, scorer) is None}
+        ),
+    )
+
+
+def _by_form(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> dict[str, FormScore]:
+    by_form: dict[str, list[tuple[float, float]]] = {}
+    for record in records:
+        assert record.payload.guess is not None
+        pair = record.payload.scores.get(scorer, 0.0), record.payload.guess.scores[scorer]
+        by_form.setdefault(_form(record), []).append(pair)
+    return {
+        form: FormScore(
+            len(pairs), *(sum(column) / len(pairs) for column in zip(*pairs, strict=True))
+        )
+        for form, pairs in sorted(by_form.items())
+    }
+
+
+def _form(record: UnitRecord[NiehAnswer]) -> str:
+    assert record.payload.guess is not None
+    file, form = record.payload.file, record.payload.guess.form
+    return f"{file}: {form}" if file else form

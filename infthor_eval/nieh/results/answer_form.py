@@ -1,0 +1,72 @@
+"""The form of replies, apart from whether they are right: a leaning to yes, and replies that are no answer at all."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import msgspec
+
+from infthor_eval.nieh.prompts import last_line
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import says_number, says_yes_or_no
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["YesNo", "format_failures", "yes_no"]
+
+Record = UnitRecord[NiehAnswer]
+
+
+class YesNo(msgspec.Struct, frozen=True):
+    """Yes/no questions; the shares, 0 to 1, are None without any.
+
+    Attributes:
+        n_neither: replies that are neither, or both.
+    """
+
+    n: int
+    share_gold_yes: float | None
+    share_said_yes: float | None
+    n_neither: int
+
+
+def yes_no(records: Sequence[Record]) -> YesNo:
+    """Return the bias on the yes/no questions among a task's: does a model always say yes, or neither?"""
+    asked = [record for record in records if _gold(record) in ({"yes"}, {"no"})]
+    said = Counter(says_yes_or_no(last_line(record.payload.reply or "")) for record in asked)
+    n = len(asked)
+    return YesNo(
+        n=n,
+        share_gold_yes=sum(_gold(record) == {"yes"} for record in asked) / n if n else None,
+        share_said_yes=said["yes"] / n if n else None,
+        n_neither=said[None],
+    )
+
+
+def format_failures(records: Sequence[Record], max_new_tokens: int | None) -> dict[str, int]:
+    """Count a task's replies that are not of the form asked for, by reason; one with two faults counts in both."""
+    counts: Counter[str] = Counter()
+    for record in records:
+        if record.payload.reply is not None:
+            counts.update(_failures(record, last_line(record.payload.reply), max_new_tokens))
+    return dict(sorted(counts.items()))
+
+
+def _failures(record: Record, said: str, max_new_tokens: int | None) -> list[str]:
+    gold, reasons = _gold(record), []
+    if not said:
+        reasons.append("empty" if record.payload.thinking is None else "cut off while thinking")
+    elif gold in ({"yes"}, {"no"}) and says_yes_or_no(said) is None:
+        reasons.append("neither yes nor no")
+    elif len(gold) == 1 and says_number(next(iter(gold))) and not says_number(said):
+        reasons.append("no number")
+    is_cut_thinking = not said and record.payload.thinking is not None
+    if (
+        not is_cut_thinking
+        and max_new_tokens is not None
+        and (record.tokens.reply or 0) >= max_new_tokens
+    ):
+        reasons.append("cut off at the token limit")
+    return reasons
+
+
+def _gold(record: Record) -> set[str]:
+    return {str(answer).lower() for answer in record.payload.answers}

@@ -1,0 +1,163 @@
+"""The effective length of a model's context: the longest at which it keeps 85 % of its score on the clue frames.
+
+The rule is NoLiMa's (Modarressi et al. 2025), with the model's own score on the clue frames alone as its base. It is
+applied to windows of growing size around the evidence (`nieh_haystack`), to the last frames (`nieh_truncate_head`) and
+to whole trajectories by their length (`nieh_full`); to plain scores and to those above guessing.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from infthor_eval.distances import LENGTHS
+from infthor_eval.nieh.results.gains import name_of
+from infthor_eval.nieh.results.summary import NiehSummary, TaskSummary
+from infthor_eval.runs import RunSummary
+from infthor_eval.tables import Column, Row, Table
+
+__all__ = ["KEPT", "Series", "effective_length", "effective_lengths", "find_series"]
+
+KEPT = 0.85  # share of the base that counts as kept
+_SIZED = ("haystack", "truncate_head")
+
+
+class _Point(NamedTuple):
+    """Scores at one length, from 0 to 1; None if nothing was asked there."""
+
+    length: str  # in thousand tokens
+    score: float | None
+    above: float | None
+
+
+@dataclass(frozen=True)
+class Series:
+    """The scores of a model in one kind of context by its length, and on the clue frames."""
+
+    model: str
+    context: str
+    scorer: str
+    base: _Point
+    points: Sequence[_Point]
+
+
+def effective_lengths(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return a table with a row per model, kind of context and scorer; none without a run on the clue frames."""
+    rows = []
+    for series in find_series(runs):
+        by_score = {point.length: point.score for point in series.points}
+        by_above = {point.length: point.above for point in series.points}
+        rows.append(
+            Row(
+                (
+                    *(series.model, series.context, series.scorer),
+                    *(_percent(series.base.score), effective_length(series.base.score, by_score)),
+                    *(_percent(series.base.above), effective_length(series.base.above, by_above)),
+                    ", ".join(
+                        f"{point.length}K {_percent(point.score)}" for point in series.points
+                    ),
+                )
+            )
+        )
+    if not rows:
+        return []
+    names = ("base", "effective length", "base above guessing", "effective length above guessing")
+    heads = [Column(name, False) for name in ("model", "context", "scorer")]
+    note = (
+        f"Effective length: the longest context, in thousand tokens, up to which {KEPT:.0%} of the base, the score on "
+        "the clue frames alone, is kept. A row of whole trajectories has their lengths in bins."
+    )
+    columns = (*heads, *map(Column, names), Column("scores by length", False))
+    return [Table("Effective length of the context", columns, tuple(rows), (note,))]
+
+
+def effective_length(base: float | None, scores: Mapping[str, float | None]) -> str:
+    """Return the longest of some lengths, ascending, up to which the base is kept; `-` if there is no base above 0."""
+    if base is None or base <= 0:
+        return "-"
+    lengths = [length for length, score in scores.items() if score is not None]
+    kept = ""
+    for length in lengths:
+        score = scores[length]
+        if score is None or _is_lost(score, base):
+            return f"{kept}K" if kept else f"below {length}K"
+        kept = length
+    return f"{kept}K, all that were asked" if kept else "-"
+
+
+def _is_lost(score: float, base: float) -> bool:
+    return score < KEPT * base and not math.isclose(
+        score, KEPT * base
+    )  # means of questions are rounded
+
+
+def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
+    """Yield the series of each model that has also been asked on the clue frames of the same set."""
+    by_subject: dict[str, list[tuple[RunSummary, str, TaskSummary]]] = {}
+    for run in runs:
+        assert isinstance(run.summary, NiehSummary)
+        for name, task in run.summary.tasks.items():
+            subject = repr(
+                (run.header.config["model"], run.header.config["frames"], _about(run, name)["data"])
+            )
+            by_subject.setdefault(subject, []).append((run, name, task))
+    for items in by_subject.values():
+        base = next(
+            ((run, task) for run, _, task in items if task.context == "clues" and task.n), None
+        )
+        if base is None:
+            continue
+        run, on_clues = base
+        for context, tasks in _lengths(items).items():
+            for scorer in on_clues.metrics:
+                points = [
+                    point
+                    for sized in tasks
+                    if scorer in sized[1].metrics
+                    for point in _points(sized, scorer)
+                ]
+                if points:
+                    yield Series(
+                        name_of(run), context, scorer, _point("", on_clues, scorer), points
+                    )
+
+
+def _about(run: RunSummary, task: str) -> Mapping[str, object]:
+    about: Mapping[str, object] = run.header.config["tasks"][task]
+    return about
+
+
+def _lengths(
+    items: Sequence[tuple[RunSummary, str, TaskSummary]],
+) -> dict[str, list[tuple[float, TaskSummary]]]:
+    """Return the tasks by kind of context, each with its size in thousand tokens (0: binned), ascending."""
+    chosen: dict[str, list[tuple[float, TaskSummary]]] = {}
+    for run, name, task in items:
+        config = run.header.config["tasks"][name]["config"]["dataset_kwargs"]
+        if task.context in _SIZED and config.get("ctx_size"):
+            chosen.setdefault(task.context, []).append((float(config["ctx_size"]), task))
+        elif task.context == "trajectory":
+            chosen.setdefault(task.context, []).append((0.0, task))
+    return {context: sorted(tasks, key=lambda item: item[0]) for context, tasks in chosen.items()}
+
+
+def _points(sized: tuple[float, TaskSummary], scorer: str) -> Iterator[_Point]:
+    size, task = sized
+    if size:
+        yield _point(f"{size:g}", task, scorer)
+        return
+    for name in LENGTHS:
+        if name in task.by_length:
+            at = task.by_length[name]
+            yield _Point(name, at.cell.scores[scorer].mean, at.above_guessing.get(scorer))
+
+
+def _point(length: str, task: TaskSummary, scorer: str) -> _Point:
+    total, above = task.by_clues["total"], task.above_guessing.get(scorer)
+    return _Point(
+        length, total.scores[scorer].mean if total.n else None, above.mean if above else None
+    )
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.1f}"

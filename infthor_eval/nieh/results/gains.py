@@ -1,0 +1,79 @@
+"""Gains over blank frames: how much higher a model scores with frames than without, by the wording alone."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.results.summary import TaskSummary
+from infthor_eval.runs import RunSummary
+from infthor_eval.statistics import MeanEstimate, paired_difference
+
+__all__ = ["Gain", "find_gains", "frames_of", "name_of"]
+
+_BLANK = "blank"
+
+
+@dataclass(frozen=True)
+class Gain:
+    """The gain of a run with frames over its run on blank ones, in one task under one scorer, with both summaries."""
+
+    run: RunSummary
+    task: str
+    metric: str
+    seeing: TaskSummary
+    blind: TaskSummary
+
+    def in_column(self, column: str) -> float | None:
+        """Return the gain for a number of clues or in total, between -1 and 1; None if nothing was asked."""
+        seeing, blind = self.seeing.by_clues[column], self.blind.by_clues[column]
+        if not seeing.n or not blind.n:
+            return None
+        return seeing.scores[self.metric].mean - blind.scores[self.metric].mean
+
+    def total(self) -> MeanEstimate | None:
+        """Return the mean gain with its interval, paired by question, clustered by trajectory; None without questions.
+
+        Runs whose configs differ in their frames only ask the same questions, in the same order.
+        """
+        seeing, blind = self.seeing.scores[self.metric], self.blind.scores[self.metric]
+        clusters = [trajectory for trajectory, scores in seeing.items() for _ in scores]
+        if not clusters:
+            return None
+        ours, theirs = (
+            [score for trajectory in seeing for score in scores[trajectory]]
+            for scores in (seeing, blind)
+        )
+        return paired_difference(theirs, ours, clusters).estimate
+
+
+def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
+    """Yield the gains of every run that has a run on blank frames with otherwise the same config among the runs."""
+    for run in runs:
+        for blind in runs:
+            is_pair = frames_of(run) != _BLANK and frames_of(blind) == _BLANK
+            if is_pair and _without_frames(run) == _without_frames(blind):
+                for name, task in run.summary.tasks.items():
+                    yield from (
+                        Gain(run, name, m, task, blind.summary.tasks[name]) for m in task.metrics
+                    )
+
+
+def frames_of(run: RunSummary) -> str:
+    """Return the frame ablation of a run."""
+    return str(run.header.config["frames"])
+
+
+def name_of(run: RunSummary) -> str:
+    """Return the name of a run, with its frame ablation."""
+    frames = frames_of(run)
+    return run.header.name if frames == SHOWN else f"{run.header.name}, {frames} frames"
+
+
+def _without_frames(run: RunSummary) -> dict[str, Any]:
+    config = {name: value for name, value in run.header.config.items() if name != "frames"}
+    if "rescored" in config:  # from runs that differ in their frames
+        config["rescored"] = {
+            name: value for name, value in config["rescored"].items() if name != "from"
+        }
+    return config

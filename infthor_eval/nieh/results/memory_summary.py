@@ -1,0 +1,84 @@
+"""What a run's memory recalled, at which cost."""
+
+import re
+from collections.abc import Mapping, Sequence
+from statistics import fmean
+from typing import Any
+
+import msgspec
+
+from infthor_eval.memory import read_budget
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["MemorySummary", "MemoryTimes", "subject_of", "summarise_memory", "time_memory"]
+
+_OF_MEMORY = re.compile(r"(?:, )?\b(?:memory|memory_args|budget)=[^,)]*")
+
+Record = UnitRecord[NiehAnswer]
+
+
+class MemorySummary(msgspec.Struct, frozen=True):
+    """A task's memory, and what it recalled for a question on average.
+
+    Attributes:
+        name: name of the memory, or of the class in a file.
+        privileged: it is given what no agent can know.
+        budget: most tokens of what is recalled; None for the memory's own limit.
+        n_frames: recalled frames of a question.
+        n_tokens: tokens of a question with all that is shown, as the model counts them; None if it does not.
+    """
+
+    name: str
+    privileged: bool
+    budget: int | None
+    n_frames: float
+    n_tokens: float | None
+
+
+class MemoryTimes(msgspec.Struct, frozen=True):
+    """Seconds of a task's memory: to observe a trajectory, and to recall for a question, both on average."""
+
+    build_s: float
+    recall_s: float
+
+
+def subject_of(label: str) -> str:
+    """Return the label of a run without its memory: "nano (budget=1k, seed=2)" is "nano (seed=2)"."""
+    return _OF_MEMORY.sub("", label).replace("(, ", "(").replace(" ()", "")
+
+
+def summarise_memory(
+    config: Mapping[str, Any], about: Mapping[str, Any], records: Sequence[Record]
+) -> MemorySummary | None:
+    """Return the summary of a task's memory, given the run's config and the task's; None if it has none."""
+    recalls = [record.payload.recall for record in records if record.payload.recall is not None]
+    memory = about.get("sources", {}).get("memory")
+    if memory is None or not recalls:
+        return None
+    tokens = [record.tokens.context for record in records if record.tokens.context is not None]
+    budget = about["config"]["dataset_kwargs"].get("budget")
+    return MemorySummary(
+        name=memory["name"],
+        privileged=memory["privileged"],
+        budget=read_budget(config.get("budget")) if budget is None else budget,
+        n_frames=fmean(
+            sum(isinstance(item, int) for item in recall.recalled) for recall in recalls
+        ),
+        n_tokens=fmean(tokens) if tokens else None,
+    )
+
+
+def time_memory(records: Sequence[Record]) -> MemoryTimes | None:
+    """Return the seconds of a task's memory; None if it has none."""
+    recalls = [
+        (record.cluster, record.payload.recall)
+        for record in records
+        if record.payload.recall is not None
+    ]
+    if not recalls:
+        return None
+    by_trajectory = {trajectory: recall.build_s for trajectory, recall in recalls}
+    return MemoryTimes(
+        fmean(by_trajectory.values()), fmean(recall.recall_s for _, recall in recalls)
+    )

@@ -1,0 +1,116 @@
+"""Repeated answers: the mean of each question, and how far the answers of one question agree.
+
+Summaries are over questions, so a question that was asked N times counts once, with its mean scores. What a set of
+other trajectories would change and what another drawing would change are two things: the intervals of all tables are
+over trajectories, `drawing` is of the drawing alone.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+from statistics import fmean, variance
+
+import msgspec
+
+from infthor_eval.nieh.prompts import last_line
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.scoring import plain_form
+from infthor_eval.runs import UnitRecord
+
+__all__ = ["RepeatSummary", "by_question", "mean_record", "summarise_repeats"]
+
+_NORMAL_95 = 1.96
+
+Record = UnitRecord[NiehAnswer]
+
+
+class RepeatSummary(msgspec.Struct, frozen=True):
+    """How the repeated answers to the questions of a task compare, under its main metric.
+
+    Attributes:
+        n_repeats: times that each question was asked.
+        n_questions: number of questions.
+        mean: mean score of all answers.
+        drawing: half the width of the 95 % interval of the mean over other drawings of answers to the same questions.
+        consensus: mean score of each question's commonest answer, the first of equals.
+        agreement: mean share of a question's answers that say the same as the commonest.
+        always: share of the questions that every answer got right, with full marks.
+        sometimes: share that some answers got right and others not.
+        never: share that none got right.
+        variance_within: mean variance of the scores of one question.
+        variance_between: variance of the questions' true means: that of the observed means without what drawing adds.
+    """
+
+    n_repeats: int
+    n_questions: int
+    mean: float
+    drawing: float
+    consensus: float
+    agreement: float
+    always: float
+    sometimes: float
+    never: float
+    variance_within: float
+    variance_between: float
+
+
+def by_question(records: Sequence[Record]) -> list[list[Record]]:
+    """Return the records of each question in its variant, given records in the order of their keys."""
+    return [list(same) for _, same in groupby(records, key=lambda record: record.key.once)]
+
+
+def mean_record(records: Sequence[Record]) -> Record:
+    """Return a record of one question's answers with their mean scores, and the first failure if there is any."""
+    if len(records) == 1:
+        return records[0]
+    names = {name for record in records for name in record.payload.scores}
+    scores = {
+        name: fmean(record.payload.scores.get(name, 0.0) for record in records)
+        for name in sorted(names)
+    }
+    failure = next((record.failure for record in records if record.failure is not None), None)
+    payload = msgspec.structs.replace(records[0].payload, scores=scores)
+    return msgspec.structs.replace(records[0], payload=payload, failure=failure)
+
+
+def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> RepeatSummary | None:
+    """Return how a task's repeated answers compare under a metric; None if nothing was repeated."""
+    n_repeats = max(map(len, questions), default=0)
+    if n_repeats < 2:
+        return None
+    scores = [[record.payload.scores.get(metric, 0.0) for record in same] for same in questions]
+    means = [fmean(of_question) for of_question in scores]
+    within = [variance(of_question) if len(of_question) > 1 else 0.0 for of_question in scores]
+    noise = [spread / len(of_question) for spread, of_question in zip(within, scores, strict=True)]
+    right = [sum(score >= 1 for score in of_question) for of_question in scores]
+    always = [count == len(of_question) for count, of_question in zip(right, scores, strict=True)]
+    votes = [_vote(same, metric) for same in questions]
+    return RepeatSummary(
+        n_repeats=n_repeats,
+        n_questions=len(questions),
+        mean=fmean(means),
+        drawing=_NORMAL_95 * math.sqrt(sum(noise)) / len(questions),
+        consensus=fmean(score for score, _ in votes),
+        agreement=fmean(share for _, share in votes),
+        always=fmean(always),
+        sometimes=fmean(
+            0 < count < len(of_question) for count, of_question in zip(right, scores, strict=True)
+        ),
+        never=fmean(count == 0 for count in right),
+        variance_within=fmean(within),
+        variance_between=max(0.0, variance(means) - fmean(noise)) if len(means) > 1 else 0.0,
+    )
+
+
+def _vote(records: Sequence[Record], metric: str) -> tuple[float, float]:
+    """Return the score of the commonest answer, and the share of the answers that say it; failures say nothing."""
+    replies = [record.payload.reply if record.failure is None else None for record in records]
+    said = [None if reply is None else plain_form(last_line(reply)).casefold() for reply in replies]
+    counts = Counter(text for text in said if text is not None)
+    if not counts:
+        return 0.0, 0.0
+    text, count = max(
+        counts.items(), key=lambda item: item[1]
+    )  # the first of equals: counters keep the order
+    return records[said.index(text)].payload.scores.get(metric, 0.0), count / len(records)

@@ -1,0 +1,377 @@
+"""The summary of a run of NIEH: a pure function of its journal.
+
+Cache hits are not in it: they differ between a run and the same run resumed. What a memory took is a field of its own,
+`took`, which results.json leaves out.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
+from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.records import NiehAnswer
+from infthor_eval.nieh.results.above_guessing import AboveGuessing, above_guessing
+from infthor_eval.nieh.results.answer_form import YesNo, format_failures, yes_no
+from infthor_eval.nieh.results.memory_summary import (
+    MemorySummary,
+    MemoryTimes,
+    summarise_memory,
+    time_memory,
+)
+from infthor_eval.nieh.results.repeat_summary import (
+    RepeatSummary,
+    by_question,
+    mean_record,
+    summarise_repeats,
+)
+from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.rates import Rate
+from infthor_eval.runs import UnitRecord
+from infthor_eval.statistics import bootstrap_interval, clustered_mean
+
+__all__ = [
+    "CLUE_COLUMNS",
+    "OPEN_ENDED",
+    "SHOWN_CLUES",
+    "Cell",
+    "EvidenceCells",
+    "Failure",
+    "LengthCell",
+    "NiehSummary",
+    "Score",
+    "SkippedSummary",
+    "TaskSummary",
+    "is_open_ended",
+    "main_metric",
+    "primary_metrics",
+    "summarise",
+]
+
+CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
+OPEN_ENDED = (
+    "open-ended"  # column of questions whose answer is neither yes, no nor a number, as published
+)
+
+SHOWN_CLUES = ("all", "some", "none")
+
+Record = UnitRecord[NiehAnswer]
+
+
+class Score(msgspec.Struct, frozen=True):
+    """A mean score under one metric, from 0 to 1; the reference scorer can exceed 1 where a reply repeats itself.
+
+    Standard error and 95 % intervals are by trajectory, and None with fewer than two. `bootstrap` is the interval over
+    resampled trajectories; None also if all scores are equal.
+    """
+
+    mean: float
+    stderr: float | None
+    low: float | None
+    high: float | None
+    bootstrap: tuple[float, float] | None
+    n_trajectories: int
+
+
+class Cell(msgspec.Struct, frozen=True):
+    """The scores of n samples by metric; empty if n is 0. A sample on which the model failed counts as wrong."""
+
+    n: int
+    n_failed: int
+    scores: dict[str, Score]
+
+
+class EvidenceCells(msgspec.Struct, frozen=True):
+    """The scores of samples by what was shown of their evidence; samples of which it is not known are in no cell.
+
+    Attributes:
+        by_shown_clues: cells of the samples with all, some and none of their clue frames shown.
+        by_distance: cells by the number of frames between the last clue and the end of the trajectory ("50-99").
+    """
+
+    by_shown_clues: dict[str, Cell]
+    by_distance: dict[str, Cell]
+
+
+class LengthCell(msgspec.Struct, frozen=True):
+    """The scores of samples with a context of about one length, and their scores above guessing by scorer."""
+
+    cell: Cell
+    above_guessing: dict[str, float | None]
+
+
+class SkippedSummary(msgspec.Struct, frozen=True):
+    """The number of samples that were not asked, by reason; and the mean by metric if they were counted as wrong."""
+
+    n: int
+    by_reason: dict[str, int]
+    mean_counting_them_wrong: dict[str, float | None]
+
+
+class Failure(msgspec.Struct, frozen=True):
+    """A sample on which the model failed, and the reason."""
+
+    question: str
+    reason: str
+
+
+class TaskSummary(msgspec.Struct, frozen=True):
+    """The summary of a task with n samples.
+
+    Attributes:
+        simulator: simulator that rendered the frames; None if the set does not say.
+        by_clues: cells of the columns of Table 4; of absence questions, which are in the total too; and of open-ended
+            questions, which are in the other columns too.
+        by_file: cells by question file, in a set of several.
+        evidence: cells by what was shown of the evidence: of all samples ("total"), and of each file.
+        by_length: cells by thousand tokens of the context ("32-64").
+        above_guessing: the share of what cannot be guessed that the replies got, by scorer.
+        format_failures: number of replies that are not of the form asked for, by reason.
+        n_thought: number of replies behind thoughts.
+        tokens_per_right: tokens of all replies, thoughts included, for each right answer under the main metric; None
+            if none is right or the model counts no tokens.
+        below_full_marks: samples with a score below 1, by metric.
+        scores: scores by metric and trajectory, in the order of the samples' keys, by which runs are paired.
+        memory: the memory that recalled what was shown; None if there is none.
+    """
+
+    n: int
+    context: str
+    simulator: str | None
+    metrics: list[str]
+    by_clues: dict[str, Cell]
+    by_question_type: dict[str, Cell]
+    by_variant: dict[str, Cell]
+    by_file: dict[str, Cell]
+    evidence: dict[str, EvidenceCells]
+    by_length: dict[str, LengthCell]
+    above_guessing: dict[str, AboveGuessing]
+    skipped: SkippedSummary
+    yes_no: YesNo
+    format_failures: dict[str, int]
+    n_thought: int
+    tokens_per_right: float | None
+    below_full_marks: dict[str, list[str]]
+    scores: dict[str, dict[str, list[float]]]
+    failures: list[Failure]
+    memory: MemorySummary | None = None
+
+
+class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The summary of a run by task.
+
+    Attributes:
+        tasks: summaries over questions. Where answers were repeated, each question counts with its mean scores; replies
+            are counted in `yes_no`, `format_failures` and `failures` alone.
+        took: what their memories took, which differs from run to run.
+        repeats: how the repeated answers to their questions compare.
+    """
+
+    tasks: dict[str, TaskSummary]
+    took: dict[str, MemoryTimes] = {}
+    repeats: dict[str, RepeatSummary] = {}
+
+
+def summarise(config: Mapping[str, Any], records: Sequence[Record]) -> NiehSummary:
+    """Summarise the run of a config by the records of its units; their order does not matter."""
+    in_order = sorted(records, key=lambda record: record.key)
+    tasks = config["tasks"].items()
+    by_task = {task: [record for record in in_order if record.task == task] for task, _ in tasks}
+    times = {task: time_memory(of_task) for task, of_task in by_task.items()}
+    repeats = {
+        task: summarise_repeats(by_question(by_task[task]), _main_metric(about["metrics"]["names"]))
+        for task, about in tasks
+    }
+    return NiehSummary(
+        {task: _task(by_task[task], about, config) for task, about in tasks},
+        {task: took for task, took in times.items() if took is not None},
+        {task: compared for task, compared in repeats.items() if compared is not None},
+    )
+
+
+def main_metric(task: TaskSummary) -> str:
+    """Return the main metric of a task: the strict scorer, else the first of its own."""
+    return _main_metric(task.metrics)
+
+
+def _main_metric(metrics: Sequence[str]) -> str:
+    return "strict" if "strict" in metrics else metrics[0]
+
+
+def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
+    """Return the mean of all samples under the main metric, for each task with any."""
+    totals = {
+        name: (task.by_clues["total"], main_metric(task)) for name, task in summary.tasks.items()
+    }
+    scores = {
+        name: (cell.scores[metric], cell.n) for name, (cell, metric) in totals.items() if cell.n
+    }
+    return {name: Rate(score.mean, score.low, score.high, n) for name, (score, n) in scores.items()}
+
+
+def _task(
+    replies: Sequence[Record], about: Mapping[str, Any], config: Mapping[str, Any]
+) -> TaskSummary:
+    metrics = list(about["metrics"]["names"])
+    records = [mean_record(same) for same in by_question(replies)]
+    names = sorted({record.payload.file for record in records} - {""})
+    files = {name: [record for record in records if record.payload.file == name] for name in names}
+    return TaskSummary(
+        n=len(records),
+        context=about["config"]["dataset_kwargs"]["context"],
+        simulator=about["simulator"],
+        metrics=metrics,
+        by_clues=_by_clues(records, metrics),
+        by_question_type=_group(
+            records, metrics, lambda record: record.payload.question_type or "untyped"
+        ),
+        by_variant=_group(records, metrics, lambda record: record.variant or "-"),
+        by_file={name: _cell(of_file, metrics) for name, of_file in files.items()},
+        evidence={
+            name: _evidence(of_file, metrics)
+            for name, of_file in {"total": records, **files}.items()
+        },
+        by_length=_by_length(records, metrics),
+        above_guessing=_above_guessing(records, metrics),
+        skipped=_summarise_skipped(records, metrics, about["skipped"]),
+        yes_no=yes_no(replies),
+        format_failures=format_failures(replies, about["decoding"]["max_new_tokens"]),
+        n_thought=sum(record.payload.thinking is not None for record in replies),
+        tokens_per_right=_tokens_per_right(replies, _main_metric(metrics)),
+        below_full_marks={
+            name: [str(record.key) for record in records if _score(record, name) < 1.0]
+            for name in metrics
+        },
+        scores={name: _by_trajectory(records, name) for name in metrics},
+        failures=[
+            Failure(str(record.key), record.failure)
+            for record in replies
+            if record.failure is not None
+        ],
+        memory=summarise_memory(config, about, records),
+    )
+
+
+def _tokens_per_right(replies: Sequence[Record], metric: str) -> float | None:
+    counts = [record.tokens.reply for record in replies if record.tokens.reply is not None]
+    right = math.fsum(_score(record, metric) for record in replies)
+    return sum(counts) / right if counts and right else None
+
+
+def _score(record: Record, metric: str) -> float:
+    return record.payload.scores.get(metric, 0.0)  # 0 if the model failed
+
+
+def _by_trajectory(records: Sequence[Record], metric: str) -> dict[str, list[float]]:
+    scores: dict[str, list[float]] = {}
+    for record in records:
+        scores.setdefault(record.cluster, []).append(_score(record, metric))
+    return scores
+
+
+def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Cell]:
+    chosen = {
+        name: [r for r in records if r.payload.clue_column == name]
+        for name in (*CLUE_COLUMNS, ABSENCE)
+    }
+    chosen["total"] = list(records)
+    chosen[OPEN_ENDED] = [record for record in records if is_open_ended(record)]
+    return {name: _cell(of_column, metrics) for name, of_column in chosen.items()}
+
+
+def is_open_ended(record: Record) -> bool:
+    """Return the published test of a question: the first gold answer decides, a number in quotes counts as a text."""
+    first = record.payload.answers[0]
+    return isinstance(first, str) and first.strip().lower() not in ("yes", "no")
+
+
+def _group(
+    records: Sequence[Record], metrics: Sequence[str], name_of: Callable[[Record], str]
+) -> dict[str, Cell]:
+    names = sorted({name_of(record) for record in records})
+    return {name: _cell([r for r in records if name_of(r) == name], metrics) for name in names}
+
+
+def _evidence(records: Sequence[Record], metrics: Sequence[str]) -> EvidenceCells:
+    return EvidenceCells(
+        by_shown_clues=_in_order(records, metrics, _share_shown, SHOWN_CLUES),
+        by_distance=_in_order(records, metrics, _distance, DISTANCES),
+    )
+
+
+def _in_order(
+    records: Sequence[Record],
+    metrics: Sequence[str],
+    name_of: Callable[[Record], str | None],
+    names: Sequence[str],
+) -> dict[str, Cell]:
+    """Return the cells of the groups that have samples, in the order of their names; some samples are in none."""
+    chosen = {name: [record for record in records if name_of(record) == name] for name in names}
+    return {name: _cell(of_group, metrics) for name, of_group in chosen.items() if of_group}
+
+
+def _by_length(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, LengthCell]:
+    cells = {}
+    for name, cell in _in_order(records, metrics, _length, LENGTHS).items():
+        chosen = [record for record in records if _length(record) == name]
+        cells[name] = LengthCell(
+            cell, {name: item.mean for name, item in _above_guessing(chosen, metrics).items()}
+        )
+    return cells
+
+
+def _above_guessing(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, AboveGuessing]:
+    return {name: above_guessing(records, name) for name in metrics if name in SCORERS}
+
+
+def _share_shown(record: Record) -> str | None:
+    clues = record.payload.shown_clues
+    if clues is None:
+        return None
+    return SHOWN_CLUES[0 if clues.n_shown == clues.n_clues else 1 if clues.n_shown else 2]
+
+
+def _distance(record: Record) -> str | None:
+    clues = record.payload.shown_clues
+    return None if clues is None or clues.n_after is None else distance_class(clues.n_after)
+
+
+def _length(record: Record) -> str | None:
+    tokens = record.tokens.context
+    return None if tokens is None else length_class(tokens)
+
+
+def _cell(records: Sequence[Record], metrics: Sequence[str]) -> Cell:
+    scores = {name: _mean(records, name) for name in metrics} if records else {}
+    return Cell(len(records), sum(record.failure is not None for record in records), scores)
+
+
+def _mean(records: Sequence[Record], metric: str) -> Score:
+    scores, trajectories = (
+        [_score(record, metric) for record in records],
+        [record.cluster for record in records],
+    )
+    estimate = clustered_mean(scores, trajectories)
+    return Score(
+        mean=estimate.mean,
+        stderr=estimate.stderr,
+        low=estimate.low,
+        high=estimate.high,
+        bootstrap=bootstrap_interval(scores, trajectories),
+        n_trajectories=estimate.n_clusters,
+    )
+
+
+def _summarise_skipped(
+    records: Sequence[Record], metrics: Sequence[str], skipped: Sequence[Mapping[str, str]]
+) -> SkippedSummary:
+    n = len(records) + len(skipped)
+    means = {
+        name: math.fsum(_score(record, name) for record in records) / n if n else None
+        for name in metrics
+    }
+    reasons = Counter(item["reason"] for item in skipped)
+    return SkippedSummary(len(skipped), dict(sorted(reasons.items())), means)

@@ -1,0 +1,356 @@
+"""NIEH results as tables: accuracy by clues beside the published rows, by depth, gain by frames, form of replies."""
+
+from collections.abc import Iterator, Sequence
+
+from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
+from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.options import SHOWN
+from infthor_eval.nieh.rescoring.report import sources_of
+from infthor_eval.nieh.results.effective_length import effective_lengths
+from infthor_eval.nieh.results.evidence_tables import (
+    above_guessing_cell,
+    above_guessing_notes,
+    evidence_tables,
+    short_name,
+)
+from infthor_eval.nieh.results.gains import Gain, find_gains, frames_of, name_of
+from infthor_eval.nieh.results.memory_tables import memory_tables
+from infthor_eval.nieh.results.repeat_tables import repeat_tables
+from infthor_eval.nieh.results.summary import (
+    CLUE_COLUMNS,
+    OPEN_ENDED,
+    Cell,
+    NiehSummary,
+    TaskSummary,
+    main_metric,
+)
+from infthor_eval.nieh.scoring import SCORERS
+from infthor_eval.runs import RunSummary
+from infthor_eval.tables import Column, Row, Table, TableCell, interval_cell
+
+__all__ = ["clues_table", "overview", "tables"]
+
+_NAMES = (Column("model", False), Column("task", False))
+_METRIC = Column("scorer", False)
+_LEGEND = (
+    "total: all questions, with those on absences. Open-ended questions are in the columns by clues too.",
+    "95 %: interval clustered by trajectory, valid near 0 and 100 %. bootstrap: interval over resampled trajectories, "
+    "which assumes no distribution of the scores. If the two differ much, there are few trajectories.",
+)
+_EMBEDDED = (
+    "Questions on frames of the embedded simulator: not comparable with the published rows, which are on AI2-THOR's "
+    "own frames."
+)
+
+
+def tables(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return the tables of runs: by depth and by clues, the gains over blank frames, and the form of the replies.
+
+    Published rows by clues are below ours; a published table of other columns (question types, question files) is a
+    table of its own beside runs in its context, with ours in it where they have its columns. The tables by depth and
+    of gains need a task with depths, and a pair of runs on true and on blank frames. Those of the evidence, of the
+    effective length and of memories are there if a task shows part of a trajectory.
+    """
+    contexts = {task.context for _, _, task in _tasks(runs)}
+    others = [
+        _beside(table, runs)
+        for table in published_tables("nieh")
+        if not _is_by_clues(table) and table.context in contexts
+    ]
+    return [
+        *_depth_table(runs),
+        *others,
+        clues_table(runs),
+        *_gains_table(runs),
+        *evidence_tables(runs),
+        *effective_lengths(runs),
+        *memory_tables(runs),
+        *repeat_tables(runs),
+        _replies_table(runs),
+    ]
+
+
+def overview(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return the accuracy of each task with its intervals, and the tables of gains, memories and repeats if any.
+
+    A task that asked nothing is a line below the table.
+    """
+    tasks = list(_tasks(runs))
+    asked = [(run, name, task) for run, name, task in tasks if task.n]
+    left_out = any(task.skipped.n or task.by_clues["total"].n_failed for _, _, task in asked)
+    rows = tuple(
+        Row((run, *_name_and_total(name, task), *(_left_out(task) if left_out else ())))
+        for run, name, task in asked
+    )
+    numbers = ("total", "95 %", "bootstrap", "n", *(("skipped", "failed") if left_out else ()))
+    notes = (
+        *dict.fromkeys(_nothing_asked(name, task) for _, name, task in tasks if not task.n),
+        *_notes(runs),
+    )
+    table = Table("NIEH accuracy, %, strict scorer", (*_NAMES, *map(Column, numbers)), rows, notes)
+    return [table, *_gains_table(runs), *memory_tables(runs), *repeat_tables(runs)]
+
+
+def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:
+    total, metric = task.by_clues["total"], main_metric(task)
+    name_and_metric = name if metric == "strict" else f"{name}, {metric}"
+    return name_and_metric, _mean(total, metric), *_intervals(total, metric), str(total.n)
+
+
+def _left_out(task: TaskSummary) -> tuple[str, str]:
+    return str(task.skipped.n), str(task.by_clues["total"].n_failed)
+
+
+def _nothing_asked(name: str, task: TaskSummary) -> str:
+    reasons = list(task.skipped.by_reason)
+    more = f", and {len(reasons) - 1} more reasons" if len(reasons) > 1 else ""
+    return f"{name}: nothing asked, {task.skipped.n} skipped{f': {reasons[0]}{more}' if reasons else ''}"
+
+
+def _is_by_clues(table: PublishedTable) -> bool:
+    return set(table.columns) <= set(CLUE_COLUMNS)
+
+
+def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]:
+    """Yield the run's name, the task's name and the task, of all runs."""
+    for run in runs:
+        assert isinstance(run.summary, NiehSummary)
+        for name, task in run.summary.tasks.items():
+            yield name_of(run), name, task
+
+
+# -- by number of clues
+
+
+def clues_table(runs: Sequence[RunSummary]) -> Table:
+    """Return the accuracy by number of clues: a row per run, task and metric, then the published rows."""
+    apart = (OPEN_ENDED, ABSENCE, "above guessing")
+    numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", "skipped", "failed")
+    rows, notes = (
+        [row for run in runs for row in _rows_of(run)],
+        [*_LEGEND, *above_guessing_notes(runs)],
+    )
+    for table in filter(_is_by_clues, published_tables("nieh")):
+        rows += _published_rows(table, runs)
+        notes += table.notes
+    columns = (*_NAMES, _METRIC, *map(Column, numbers))
+    return Table(
+        "NIEH accuracy, % by number of clues (questions)",
+        columns,
+        tuple(rows),
+        (*notes, *_notes(runs)),
+    )
+
+
+def _notes(runs: Sequence[RunSummary]) -> list[str]:
+    embedded = (
+        [_EMBEDDED] if any(task.simulator == "embedded" for _, _, task in _tasks(runs)) else []
+    )
+    sources = dict.fromkeys(item for run in runs for item in sources_of(run.header.config).items())
+    return [
+        *embedded,
+        *(f"{metric}: {source}." for metric, source in sources if metric not in SCORERS),
+    ]
+
+
+def _rows_of(run: RunSummary) -> list[Row]:
+    lines = [(name, task, metric) for _, name, task in _tasks([run]) for metric in task.metrics]
+    return [
+        Row((name_of(run), name, metric, *_cells(task, metric)), ends_section=number == len(lines))
+        for number, (name, task, metric) in enumerate(lines, 1)
+    ]
+
+
+def _cells(task: TaskSummary, metric: str) -> list[str]:
+    total = task.by_clues["total"]
+    by_clues, apart = (
+        [_mean_of(task.by_clues[name], metric) for name in names]
+        for names in (CLUE_COLUMNS[:-1], (OPEN_ENDED, ABSENCE))
+    )
+    above = above_guessing_cell(task.above_guessing.get(metric))
+    return [
+        *by_clues,
+        _mean(total, metric),
+        *_intervals(total, metric),
+        *apart,
+        above,
+        str(total.n),
+        *_left_out(task),
+    ]
+
+
+def _intervals(cell: Cell, metric: str) -> tuple[str, str]:
+    """Return the clustered interval, and that over resampled trajectories; one trajectory has neither."""
+    score = cell.scores.get(metric)
+    if score is None:
+        return _range(None, None), _range(None, None)
+    return _range(score.low, score.high), _range(*(score.bootstrap or (None, None)))
+
+
+def _mean(cell: Cell, metric: str) -> str:
+    return f"{100 * cell.scores[metric].mean:.2f}" if cell.n else "-"
+
+
+def _mean_of(cell: Cell | None, metric: str) -> TableCell:
+    if not cell or not cell.n:
+        return TableCell("-", {"": "", "questions": ""})
+    mean = _mean(cell, metric)
+    return TableCell(f"{mean} ({cell.n})", {"": mean, "questions": str(cell.n)})
+
+
+def _range(low: float | None, high: float | None) -> TableCell:
+    low, high = (None if end is None else 100 * end for end in (low, high))
+    return interval_cell(low, high, pattern="{}–{}")
+
+
+def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterator[Row]:
+    """Yield the published rows, each followed by the differences of runs of its checkpoint."""
+    for row in table.rows:
+        values = dict(zip(table.columns, row.values, strict=True))
+        cells = [f"{values[name]:.2f}" if name in values else "" for name in CLUE_COLUMNS]
+        yield Row(
+            (row.name, f"{table.title}, {table.context}", table.metric, *cells), is_published=True
+        )
+        for run in runs:
+            yield from _differences(run, row, table)
+
+
+def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
+    """Yield the differences of a run of the published model from its row; = if its interval has the published value."""
+    if not row.matches(run.header.config["model"]) or frames_of(run) != SHOWN:
+        return
+    for _, name, task in _tasks([run]):
+        # Frames that a simulator of ours rendered are another data set.
+        if (
+            task.context != table.context
+            or task.simulator is not None
+            or table.metric not in task.metrics
+        ):
+            continue
+        values = dict(zip(table.columns, row.values, strict=True))
+        cells = [
+            _difference(task.by_clues[column], values.get(column), table.metric)
+            for column in CLUE_COLUMNS
+        ]
+        yield Row(("  ours minus published", name, table.metric, *cells))
+
+
+def _difference(cell: Cell, value: float | None, metric: str) -> str:
+    if not cell.n or value is None:
+        return "-"
+    ours = cell.scores[metric]
+    within = (
+        ours.low is not None
+        and ours.high is not None
+        and 100 * ours.low <= value <= 100 * ours.high
+    )
+    difference = f"{100 * ours.mean - value:+.2f}"
+    return TableCell(f"{difference} =", {"": difference}) if within else difference
+
+
+# -- published, by anything else
+
+
+def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
+    """Return the published rows, and the runs that asked in the same context and have one of the columns."""
+    rows = [
+        Row(
+            (row.name, _made_by(row, table), table.metric, *map("{:.2f}".format, row.values)),
+            is_published=True,
+        )
+        for row in table.rows
+    ]
+    for run, name, task in _tasks([run for run in runs if frames_of(run) == SHOWN]):
+        if task.context == table.context and table.metric in task.metrics:
+            by_file = {short_name(file): cell for file, cell in task.by_file.items()}
+            cells = task.by_clues | task.by_question_type | task.by_variant | by_file
+            if not cells.keys() & set(table.columns):
+                continue
+            means = [
+                _mean(cells[column], table.metric) if column in cells else "-"
+                for column in table.columns
+            ]
+            rows.append(Row((run, name, table.metric, *means)))
+    columns = (*_NAMES, _METRIC, *map(Column, table.columns))
+    return Table(
+        f"{table.title}: {table.source}", columns, tuple(rows), (*table.notes, *_notes(runs))
+    )
+
+
+def _made_by(row: PublishedRow, table: PublishedTable) -> str:
+    return ", ".join(filter(None, (row.task, row.source))) or table.context
+
+
+# -- gain by frames
+
+
+def _gains_table(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return a table of the gain of each run over its run on blank frames, if there is such a pair."""
+    rows = [
+        Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain)))
+        for gain in find_gains(runs)
+    ]
+    if not rows:
+        return []
+    note = "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval compare` has it."
+    title = "Gain over the same model's run on blank frames, in points"
+    columns = (*CLUE_COLUMNS, "95 %", OPEN_ENDED, ABSENCE)
+    return [Table(title, (*_NAMES, _METRIC, *map(Column, columns)), tuple(rows), (note,))]
+
+
+def _gain_cells(gain: Gain) -> tuple[str, ...]:
+    gains = {name: gain.in_column(name) for name in (*CLUE_COLUMNS, OPEN_ENDED, ABSENCE)}
+    points = {
+        name: "-" if value is None else f"{100 * value:+.2f}" for name, value in gains.items()
+    }
+    by_clues, apart = (
+        tuple(points[name] for name in names) for names in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE))
+    )
+    total = gain.total()
+    # One trajectory alone tells nothing about others, and has no interval.
+    ends = (None, None) if total is None else (total.low, total.high)
+    low, high = (None if end is None else 100 * end for end in ends)
+    return *by_clues, interval_cell(low, high, "+.2f"), *apart
+
+
+# -- by depth
+
+
+def _depth_table(runs: Sequence[RunSummary]) -> list[Table]:
+    """Return a table if a task has depths."""
+    variants = {variant for _, _, task in _tasks(runs) for variant in task.by_variant}
+    depths = sorted(variant for variant in variants if variant.startswith("depth="))
+    if not depths:
+        return []
+    rows = [
+        Row(
+            (run, name, metric, *(_mean_of(task.by_variant.get(depth), metric) for depth in depths))
+        )
+        for run, name, task in _tasks(runs)
+        if set(depths) & set(task.by_variant)
+        for metric in task.metrics
+    ]
+    columns = (*_NAMES, _METRIC, *map(Column, depths))
+    return [Table("Accuracy, % by depth of the needle (questions)", columns, tuple(rows))]
+
+
+# -- form of the replies
+
+
+def _replies_table(runs: Sequence[RunSummary]) -> Table:
+    """Return the bias to yes, the length of replies, and those that are no answer: a row per run and task."""
+    thought = any(task.n_thought for _, _, task in _tasks(runs))
+    numbers = ["yes/no questions", "gold yes, %", "said yes, %", "tokens per right answer"]
+    numbers += ["with thoughts"] if thought else []
+    rows = []
+    for run, name, task in _tasks(runs):
+        if not task.n:
+            continue
+        tokens = "-" if task.tokens_per_right is None else f"{task.tokens_per_right:.1f}"
+        further = [tokens, str(task.n_thought)] if thought else [tokens]
+        both = (task.yes_no.share_gold_yes, task.yes_no.share_said_yes)
+        shares = ["-" if share is None else f"{100 * share:.1f}" for share in both]
+        said = ", ".join(f"{n} {reason}" for reason, n in task.format_failures.items()) or "-"
+        rows.append(Row((run, name, str(task.yes_no.n), *shares, *further, said)))
+    columns = (*_NAMES, *map(Column, numbers), Column("not in the form asked for", False))
+    return Table("Form of the replies", columns, tuple(rows))

@@ -1,0 +1,1 @@
+"""Who carries plans out: models, people and baselines."""

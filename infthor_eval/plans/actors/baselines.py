@@ -1,0 +1,119 @@
+"""Baselines that see no frame: the expert, chance, a script for a plan's words, and habits of experts."""
+
+import random
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
+
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.plans.actors.habits import Habits
+from infthor_eval.plans.actors.protocols import Act, PlanActor, PlanBaseline, PlanSituation
+from infthor_eval.plans.actors.script import scripted_action
+from infthor_eval.plans.environment import StepOutcome
+from infthor_eval.runs.baseline import BaselineSubject
+from infthor_eval.thor.actions import applicable_calls
+from model_adapters import Capabilities
+
+__all__ = ["BASELINES"]
+
+_IN_FLIGHT = 4  # trajectories at a time; each has its own simulator
+
+
+class _PlanBaseline(BaselineSubject):
+    capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=_IN_FLIGHT)
+    _actor: ClassVar[type[PlanActor]]
+
+    def fit(self, trajectories: Sequence[Trajectory]) -> None:
+        """See `PlanBaseline`; there is nothing to learn."""
+
+    def actor(self, trajectory: Trajectory, words: Words) -> PlanActor:
+        """See `PlanBaseline`."""
+        return self._actor()
+
+
+class _BlindActor:
+    """An actor that knows the plan and its own actions so far."""
+
+    def begin(self, situation: PlanSituation) -> None:
+        self._situation = situation
+        self._done: list[str] = []
+        self._view = situation.observation.view
+
+    def observe(self, outcome: StepOutcome) -> None:
+        self._done.append(outcome.info.action)
+        self._view = outcome.observation.view
+
+
+class _ExpertActor(_BlindActor):
+    def act(self) -> Act:
+        actions = self._situation.environment.expert_actions(self._situation.plan.index)
+        return Act(actions[len(self._done)].call if len(self._done) < len(actions) else "NoOp")
+
+
+class _RandomPlanActor(_BlindActor):
+    def begin(self, situation: PlanSituation) -> None:
+        super().begin(situation)
+        self._random = random.Random(situation.seed)
+
+    def act(self) -> Act:
+        return Act(
+            self._random.choice(
+                applicable_calls(self._view, self._situation.environment.look_degrees)
+            )
+        )
+
+
+class _ScriptedActor(_BlindActor):
+    def act(self) -> Act:
+        return Act(scripted_action(self._situation.plan.text, self._done))
+
+
+class _HabitualActor(_BlindActor):
+    def __init__(self, habits: Habits) -> None:
+        self._habits = habits
+
+    def act(self) -> Act:
+        return Act(self._habits.next_action(self._situation.plan.text, self._done))
+
+
+class PlannerAgent(_PlanBaseline):
+    """Repeats the expert's actions: the upper bound."""
+
+    name = "planner"
+    _actor = _ExpertActor
+
+
+class RandomAgent(_PlanBaseline):
+    """Draws uniformly, by the situation's seed alone, from the calls possible in view: each action with each object."""
+
+    name = "random"
+    _actor = _RandomPlanActor
+
+
+class ScriptedAgent(_PlanBaseline):
+    """Does what the plan's words say, and nothing else; see `script`."""
+
+    name = "scripted"
+    _actor = _ScriptedActor
+
+
+class HabitualAgent(_PlanBaseline):
+    """Does what experts did next in other scenes, after the same action in a plan of the same words; see `Habits`."""
+
+    name = "history"
+
+    def fit(self, trajectories: Sequence[Trajectory]) -> None:
+        """See `PlanBaseline`."""
+        self._trajectories = trajectories
+
+    def actor(self, trajectory: Trajectory, words: Words) -> _HabitualActor:
+        """See `PlanBaseline`; it learns from other scenes than the trajectory's."""
+        scene = trajectory.scene.floor_plan
+        elsewhere = (item for item in self._trajectories if item.scene.floor_plan != scene)
+        return _HabitualActor(Habits(elsewhere, words))
+
+
+BASELINES: Mapping[str, Callable[[int], PlanBaseline]] = {
+    baseline.name: baseline
+    for baseline in (PlannerAgent, RandomAgent, ScriptedAgent, HabitualAgent)
+}

@@ -1,0 +1,141 @@
+"""A model as an actor: it continues the sequence that it was trained on."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.blank import blank_like
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.household.sequence_text import ACT, action_part
+from infthor_eval.plans.actors.protocols import Act, PlanSituation
+from infthor_eval.plans.environment import StepOutcome
+from infthor_eval.plans.history.past import History
+from infthor_eval.plans.history.segments import Part
+from infthor_eval.plans.published.final_protocol import (
+    FinalForm,
+    present_parts,
+    with_recorded_state,
+)
+from infthor_eval.storage.digests import seed_of
+from infthor_eval.thor.actions import applicable_actions
+from model_adapters import Decoding, Model, answer_of, wrap_request_errors
+
+__all__ = ["AgentConfig", "ModelActor"]
+
+_MAX_ACTION_TOKENS = 64  # if replies are restricted to texts of actions, which must not be cut
+
+
+@dataclass(frozen=True)
+class AgentConfig:
+    """How a model is prompted, and how its actions are decoded, each draw with its own seed.
+
+    Attributes:
+        history: the part of the history that it is given.
+        words: words of actions.
+        form: the published form of final tasks, or of a chat; None elsewhere.
+        preamble: text before everything else; empty as published.
+        constrained: whether its replies are restricted to the actions that are possible in view.
+        blank: whether it is shown grey frames instead of the actual ones.
+    """
+
+    decoding: Decoding
+    history: History
+    words: Words
+    form: FinalForm | None = None
+    preamble: str = ""
+    constrained: bool = False
+    blank: bool = False
+
+
+class ModelActor:
+    """Asks a model for one action after the other.
+
+    Within a plan the conversation is only appended to, so that the model's prefix cache stays valid.
+    """
+
+    def __init__(self, model: Model, config: AgentConfig) -> None:
+        self._model, self._config = model, config
+        self._conversation = model.conversation()
+        if config.form is not None:
+            self._conversation.append(config.form.system, role="system")
+        self._start = self._conversation.mark()
+
+    def begin(self, situation: PlanSituation) -> None:
+        """See `PlanActor`."""
+        environment, plan = situation.environment, situation.plan.index
+        self._seed, self._n_acts = situation.seed, 0
+        self._observation = situation.observation
+        if situation.goes_on:
+            return
+        past = environment.past(plan)
+        if self._config.form is not None:
+            past = with_recorded_state(past, environment.trajectory, situation.plan.low[0])
+        self._past = past
+        with wrap_request_errors(self._model.name):
+            self._given = self._config.history.recall(past, self._count)
+            self._restart(self._given)
+
+    def act(self) -> Act:
+        """See `PlanActor`."""
+        decoding = replace(self._config.decoding, seed=seed_of(f"{self._seed}/{self._n_acts}"))
+        if self._config.constrained:
+            possible = tuple(
+                str(text) for text in applicable_actions(self._observation.view, self._config.words)
+            )
+            max_new_tokens = max(decoding.max_new_tokens, _MAX_ACTION_TOKENS)
+            decoding = replace(decoding, choices=possible, max_new_tokens=max_new_tokens)
+        self._n_acts += 1
+        if self._asks_anew:
+            self._restart([*self._given, *present_parts(self._present_frame())])
+        with wrap_request_errors(self._model.name):
+            reply = self._conversation.reply(decoding)
+        return Act(answer_of(reply).answer, reply)
+
+    def observe(self, outcome: StepOutcome) -> None:
+        """See `PlanActor`; the action is appended as it was understood, not as the model wrote it."""
+        self._observation = outcome.observation
+        if self._asks_anew:
+            return
+        frame = self._present_frame()
+        self._conversation.append(f"{outcome.info.action}{ACT}", *self._visible_parts([frame]), ACT)
+
+    def tokens_between(self, first: int, last: int) -> int | None:
+        """See `CountingActor`."""
+        parts: list[Part] = []
+        ends: list[
+            int
+        ] = []  # of the parts up to each frame; a task's first frame is there again behind its goal
+        for segment in self._past.all:
+            parts += segment.opening()
+            ends += [] if ends else [parts.index(segment.before) + 1]
+            for action, frame in segment.steps:
+                parts += action_part(action), frame
+                ends.append(len(parts))
+        counts = [self._count(parts[: ends[frame]]) for frame in (first, last)]
+        self._restart(self._given)
+        return None if counts[0] is None or counts[1] is None else counts[1] - counts[0]
+
+    @property
+    def _asks_anew(self) -> bool:
+        return self._config.form is not None and self._config.form.asks_anew
+
+    def _present_frame(self) -> FrameRef:
+        frame = self._observation.frame
+        if frame is None:
+            raise ModelError("the environment keeps no frames, which a model needs")
+        return frame
+
+    def _restart(self, parts: Sequence[Part]) -> None:
+        self._conversation.rewind(self._start)
+        ends = () if self._asks_anew else (ACT,)
+        self._conversation.append(self._config.preamble, *self._visible_parts(parts), *ends)
+
+    def _visible_parts(self, parts: Sequence[Part]) -> list[Part]:
+        if not self._config.blank:
+            return list(parts)
+        return [blank_like(part) if isinstance(part, FrameRef) else part for part in parts]
+
+    def _count(self, parts: Sequence[Part]) -> int | None:
+        self._restart(parts)
+        return self._conversation.n_tokens

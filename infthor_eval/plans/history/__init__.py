@@ -1,0 +1,1 @@
+"""What an agent is given of the true history before it acts."""

@@ -1,0 +1,49 @@
+"""Where the object of a plan was last in view before the agent needs it: what a memory would have to recall.
+
+The trajectory's object log has the types in view at each frame. A final task needs an object and a place that were seen
+at the two ends of the trajectory before it (`infthor_eval.generation.final_task`).
+"""
+
+from collections.abc import Sequence
+
+import msgspec
+
+from infthor_eval.formats.step_log import ObjectLog
+from infthor_eval.formats.trajectory import HighAction, Trajectory
+from infthor_eval.plans.plan import Plan, PlanKind
+
+__all__ = ["clue_step", "object_logs"]
+
+# Plans that have their receptacle or tool as the last argument; it is what the agent must find.
+_TO_RECEPTACLE = {PlanKind.PUT, PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
+
+
+def object_logs(trajectory: Trajectory) -> Sequence[ObjectLog]:
+    """Return what each frame shows, by the trajectory's own log; empty if it has none for every frame."""
+    log = trajectory.object_log
+    if len(log) != len(trajectory.plan.low_actions) + 1:
+        return ()
+    try:
+        return [msgspec.convert(entry, ObjectLog) for entry in log]
+    except msgspec.ValidationError:
+        return ()  # a log of another form tells nothing about frames
+
+
+def clue_step(
+    logs: Sequence[ObjectLog], trajectory: Trajectory, plan: Plan, before: int
+) -> int | None:
+    """Return the last frame, up to `before`, with a plan's object in view, or its receptacle if the plan goes there.
+
+    None if it was never in view, or if that is not known.
+    """
+    wanted = _wanted(trajectory.plan.high_pddl[plan.high], plan.kind)
+    frames = range(min(before + 1, len(logs)))
+    return next(
+        (frame for frame in reversed(frames) if wanted in map(str.lower, logs[frame].visible)), None
+    )
+
+
+def _wanted(high: HighAction, kind: PlanKind) -> str:
+    args = high.discrete_action.args
+    names = args if isinstance(args, list) else []
+    return str(names[-1 if kind in _TO_RECEPTACLE else 0]).lower() if names else ""

@@ -1,0 +1,158 @@
+"""A memory in front of an agent: what it recalls of the steps before the present one."""
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from infthor_eval.errors import DataError, ModelError, UsageError
+from infthor_eval.household.sequence_text import goal_part, plan_part
+from infthor_eval.memory import (
+    MemoryOptions,
+    Observation,
+    Query,
+    TrajectoryFacts,
+    accepted_options,
+    check_recalled,
+    memory_identity,
+    open_memory,
+    parse_options,
+    read_budget,
+    wrap_memory_errors,
+)
+from infthor_eval.plans.history.past import CountTokens, Past
+from infthor_eval.plans.history.segments import Part
+
+__all__ = ["MemoryChoice", "RecalledHistory"]
+
+
+class RecalledHistory:
+    """What a memory recalls of the steps before the present one (`infthor_eval.memory`), the goal, and that frame.
+
+    The memory observes each step once, as long as one episode goes on.
+    """
+
+    needs_state: ClassVar[bool] = False
+
+    def __init__(
+        self, name: str, options: MemoryOptions = (), budget: int | None = None, blank: bool = False
+    ) -> None:
+        """Open a memory.
+
+        Args:
+            name: its name, or FILE.py:CLASS.
+            options: options of its class, sorted pairs.
+            budget: most tokens of what it recalls; None for its own limit.
+            blank: whether it observes blank frames.
+
+        Raises:
+            UsageError: there is no such memory, or it needs a model that writes.
+        """
+        self._name, self._options, self._budget, self._blank = name, options, budget, blank
+        self._memory = open_memory(name, options)
+        self._privileged = self._memory.capabilities.privileged
+        if self._memory.capabilities.writes:
+            raise UsageError(
+                f"the memory {name} needs a model that writes for it, as agents do not; take another"
+            )
+        self.identity()  # opens what the memory needs now, rather than at the first plan
+        self._observed: list[Observation] = []
+        self._in_use = threading.Lock()  # episodes in flight share it
+
+    def identity(self) -> dict[str, Any]:
+        """Return everything that can change what is recalled, as JSON values."""
+        return memory_identity(self._name, self._options) | {"budget": self._budget}
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        recalled = self.choose(past, count)
+        return [*recalled, goal_part(past.goal), past.present.before, plan_part(past.present.plan)]
+
+    def choose(self, past: Past, count: CountTokens) -> list[Part]:
+        """Return what is recalled, in order.
+
+        Raises:
+            DataError: a frame cannot be read, or the trajectory lacks what a privileged memory needs.
+            ModelError: there is a budget and the model counts no tokens, or the memory exceeds it.
+            UserCodeError: the memory fails.
+        """
+        if self._privileged and not past.logs:
+            raise DataError(
+                f"the trajectory has no log of what is in view, which the memory {self._name} needs"
+            )
+        *steps, present = past.observations(self._blank, self._privileged)
+        clues = (() if past.clue is None else (past.clue,)) if self._privileged else None
+        query = Query(text=f"{past.goal} {past.present.plan}", present=present, clues=clues)
+        size = self._tokens_per_frame(present, count)
+        with self._in_use, wrap_memory_errors(self._name):
+            self._observe(steps, size)
+            recalled = self._memory.recall(query, self._budget)
+        check_recalled(recalled, steps, self._name, self._budget, size)
+        frames = past.frames
+        return [item if isinstance(item, str) else frames[item.number] for item in recalled]
+
+    def _tokens_per_frame(self, present: Observation, count: CountTokens) -> int | None:
+        if self._budget is None:
+            return None
+        both, one = count([present.frame, present.frame]), count([present.frame])
+        if both is None or one is None:
+            raise ModelError("the model counts no tokens, so --budget cannot be used; leave it out")
+        return both - one
+
+    def _observe(self, steps: Sequence[Observation], tokens_per_frame: int | None) -> None:
+        """Observe the steps that are new, or all of them where another episode has begun."""
+        n_known = len(self._observed)
+        if not n_known or list(steps[:n_known]) != self._observed:
+            n_known = 0
+            self._memory.begin(TrajectoryFacts(name="episode", tokens_per_frame=tokens_per_frame))
+        for step in steps[n_known:]:
+            self._memory.observe(step)
+        self._observed = list(steps)
+
+
+@dataclass(frozen=True)
+class MemoryChoice:
+    """The options of a run that choose a memory, as they were typed.
+
+    Attributes:
+        blank: whether it observes blank frames.
+    """
+
+    name: str | None = None
+    options: str | None = None
+    budget: str | None = None
+    retriever: str | None = None
+    blank: bool = False
+
+    def open(self) -> RecalledHistory:
+        """Open the memory.
+
+        Raises:
+            UsageError: none is named, or it cannot be opened.
+        """
+        if self.name is None:
+            raise UsageError(
+                "--history memory: give --memory NAME; `infthor-eval ls memories` lists them"
+            )
+        options = parse_options(self.options) or {}
+        if self.retriever is not None:
+            if "retriever" not in accepted_options(self.name):
+                raise UsageError(
+                    f"--retriever: the memory {self.name} retrieves no frames; leave it out"
+                )
+            options["retriever"] = self.retriever
+        budget = read_budget(self.budget)
+        return RecalledHistory(self.name, tuple(sorted(options.items())), budget, self.blank)
+
+    def refuse(self, history: str) -> None:
+        """Refuse options of memories with another history.
+
+        Raises:
+            UsageError: there is one.
+        """
+        given = {"--memory": self.name, "--memory-args": self.options, "--budget": self.budget}
+        for option, value in given.items():
+            if value is not None:
+                raise UsageError(
+                    f"{option} {value}: --history {history} has no memory; use --history memory"
+                )

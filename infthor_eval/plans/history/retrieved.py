@@ -1,0 +1,130 @@
+"""An agent's image memory as the trajectory's own file names it (`retrieved_image`), as the published script reads it.
+
+The file has, for low-level actions, the names of the frames that a retriever found before each (`top20`). A name is
+looked up in `images`, which has the action that each frame was taken at; what is shown is this run's own frame after
+that action, so that past and present come from one simulator.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import msgspec
+from PIL import Image
+
+from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.sequence_text import goal_part, plan_part
+from infthor_eval.plans.history.past import CountTokens, Past
+from infthor_eval.plans.history.segments import Part
+
+__all__ = ["RetrievedFrames", "require_retrieved", "retrieved_steps"]
+
+_SIDE = 336  # pixels, of remembered frames in the published script; the present one keeps its size
+_FIRST = "000000000"  # the frame before the first action, which `images` does not list
+
+
+class _Image(msgspec.Struct):
+    low_idx: Annotated[int, msgspec.Meta(ge=0)]
+    image_name: str
+
+
+class RetrievedFrames:
+    """The K frames that the trajectory's file says were retrieved for a plan's first action, the goal, and the plan."""
+
+    needs_state: ClassVar[bool] = False
+
+    def __init__(self, k: int) -> None:
+        """Set the number of frames: the file must have a list `topK`."""
+        self._k = k
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        return [
+            *self.choose(past, count),
+            goal_part(past.goal),
+            past.present.before,
+            plan_part(past.present.plan),
+        ]
+
+    def choose(self, past: Past, count: CountTokens) -> list[Part]:
+        """Return the frames in the file's order, 336x336 pixels.
+
+        Raises:
+            DataError: the file names none for this action, or a frame that is not known or not yet taken; or a frame
+                cannot be read or written.
+        """
+        frames = [step.frame for step in past.observations()]
+        if past.trajectory is None:
+            raise DataError("the trajectory's file is not known, which --history retrieved:K reads")
+        steps = retrieved_steps(past.trajectory, len(frames) - 1, self._k)
+        return [_resized(frames[step]) for step in steps]
+
+
+def require_retrieved(trajectories: Iterable[Trajectory], task: str) -> None:
+    """Check before the work that some trajectory names retrieved frames; `task` is named in the message.
+
+    Raises:
+        DataError: none does.
+    """
+    if not any(trajectory.retrieved_image for trajectory in trajectories):
+        missing = "no trajectory there has retrieved_image, which --history retrieved:K shows"
+        raise DataError(f"{task}: {missing}; take --history frames:K, or the published test files")
+
+
+def retrieved_steps(trajectory: Trajectory, action: int, k: int) -> Sequence[int]:
+    """Return the frames that a trajectory's file says were retrieved before an action: 0 is the first, n + 1 after n.
+
+    Raises:
+        DataError: it names none, or one that is not known or is taken after the action.
+    """
+    place = f'trajectory {trajectory.traj_id}: retrieved_image["{action}"]["top{k}"]'
+    names = _names(trajectory.retrieved_image, action, k, place)
+    steps = _steps_of_images(trajectory)
+    found = [steps.get(Path(name).stem) for name in names]
+    for name, step in zip(names, found, strict=True):
+        if step is None or step > action:
+            wrong = "is in no entry of images" if step is None else "is taken after that action"
+            raise DataError(f"{place}: {name!r:.60} {wrong}; restore the file")
+    return [step for step in found if step is not None]
+
+
+def _names(retrieved: Mapping[str, Any] | None, action: int, k: int, place: str) -> Sequence[str]:
+    entry = (retrieved or {}).get(str(action))
+    if entry is None or (isinstance(entry, dict) and f"top{k}" not in entry):
+        there = (
+            f"it has {', '.join(sorted(entry))}"
+            if entry
+            else "nothing was retrieved before this action"
+        )
+        raise DataError(f"{place} is not in the file ({there}); take --history frames:{k}")
+    with wrap_errors(
+        f"{place} is no list of frame names", "restore the file", catch=msgspec.ValidationError
+    ):
+        return msgspec.convert(entry, dict[str, list[str]])[f"top{k}"]
+
+
+def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
+    """Return the step of each named frame; of several frames of one action all stand for its last one."""
+    where, hint = (
+        f"trajectory {trajectory.traj_id}: images is no list of low_idx and image_name",
+        "restore the file",
+    )
+    with wrap_errors(where, hint, catch=msgspec.ValidationError):
+        images = msgspec.convert(trajectory.images, list[_Image])
+    return {Path(image.image_name).stem: image.low_idx + 1 for image in images} | {_FIRST: 0}
+
+
+def _resized(frame: FrameRef) -> FrameRef:
+    """Return a frame in the published size, in a file beside it (an episode's folder, which ends with the episode).
+
+    Raises:
+        DataError: it cannot be read or written.
+    """
+    path = frame.path.with_name(f"{frame.path.stem}-{_SIDE}.png")
+    if not path.is_file():
+        image = frame.load().resize((_SIDE, _SIDE), resample=Image.Resampling.LANCZOS)
+        with wrap_errors(f"{path}: cannot be written", "make room, or set TMPDIR", catch=OSError):
+            image.save(path, compress_level=1)
+    return FrameRef(path)

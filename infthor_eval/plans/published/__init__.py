@@ -1,0 +1,1 @@
+"""Plans as the published scripts run, reward, log and tabulate them."""

@@ -1,0 +1,114 @@
+"""Final tasks as the published scripts run them (`--protocol published`): in one go, and without the text of a plan.
+
+The expert carries out all tasks but the last; the agent then has the last one, its plans following each other in the
+world that it has made. It is told the goal alone, in one of three forms:
+
+- interleaved (`--history full`): the whole history as a user's turn. After the first plan, done or failed, the script
+  ends; the other plans are never tried, and count as not done.
+- memory as text (`--history text`) and as frames (`--history retrieved:K`, the frames that the trajectory's file names,
+  or `frames:K`, those nearest to the present one): each action is asked for anew, with the memory and the present
+  frame. After a failure the next plan follows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.trajectory import Trajectory
+from infthor_eval.household.sequence_text import ACT
+from infthor_eval.plans.history.chat import GoalHistory
+from infthor_eval.plans.history.forms import StateInWords
+from infthor_eval.plans.history.past import CountTokens, History, Past
+from infthor_eval.plans.history.recalled import RecalledHistory
+from infthor_eval.plans.history.retrieved import RetrievedFrames
+from infthor_eval.plans.history.segments import Part
+from infthor_eval.plans.published.system_prompts import system_prompt
+from model_adapters import Decoding
+
+__all__ = ["MAX_STEPS", "FinalForm", "final_form", "present_parts", "with_recorded_state"]
+
+_MAX_TOKENS = 32
+MAX_STEPS = 201  # of one plan
+
+
+@dataclass(frozen=True)
+class FinalForm:
+    """One of the forms.
+
+    Attributes:
+        system: text of the system's turn.
+        history: what the agent is given before its first action.
+        asks_anew: whether each action is asked for anew; else its actions and frames are added to the history.
+        goes_on: whether later plans are tried after the first.
+        ends: texts that end a reply.
+    """
+
+    system: str
+    history: History
+    asks_anew: bool = False
+    goes_on: bool = False
+    ends: tuple[str, ...] = ()
+
+    def decoding(self, seed: int) -> Decoding:
+        """Return the decoding: as Qwen2.5-VL's own settings have it, greedy with the checkpoint's penalty."""
+        return Decoding(max_new_tokens=_MAX_TOKENS, seed=seed, stop=self.ends)
+
+
+@dataclass(frozen=True)
+class _TextMemory:
+    """The task, and the state of the room in words."""
+
+    needs_state: ClassVar[bool] = True
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        return [_task_text(past) + f"State: You are in the middle of a room. {past.state};\n"]
+
+
+@dataclass(frozen=True)
+class _FrameMemory:
+    """The task, and frames of what came before."""
+
+    frames: RecalledHistory | RetrievedFrames
+    needs_state: ClassVar[bool] = False
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        return [f"{_task_text(past)}Previous states: ", *self.frames.choose(past, count)]
+
+
+def final_form(history: History, name: str) -> FinalForm:
+    """Return the form of a value of `--history`, given what it stands for elsewhere.
+
+    Raises:
+        UsageError: the published scripts have no such form.
+    """
+    if name in ("full", "published"):
+        return FinalForm(system_prompt("goals"), GoalHistory(), ends=(ACT,))
+    if isinstance(history, StateInWords):
+        return FinalForm(system_prompt("text"), _TextMemory(), asks_anew=True, goes_on=True)
+    if isinstance(history, RetrievedFrames) or (
+        name.startswith("frames:") and isinstance(history, RecalledHistory)
+    ):
+        return FinalForm(
+            system_prompt("frames"), _FrameMemory(history), asks_anew=True, goes_on=True
+        )
+    raise UsageError(
+        f"--protocol published has the histories full, text, retrieved:K and frames:K, not {name}"
+    )
+
+
+def with_recorded_state(past: Past, trajectory: Trajectory, first: int) -> Past:
+    """Return a past with the state that the trajectory's own file has for an action, if it has one."""
+    recorded = (trajectory.state_summary or {}).get(str(first))
+    return past if recorded is None else replace(past, state=recorded)
+
+
+def present_parts(frame: Part) -> Sequence[Part]:
+    """Return what stands behind the memory when an action is asked for anew."""
+    return ("Current state: ", frame, " Next action: ")
+
+
+def _task_text(past: Past) -> str:
+    return f"Your task is: {past.goal}.\n"

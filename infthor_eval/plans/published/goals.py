@@ -1,0 +1,135 @@
+"""Goals of tasks as the published functions test them (`env/tasks.py`), by the name of the task's type.
+
+They differ from ALFRED's, which `household.goals` tests: no lamp is ever asked for, so that looking at an object in
+light never counts; objects are told apart by the first part of their ids, so that no slice is ever asked for by its
+type; the basin of a sink is found in tasks of two objects alone.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.formats.trajectory import TaskInfo
+from infthor_eval.thor.view import ThorObject
+
+__all__ = ["Scene", "Treated", "goal_holds"]
+
+
+@dataclass(frozen=True)
+class Treated:
+    """Ids of washed, heated and cooled objects. In the published script all stay empty."""
+
+    cleaned: Collection[str] = frozenset()
+    heated: Collection[str] = frozenset()
+    cooled: Collection[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What goals are tested on: all objects by id, the ids of those that are held, and what was done to objects."""
+
+    objects: Mapping[str, ThorObject]
+    held: tuple[str, ...]
+    treated: Treated
+
+    def named(
+        self, name: str | None, has_property: Callable[[ThorObject], bool]
+    ) -> list[ThorObject]:
+        """Return the objects of a name that have a property."""
+        every = self.objects.values()
+        return [
+            item
+            for item in every
+            if Words.PUBLISHED.name_of(item.object_id) == name and has_property(item)
+        ]
+
+
+def _pickupable(item: ThorObject) -> bool:
+    return bool(item.pickupable)
+
+
+def _receptacle(item: ThorObject) -> bool:
+    return bool(item.receptacle)
+
+
+def _inside(item: ThorObject, receptacles: Iterable[ThorObject]) -> bool:
+    return any(
+        item.object_id in (receptacle.receptacle_object_ids or ()) for receptacle in receptacles
+    )
+
+
+def _targets(info: TaskInfo, scene: Scene) -> tuple[list[ThorObject], list[ThorObject], int]:
+    """Return a task's objects, its receptacles, and the number of slices that are asked for and lacking."""
+    items = scene.named(info.pickup, _pickupable)
+    n_slices = sum("Sliced" in item.object_id for item in items)
+    if info.pickup is None:
+        raise TypeError("the task names no object")
+    lacking = max(0, 1 - n_slices) if "Sliced" in info.pickup else 0
+    return items, scene.named(info.receptacle, _receptacle), lacking
+
+
+def _place(info: TaskInfo, scene: Scene) -> bool:
+    items, receptacles, lacking = _targets(info, scene)
+    return not lacking and any(_inside(item, receptacles) for item in items)
+
+
+def _place_two(info: TaskInfo, scene: Scene) -> bool:
+    items, receptacles, _ = _targets(info, scene)
+    if not receptacles and info.receptacle == "SinkBasin":
+        receptacles = scene.named("Sink", _receptacle)
+    if "Sliced" in str(info.pickup) and sum("Sliced" in item.object_id for item in items) < 2:
+        return False
+    return any(
+        sum(_inside(item, [receptacle]) for item in items) >= 2 for receptacle in receptacles
+    )
+
+
+def _look_in_light(info: TaskInfo, scene: Scene) -> bool:
+    _targets(info, scene)  # which raises for a task without an object
+    return False
+
+
+def _place_treated(
+    chosen: Callable[[Treated], Collection[str]],
+) -> Callable[[TaskInfo, Scene], bool]:
+    def holds(info: TaskInfo, scene: Scene) -> bool:
+        items, receptacles, lacking = _targets(info, scene)
+        ready = [item for item in items if item.object_id in chosen(scene.treated)]
+        return not lacking and any(_inside(item, receptacles) for item in ready)
+
+    return holds
+
+
+def _place_with_movable(info: TaskInfo, scene: Scene) -> bool:
+    items, receptacles, lacking = _targets(info, scene)
+    carriers = scene.named(info.movable, _pickupable)
+    filled = [carrier for carrier in carriers if any(_inside(item, [carrier]) for item in items)]
+    there = any(_inside(carrier, receptacles) for carrier in carriers)
+    ids = {receptacle.object_id for receptacle in receptacles}
+    stacked = any(ids & set(carrier.parent_receptacles or ()) for carrier in filled)
+    return not lacking and bool(filled) and there and stacked
+
+
+def _put(info: TaskInfo, scene: Scene) -> bool:
+    """What is put away after a task: anything of a name lies in anything of another, and the hand is empty."""
+    wanted = {info.pickup, info.movable}
+    receptacles = [] if scene.held else scene.named(info.receptacle, _receptacle)
+    inside = (key for receptacle in receptacles for key in receptacle.receptacle_object_ids or ())
+    return any(Words.PUBLISHED.name_of(key) in wanted for key in inside)
+
+
+_GOALS: Mapping[str, Callable[[TaskInfo, Scene], bool]] = {
+    "pick_and_place_simple": _place,
+    "pick_two_obj_and_place": _place_two,
+    "look_at_obj_in_light": _look_in_light,
+    "pick_clean_then_place_in_recep": _place_treated(lambda treated: treated.cleaned),
+    "pick_heat_then_place_in_recep": _place_treated(lambda treated: treated.heated),
+    "pick_cool_then_place_in_recep": _place_treated(lambda treated: treated.cooled),
+    "pick_and_place_with_movable_recep": _place_with_movable,
+    "put_object": _put,
+}
+
+
+def goal_holds(info: TaskInfo, scene: Scene) -> bool:
+    """Return whether the goal of a task holds; KeyError if its name, with blanks or underscores, is unknown."""
+    return _GOALS[info.goal.replace(" ", "_")](info, scene)

@@ -1,0 +1,1 @@
+"""Recorded runs of plans: their curves and their replay."""

@@ -1,0 +1,257 @@
+"""Recorded plans replayed; see `infthor_eval.episodes.replaying`."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import msgspec
+
+from infthor_eval.episodes.replaying import (
+    EpisodeReplay,
+    RecordedTrajectory,
+    ending_of,
+    records_of_trajectory,
+    restore_trajectory,
+)
+from infthor_eval.episodes.shared_units import only_name
+from infthor_eval.errors import DataError, UsageError, wrap_errors
+from infthor_eval.formats.object_ids import Words, object_type_of
+from infthor_eval.household.scout import reachable_grid
+from infthor_eval.plans.environment import MAX_STEPS, PlanEnvironment, StepOutcome
+from infthor_eval.plans.plan import PlanKind
+from infthor_eval.plans.recorded.replay_frames import (
+    FloorPose,
+    MapObject,
+    PlanFrame,
+    PlanObservation,
+    PlanRewards,
+    PlanTitle,
+    Point,
+    RoomMap,
+)
+from infthor_eval.plans.recorded.runs import PlansRun, PlanTaskConfig
+from infthor_eval.plans.records import PlanRecord, StepRecord
+from infthor_eval.plans.reward_rules import RewardRules
+from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
+from infthor_eval.runs import UnitRecord
+from infthor_eval.thor.actions import text_of
+from infthor_eval.thor.simulator import Simulator
+from infthor_eval.thor.view import AgentPose, ThorObject
+
+__all__ = ["PlanReplay", "RecordedPlans", "recorded_plans", "replay_plans"]
+
+Record = UnitRecord[PlanRecord]
+_TOLERANCE = 1e-6  # rewards are recorded with six digits
+_FLOOR = "Floor"  # object type of the room's own floor, which would cover the map
+
+
+class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
+    """What a run recorded of the plans of one trajectory."""
+
+    def between(self, first: int, last: int) -> list[Record]:
+        """Return the records of plans by number, from 1 on, ends included; UsageError if the run lacks some of them."""
+        lowest, highest = (self.records[place].payload.index + 1 for place in (0, -1))
+        if not lowest <= first <= last <= highest:
+            chosen = f"{first}" if first == last else f"{first}-{last}"
+            raise UsageError(
+                f"--plans {chosen}: the run has plans {lowest} to {highest} of {self.trajectory}; give some of these"
+            )
+        return [record for record in self.records if first <= record.payload.index + 1 <= last]
+
+
+def recorded_plans(run: PlansRun, task: str | None, trajectory: str | None) -> RecordedPlans:
+    """Find a run's records of a trajectory in a task; None for the only one.
+
+    Raises:
+        UsageError: there is no such task or trajectory, or none is given and there are several.
+        DataError: it is not a run of plans, or has no record yet.
+    """
+    tasks = [only_name("task", "--task", task, list(run.config.tasks))]
+    return RecordedPlans(run, *records_of_trajectory(run, tasks, trajectory))
+
+
+@contextmanager
+def replay_plans(
+    recorded: RecordedPlans, data: Path | None, scenes: Path | None
+) -> Iterator["PlanReplay"]:
+    """Open a session; see `restore_trajectory`."""
+    words = _words(recorded.run.config.tasks[recorded.records[0].task])
+    read = partial(read_plan_trajectory, words=words)
+    with restore_trajectory(recorded, read, data, scenes) as (trajectory, start_simulator):
+        yield PlanReplay(recorded, trajectory, start_simulator)
+
+
+class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
+    """A simulator in which recorded plans are replayed. It is started, and the scene restored, for the first plan."""
+
+    def __init__(
+        self,
+        recorded: RecordedPlans,
+        trajectory: PlanTrajectory,
+        start_simulator: Callable[..., Simulator],
+    ) -> None:
+        self._recorded, self._trajectory, self._start_simulator = (
+            recorded,
+            trajectory,
+            start_simulator,
+        )
+        self._world: tuple[PlanEnvironment, Simulator] | None = None
+
+    @property
+    def n_episodes(self) -> int:
+        """Number of plans of the trajectory, recorded or not."""
+        return len(self._trajectory.plans)
+
+    def _begin(self, record: Record) -> "_PlanInReplay":
+        if self._world is None:
+            self._world = self._restore(record)
+        return _PlanInReplay(*self._world, record.payload.index)
+
+    def _restore(self, record: Record) -> tuple[PlanEnvironment, Simulator]:
+        run = self._recorded.run
+        config = run.config.tasks[record.task]
+        problem = f"{run.label}: rewards that this version does not know"
+        with wrap_errors(problem, "run the evaluation again", catch=msgspec.ValidationError):
+            rules = msgspec.convert(config.rewards, RewardRules)
+            max_steps = msgspec.convert(config.settings.get("max_steps", MAX_STEPS), int)
+        simulator = self._start_simulator()
+        data, words = self._trajectory.data, _words(config)
+        return PlanEnvironment(
+            data, simulator, rules=rules, words=words, max_steps=max_steps
+        ), simulator
+
+    def _place(self, record: Record, number: int) -> str:
+        return f"plan {record.payload.index + 1}, action {number}"
+
+    def _frame(
+        self, record: Record, number: int, observation: PlanObservation | None, note: str
+    ) -> PlanFrame:
+        payload, step = record.payload, record.payload.steps[number - 1] if number else StepRecord()
+        n_steps = len(payload.steps)
+        is_end = 0 < number == n_steps
+        return PlanFrame(
+            title=PlanTitle(
+                payload.index + 1,
+                self.n_episodes,
+                payload.plan,
+                payload.goal,
+                payload.n_expert_steps,
+                n_actions=n_steps,
+            ),
+            observation=observation,
+            number=number,
+            ending=ending_of(record, number),
+            done=is_end and payload.done,
+            note=note,
+            rewards=self._rewards(payload, number),
+            action=_action_text(step),
+            reply=step.reply if step.reply and step.reply.strip() != step.action else "",
+            wrong=step.message,
+            goal_reached=is_end and payload.goal_reached,
+        )
+
+    def _rewards(self, plan: PlanRecord, number: int) -> PlanRewards:
+        """Return the rewards after a number of actions; excluded plans of the trajectory do not count."""
+        steps = plan.steps[:number]
+        earned = sum(step.reward for step in steps)
+        so_far = [item.payload for item in self._recorded.records if item.excluded is None]
+        return PlanRewards(
+            step=steps[-1].reward if steps else None,
+            plan=earned,
+            max_of_plan=plan.max_reward,
+            so_far=sum(item.reward for item in so_far if item.index < plan.index) + earned,
+            max_so_far=sum(item.max_reward or 0.0 for item in so_far if item.index <= plan.index),
+        )
+
+
+class _PlanInReplay:
+    """A plan that is being replayed."""
+
+    def __init__(self, environment: PlanEnvironment, simulator: Simulator, plan: int) -> None:
+        self._environment = environment
+        observation, _ = environment.reset(plan)
+        self._view, self._is_over = observation.view, False
+        self._walked = [_point(self._view.agent)]
+        self._named = frozenset(environment.named_objects(plan))
+        grid = reachable_grid(simulator)
+        self._floor = tuple(grid.position(cell) for cell in sorted(grid.cells))
+        leads_somewhere = environment.plans[plan].kind == PlanKind.GOTO
+        self._goal = (
+            _floor_pose(environment.expert_actions(plan)[-1].pose) if leads_somewhere else None
+        )
+
+    def repeat(self, step: StepRecord, *, is_last: bool) -> str:
+        """See `EpisodeInReplay`; a reply that could not be executed has no call to repeat."""
+        if step.call is None or self._is_over:
+            return ""
+        outcome = self._environment.step(step.call)
+        self._view = outcome.observation.view
+        self._is_over = outcome.terminated or outcome.truncated
+        here = _point(self._view.agent)
+        if here != self._walked[-1]:
+            self._walked.append(here)
+        return _difference(step, outcome, self._is_over, is_last)
+
+    def observe(self) -> PlanObservation:
+        """See `EpisodeInReplay`."""
+        view = self._view
+        if view.frame is None:
+            raise DataError("the simulator sent no frame; use one that renders")
+        drawn = (self._map_object(item) for item in view.objects.values() if self._is_drawn(item))
+        room = RoomMap(self._floor, tuple(item for item in drawn if item is not None), self._goal)
+        held = tuple(map(object_type_of, view.inventory))
+        return PlanObservation(view.frame, room, _floor_pose(view.agent), tuple(self._walked), held)
+
+    def _is_drawn(self, item: ThorObject) -> bool:
+        if item.is_picked_up or item.object_type == _FLOOR:
+            return False
+        return item.object_id in self._named or (
+            not item.pickupable and (item.receptacle or item.moveable)
+        )
+
+    def _map_object(self, item: ThorObject) -> MapObject | None:
+        box = item.axis_aligned_bounding_box
+        if box is None:
+            return None
+        x, z, half_x, half_z = box.center.x, box.center.z, box.size.x / 2, box.size.z / 2
+        is_named = item.object_id in self._named
+        return MapObject(
+            item.object_type, (x - half_x, z - half_z), (x + half_x, z + half_z), is_named
+        )
+
+
+def _words(config: PlanTaskConfig) -> Words:
+    assert config.words is not None  # only imported counts have none, and they are refused before
+    return config.words
+
+
+def _difference(step: StepRecord, outcome: StepOutcome, is_over: bool, is_last: bool) -> str:
+    message = outcome.info.message
+    if bool(step.message) != bool(message):
+        return f"{step.action} {_success_text(message)} now, and {_success_text(step.message)} in the run"
+    if abs(outcome.reward - step.reward) > _TOLERANCE:
+        return f"{step.action} earns {outcome.reward:g} now, and {step.reward:g} in the run"
+    if is_over != is_last:
+        return f"the plan {'ends' if is_over else 'goes on'} now, and {'goes on' if is_over else 'ends'} in the run"
+    return ""
+
+
+def _success_text(message: str) -> str:
+    return f"is refused ({message})" if message else "succeeds"
+
+
+def _action_text(step: StepRecord) -> str:
+    """Return the action in words; of an action given as a call, as by a baseline, the record has its name alone."""
+    object_id = (step.call or {}).get("objectId")
+    if isinstance(object_id, str) and step.call is not None and step.action == step.call["action"]:
+        return str(text_of(step.action, object_id))
+    return step.action
+
+
+def _point(pose: AgentPose) -> Point:
+    return pose.position.x, pose.position.z
+
+
+def _floor_pose(pose: AgentPose) -> FloorPose:
+    return FloorPose(_point(pose), pose.rotation)

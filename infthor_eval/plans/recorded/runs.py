@@ -1,0 +1,74 @@
+"""Recorded runs of plans, and the plans that several of them have in common."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+from infthor_eval.episodes.recorded_runs import RecordedRun, RunConfig, TaskConfig
+from infthor_eval.episodes.shared_units import (
+    SharedUnits,
+    difference_notes,
+    shared_tasks,
+    shared_units,
+)
+from infthor_eval.errors import UsageError
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.plans.records import RECORDS, PlanRecord
+
+__all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
+
+
+class PlanTaskConfig(TaskConfig, frozen=True, kw_only=True):
+    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules` decodes it.
+
+    All of these are None for imported counts.
+    """
+
+    rewards: Any
+    words: Words | None
+    after_failure: str | None
+
+
+class PlansRun(RecordedRun[PlanRecord, PlanTaskConfig]):
+    """The journal of a run of plans."""
+
+    suite = "plans"
+    record_types = RECORDS
+    task_config = PlanTaskConfig
+    planner = "planner"
+
+    @cached_property
+    def config(self) -> RunConfig[PlanTaskConfig]:
+        """See `RecordedRun.config`; raises UsageError if the run has counts alone."""
+        config = super().config
+        if any(task.rewards is None for task in config.tasks.values()):
+            raise UsageError(
+                f"{self.label}: imported counts have no steps and no rewards; give runs made here"
+            )
+        return config
+
+
+def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[PlanRecord]:
+    """Find the plans of a task (None: the only one shared) in trajectories that all runs (at least one) have in full.
+
+    Raises:
+        UsageError: they share no task or several, or their reward rules differ.
+        DataError: they share no trajectory, or one is not a run of plans.
+    """
+    shared = shared_tasks(runs, None if task is None else [task])
+    if len(shared) > 1:
+        raise UsageError(
+            f"the runs share several tasks; give one of them with --task: {', '.join(shared)}"
+        )
+    configs = [run.config.tasks[shared[0]] for run in runs]
+    for run, config in zip(runs, configs, strict=True):
+        if config.rewards != configs[0].rewards:
+            raise UsageError(
+                f"{runs[0].label} and {run.label} have different reward rules; draw runs with the same --rewards"
+            )
+    differences = difference_notes(
+        "continuation after a failed plan", runs, [it.after_failure for it in configs]
+    )
+    return shared_units(
+        runs, shared, "plans left out, as a simulator refuses their expert", differences
+    )

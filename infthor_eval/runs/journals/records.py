@@ -1,0 +1,221 @@
+"""The lines of a journal: the run's header, records of units, and cached artifacts.
+
+A line is a JSON object whose `type` is one of the three. A unit's envelope is the same for every suite. Its payload
+is the suite's own, and tagged in turn.
+"""
+
+from dataclasses import dataclass
+from types import UnionType
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import msgspec
+
+from infthor_eval.errors import InfthorError, describe_exception
+from infthor_eval.runs.counts import Count
+from infthor_eval.runs.usage import NOTHING, Usage
+
+__all__ = [
+    "FORMAT",
+    "ArtifactRecord",
+    "RecordTypes",
+    "RunHeader",
+    "Tokens",
+    "Unit",
+    "UnitKey",
+    "UnitRecord",
+    "describe_failure",
+]
+
+FORMAT = 3
+_CONFIG_FORMS: dict[str, type] = {"tasks": dict, "model": dict, "frames": str}
+
+A = TypeVar("A")  # an artifact
+P = TypeVar("P")  # the payload of a suite's records
+P_co = TypeVar("P_co", covariant=True)
+U = TypeVar("U", bound="Unit[Any]")  # a suite's unit
+
+
+class UnitKey(NamedTuple):
+    """The key of a unit within its run.
+
+    Attributes:
+        task: name of the task.
+        id: id of the question or the episode.
+        variant: variant of the task's evaluation of it ("depth=0.4"); empty where there is only one.
+        repeat: number of its repetition, from 1, where it is evaluated several times.
+    """
+
+    task: str
+    id: str
+    variant: str = ""
+    repeat: int = 1
+
+    def __str__(self) -> str:
+        number = f"({self.repeat})" if self.repeat > 1 else ""
+        return " ".join(filter(None, (self.id, self.variant, number)))
+
+    @property
+    def once(self) -> "UnitKey":
+        """The key without the number of the repetition: that of the first."""
+        return self._replace(repeat=1)
+
+
+class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Tokens of a unit's requests, of those that were not encoded again, and of its replies; None if not counted."""
+
+    context: Count | None = None
+    cached: Count | None = None
+    reply: Count | None = None
+
+
+class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="run"):
+    """The header of a run: the first line of each shard.
+
+    Attributes:
+        suite: name of the suite, which knows the payloads.
+        name: name of the run in tables and folders.
+        config: everything that can change a number, as JSON values.
+        n_units: number of units of the run; None where its records were made without a driver.
+        format: format of the journal.
+    """
+
+    suite: str
+    name: str
+    config: dict[str, Any]
+    n_units: Count | None = None
+    format: int = FORMAT
+
+    def __post_init__(self) -> None:
+        """Check the form of what every suite's config has; msgspec turns the error into its own."""
+        for key, form in _CONFIG_FORMS.items():
+            if not isinstance(self.config.get(key, form()), form):
+                raise TypeError(f"`config.{key}` is no {form.__name__}")
+
+
+class UnitRecord(
+    msgspec.Struct,
+    Generic[P],
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    tag_field="type",
+    tag="unit",
+):
+    """A unit that was evaluated, or the reason why it could not be.
+
+    Attributes:
+        cluster: name of what it shares with units that are right or wrong together (a trajectory), for intervals.
+        fingerprint: hash of all its inputs; empty if they could not be read.
+        payload: the suite's own struct.
+        attempt: number of the attempt, from 1.
+        failure: reason why there is no result; None if there is one.
+        excluded: reason why the unit does not count, through no fault of the subject; None if it counts.
+        faults: faults that were retried, a line each.
+        seconds: duration.
+        tokens: tokens of the unit.
+        usage: usage of all its requests.
+    """
+
+    task: str
+    id: str
+    cluster: str
+    fingerprint: str
+    payload: P
+    variant: str = ""
+    repeat: Count = 1
+    attempt: Count = 1
+    failure: str | None = None
+    excluded: str | None = None
+    faults: tuple[str, ...] = ()
+    seconds: float = 0.0
+    tokens: Tokens = Tokens()
+    usage: Usage = NOTHING
+
+    @property
+    def key(self) -> UnitKey:
+        """Key of the unit."""
+        return UnitKey(self.task, self.id, self.variant, self.repeat)
+
+
+class ArtifactRecord(
+    msgspec.Struct,
+    Generic[P],
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    tag_field="type",
+    tag="artifact",
+):
+    """A cached artifact: an intermediate result of a suite that a resumed run does not compute again.
+
+    Attributes:
+        fingerprint: hash of all its inputs, by which it is looked up.
+        payload: the suite's own struct.
+        usage: what the requests behind it took.
+    """
+
+    fingerprint: str
+    payload: P
+    usage: Usage = NOTHING
+
+
+@dataclass(frozen=True)
+class RecordTypes(Generic[P_co]):
+    """The payloads of a suite's records: msgspec structs with a tag.
+
+    Attributes:
+        unit: payload of its units.
+        artifact: payload of its cached artifacts, a union if there are several kinds; None where it caches none.
+    """
+
+    unit: type[P_co]
+    artifact: type[Any] | UnionType | None = None
+
+    def decoder(self) -> msgspec.json.Decoder[Any]:
+        """Return the decoder of a journal's lines."""
+        lines: Any = RunHeader | UnitRecord[self.unit] | ArtifactRecord[self.artifact]  # type: ignore[name-defined]
+        return msgspec.json.Decoder(lines)
+
+
+def describe_failure(error: Exception) -> str:
+    """Return the message of an expected error, or type, place and message of another exception, in one line."""
+    if isinstance(error, InfthorError):
+        return str(error)
+    return f"{describe_exception(error)}; fix the suite and run the same command again"
+
+
+@dataclass(frozen=True)
+class Unit(Generic[P]):
+    """The smallest piece of work with a record of its own: a sample or an episode.
+
+    Attributes:
+        key: key of the unit.
+        cluster: see `UnitRecord`.
+        payload: payload before the unit is evaluated; recorded as it is if the unit fails.
+    """
+
+    key: UnitKey
+    cluster: str
+    payload: P
+
+    def without_inputs(self) -> "Unit[P]":
+        """Return what can record its failure in another process, without the inputs that only the suite needs."""
+        return Unit(self.key, self.cluster, self.payload)
+
+    def record(self, fingerprint: str, payload: P, **envelope: Any) -> UnitRecord[P]:
+        """Return its record; further fields of the envelope (see `UnitRecord`) are keywords."""
+        return UnitRecord(
+            **self.key._asdict(),
+            cluster=self.cluster,
+            fingerprint=fingerprint,
+            payload=payload,
+            **envelope,
+        )
+
+    def record_failure(self, reason: str, fingerprint: str = "", **envelope: Any) -> UnitRecord[P]:
+        """Return its record if there is no result."""
+        return self.record(fingerprint, self.payload, failure=reason, **envelope)
+
+    def record_exclusion(self, reason: str, fingerprint: str, **envelope: Any) -> UnitRecord[P]:
+        """Return its record if it turns out that no subject can be evaluated on it."""
+        return self.record(fingerprint, self.payload, excluded=reason, **envelope)

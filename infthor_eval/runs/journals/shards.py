@@ -1,0 +1,241 @@
+"""Reading the shards of a run's journal."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic
+
+import msgspec
+
+from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.reading import NOT_JSON, read_bytes, require_file
+from infthor_eval.runs.journals.records import (
+    FORMAT,
+    ArtifactRecord,
+    P,
+    RecordTypes,
+    RunHeader,
+    UnitKey,
+    UnitRecord,
+)
+from infthor_eval.runs.usage import Usage
+from infthor_eval.storage.digests import canonical_json
+
+__all__ = [
+    "FOLDER",
+    "Decoder",
+    "RunLog",
+    "check_format",
+    "find_shards",
+    "parse_header",
+    "parse_record",
+    "read_failures",
+    "read_header",
+    "read_lines",
+    "read_run",
+    "read_shard",
+    "read_shards",
+]
+
+
+FOLDER = "journal"  # within the run's folder
+Decoder = msgspec.json.Decoder[Any]
+_FORMAT_1 = "journal.jsonl"  # the single file of format 1, in the run's folder
+_HINT = (
+    "run the same command with --recover to resume without such lines, or with --fresh to restart"
+)
+
+
+@dataclass
+class RunLog(Generic[P]):
+    """The contents of all shards of a run: latest records of units, and artifacts by fingerprint."""
+
+    header: RunHeader | None = None
+    units: dict[UnitKey, UnitRecord[P]] = field(default_factory=dict)
+    artifacts: dict[str, ArtifactRecord[Any]] = field(default_factory=dict)
+
+    def add(self, record: UnitRecord[P] | ArtifactRecord[Any]) -> None:
+        """Add a record. Of several of one unit the last attempt counts; of one attempt by two workers, the result."""
+        if isinstance(record, ArtifactRecord):
+            self.artifacts[record.fingerprint] = record
+            return
+        known = self.units.get(record.key)
+        if known is None or _rank(record) >= _rank(known):
+            self.units[record.key] = record
+
+    @property
+    def records(self) -> list[UnitRecord[P]]:
+        """The latest record of each unit, in the order of the units' keys."""
+        return [self.units[key] for key in sorted(self.units)]
+
+    @property
+    def usage(self) -> Usage:
+        """Usage of all requests, those for cached artifacts included."""
+        return Usage.total(
+            [
+                *(unit.usage for unit in self.units.values()),
+                *(artifact.usage for artifact in self.artifacts.values()),
+            ]
+        )
+
+
+def _rank(record: UnitRecord[Any]) -> tuple[int, bool]:
+    return record.attempt, record.failure is None
+
+
+def read_header(run: Path) -> RunHeader:
+    """Read the header of the run in a folder.
+
+    Raises:
+        DataError: there is no journal, or one of another format.
+    """
+    shards = find_shards(run)
+    if shards:
+        return parse_header(shards[0], next(iter(read_lines(shards[0])), b""))
+    if (run / _FORMAT_1).is_file():
+        raise DataError(
+            f"{run}: its journal is of format 1, this version reads {FORMAT}; run the evaluation again"
+        )
+    raise DataError(f"{run}: no journal in it; give the folder of a run")
+
+
+def read_run(run: Path, types: RecordTypes[P]) -> tuple[RunHeader, list[UnitRecord[P]]]:
+    """Read the header of the run in a folder, and the latest record of each unit of all shards.
+
+    Raises:
+        DataError: there is no journal, or one with a bad line, or of another format.
+    """
+    header = read_header(run)
+    return header, read_shards(run, types.decoder()).records
+
+
+class _UnitOutcome(msgspec.Struct, tag_field="type", tag="unit"):
+    """The fields of a unit's record that need no suite."""
+
+    task: str
+    id: str
+    variant: str = ""
+    repeat: int = 1
+    attempt: int = 1
+    failure: str | None = None
+
+
+class _AnyArtifact(msgspec.Struct, tag_field="type", tag="artifact"):
+    """An artifact; no field of it is read."""
+
+
+def read_failures(run: Path) -> dict[UnitKey, bool]:
+    """Return for each unit with a record whether its latest attempt failed; needs no suite.
+
+    Raises:
+        DataError: a line is bad.
+    """
+    decoder = msgspec.json.Decoder(_UnitOutcome | _AnyArtifact | RunHeader)
+    latest: dict[UnitKey, tuple[int, bool]] = {}
+    for path in find_shards(run):
+        for number, line in enumerate(read_lines(path), 1):
+            with wrap_errors(
+                f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON
+            ):
+                unit = decoder.decode(line)
+            if isinstance(unit, _UnitOutcome):
+                key, rank = (
+                    UnitKey(unit.task, unit.id, unit.variant, unit.repeat),
+                    (unit.attempt, unit.failure is None),
+                )
+                latest[key] = max(latest.get(key, rank), rank)
+    return {key: not succeeded for key, (_, succeeded) in latest.items()}
+
+
+def find_shards(run: Path) -> list[Path]:
+    """Return the files of a run's shards.
+
+    Raises:
+        DataError: a shard is not a file.
+    """
+    shards = sorted((run / FOLDER).glob("worker-*.jsonl"))
+    for path in shards:
+        require_file(path, "take it out of the run's folder")
+    return shards
+
+
+def read_shards(run: Path, decoder: Decoder) -> RunLog[Any]:
+    """Read all shards of a run; an empty log if there is none.
+
+    Raises:
+        DataError: a shard has a bad line, is of another format, or of another run than the others.
+    """
+    log: RunLog[Any] = RunLog()
+    for path in find_shards(run):
+        read_shard(path, decoder, log)
+    return log
+
+
+def read_shard(path: Path, decoder: Decoder, log: RunLog[Any]) -> None:
+    """Add the contents of a shard to a log."""
+    lines = read_lines(path)
+    if not lines:
+        return  # created by a worker that was killed before it wrote the header
+    header = parse_header(path, lines[0])
+    if log.header is not None and canonical_json(header.config) != canonical_json(
+        log.header.config
+    ):
+        raise DataError(
+            f"{path}: belongs to another run than the shards beside it; take it out of the folder"
+        )
+    log.header = header
+    for number, line in enumerate(lines[1:], 2):
+        log.add(parse_record(path, number, line, decoder))
+
+
+def parse_record(
+    path: Path, number: int, line: bytes, decoder: Decoder
+) -> UnitRecord[Any] | ArtifactRecord[Any]:
+    """Return the record in a line of a shard; `number` is the line's, from 1.
+
+    Raises:
+        DataError: the line is bad, or a header.
+    """
+    with wrap_errors(f"{path}, line {number}: not a line of a journal", _HINT, catch=NOT_JSON):
+        record: UnitRecord[Any] | ArtifactRecord[Any] | RunHeader = decoder.decode(line)
+    if isinstance(record, RunHeader):
+        raise DataError(
+            f"{path}, line {number}: a second header in the middle of the records; {_HINT}"
+        )
+    return record
+
+
+def read_lines(path: Path) -> list[bytes]:
+    """Return the complete lines of a shard; a last line without its end is still being written, or never will be."""
+    content = read_bytes(path, "restore the file")
+    return content[: content.rfind(b"\n") + 1].splitlines()
+
+
+class _AnyFormat(msgspec.Struct):
+    format: int
+
+
+def check_format(path: Path, line: bytes) -> None:
+    """Refuse a shard whose first line is the header of another format; a line that is no header passes.
+
+    Raises:
+        DataError: names both formats, and what to do.
+    """
+    try:
+        version = msgspec.json.decode(line, type=_AnyFormat).format
+    except NOT_JSON:
+        return
+    if version != FORMAT:
+        raise DataError(
+            f"{path}: a journal of format {version}, this version reads {FORMAT}; run the command again with --fresh"
+        )
+
+
+def parse_header(path: Path, line: bytes) -> RunHeader:
+    """Return the header in the first line of a shard.
+
+    Raises:
+        DataError: the line is no header, or that of another format.
+    """
+    check_format(path, line)
+    with wrap_errors(f"{path}, line 1: not the first line of a journal", _HINT, catch=NOT_JSON):
+        return msgspec.json.decode(line, type=RunHeader)

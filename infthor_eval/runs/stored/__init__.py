@@ -1,0 +1,1 @@
+"""Runs in folders: finding, naming and repeating them."""

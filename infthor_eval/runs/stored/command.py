@@ -1,0 +1,154 @@
+"""The command of a run: its options in `run.yaml` beside the results, with which it can be repeated."""
+
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from infthor_eval.errors import DataError, wrap_errors
+from infthor_eval.formats.yaml_files import read_yaml
+from infthor_eval.runs.request import RunRequest
+from infthor_eval.storage.files import write_atomically
+
+__all__ = ["StoredCommand", "read_options", "read_stored_command", "write_command"]
+
+_FILE = "run.yaml"
+_HEAD = (
+    "# The options of this run: `infthor-eval run --config` with this file resumes or repeats it.\n"
+)
+_REPEATED = {"include_path"}  # options that are typed once for each value
+_CHECKPOINT = "pretrained"  # the model option that may be a folder
+_HINT = "write options of `infthor-eval run` by their long names, as `limit: 100`"
+
+
+@dataclass(frozen=True)
+class StoredCommand:
+    """The command of a run in `run.yaml`.
+
+    Attributes:
+        options: options of `infthor-eval run` by their long names with `_` for `-`; several values are a list, those
+            of `model_args` a mapping.
+    """
+
+    path: Path
+    options: Mapping[str, Any]
+
+    @property
+    def data(self) -> Path | None:
+        """Folder of the data set; None if it is the tasks' own or the published one."""
+        return Path(self.options["data"]) if self.options.get("data") else None
+
+    @property
+    def line(self) -> str:
+        """One line for a shell that resumes or repeats the run."""
+        typed = [word for name, value in self.options.items() for word in _words(name, value)]
+        model_args = self.options.get("model_args")
+        if isinstance(model_args, Mapping) and any(
+            "," in str(value) for value in model_args.values()
+        ):
+            typed = ["--config", str(self.path)]  # a value with a comma cannot be typed
+        return shlex.join(["infthor-eval", "run", *typed])
+
+
+def write_command(folder: Path, request: RunRequest) -> None:
+    """Write `run.yaml` into a run's folder.
+
+    Raises:
+        DataError: the file cannot be written.
+    """
+    path = folder / _FILE
+    text = _HEAD + yaml.safe_dump(_options_of(request), sort_keys=False, allow_unicode=True)
+    with (
+        wrap_errors(
+            f"{path}: cannot be written",
+            "make room and run the same command again, which resumes it",
+        ),
+        write_atomically(path) as partial,
+    ):
+        partial.write_text(text, encoding="utf-8")
+
+
+def read_stored_command(run_folder: Path) -> StoredCommand | None:
+    """Read `run.yaml` of a run; None if there is none, as in runs of early versions.
+
+    Raises:
+        DataError: the file is not valid.
+    """
+    path = run_folder.absolute() / _FILE
+    return StoredCommand(path, read_options(path)) if path.is_file() else None
+
+
+def read_options(path: Path) -> dict[str, Any]:
+    """Read the options in a file as they are written; their names are not checked.
+
+    Raises:
+        DataError: the file cannot be read, or is no mapping of names.
+    """
+    options = read_yaml(path, _HINT)
+    if not isinstance(options, dict) or not all(isinstance(name, str) for name in options):
+        raise DataError(f"{path}: holds no options; {_HINT}")
+    if not isinstance(options.get("model_args") or {}, dict | str):
+        raise DataError(
+            f"{path}: model_args is neither a mapping nor a text; write K: V below it, a line each"
+        )
+    if not isinstance(options.get("data") or "", str):
+        raise DataError(f"{path}: data is {options['data']!r:.60}; write the name of a folder")
+    return options
+
+
+def _options_of(request: RunRequest) -> dict[str, Any]:
+    """Return all options of a request. Keys of servers are none: they come from the environment only."""
+    tasks, given = request.tasks, dict(request.model_options)
+    if _CHECKPOINT in given:
+        given[_CHECKPOINT] = _absolute(given[_CHECKPOINT])
+    every = {
+        "model": request.model,
+        "model_args": given or None,
+        "tasks": list(request.asked),
+        "include_path": [str(folder.absolute()) for folder in request.include] or None,
+        "data": None if tasks.data is None else str(tasks.data.absolute()),
+        "limit": tasks.limit,
+        "seed": tasks.seed,
+        "name": request.name,
+        "output": str(request.output.absolute()),
+        **_non_default(tasks.options),
+        **_non_default(request.worker_settings),
+    }
+    return {name: value for name, value in every.items() if value is not None}
+
+
+def _non_default(options: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that differ from their defaults."""
+    if not is_dataclass(options):  # a suite without options
+        return {}
+    values = [(item, getattr(options, item.name)) for item in fields(options)]
+    return {
+        item.name: _absolute(value) if item.metadata.get("is_place") else value
+        for item, value in values
+        if value != item.default
+    }
+
+
+def _absolute(text: str) -> str:
+    """Return a path that exists as an absolute one, which holds in any folder; a name of the hub as it is."""
+    return str(Path(text).absolute()) if Path(text).exists() else text
+
+
+def _words(name: str, value: Any) -> Iterator[str]:
+    """Yield the words of an option as it is typed."""
+    if value is None or value is False:
+        return
+    typed = f"--{name.replace('_', '-')}"
+    if name in _REPEATED:
+        yield from (word for one in value for word in (typed, str(one)))
+        return
+    yield typed
+    if isinstance(value, Mapping):
+        yield ",".join(f"{key}={item}" for key, item in value.items())
+    elif isinstance(value, list):
+        yield ",".join(map(str, value))
+    elif value is not True:
+        yield str(value)

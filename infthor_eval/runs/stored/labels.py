@@ -1,0 +1,92 @@
+"""Labels of runs that are shown beside each other: their names, and the options that differ where names are equal."""
+
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path, PurePath
+
+from infthor_eval.runs.journals.records import RunHeader
+from infthor_eval.runs.stored.command import read_stored_command
+
+__all__ = ["label_runs"]
+
+# Options that change no number, and the tasks, which every table has a column for.
+_NOT_SHOWN = {
+    "output",
+    "workers",
+    "ray_address",
+    "gpus_per_worker",
+    "include_path",
+    "name",
+    "tasks",
+}
+
+
+def label_runs(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] = ()) -> list[str]:
+    """Return a label for each run.
+
+    Runs of one suite and name are told apart by the options that differ: `qwen2.5-vl (dtype=float16)`. Runs of the same
+    tasks that have equal options too get the names of their folders instead.
+
+    Args:
+        runs: folder and header of each run.
+        ignore: options that the tables show anyway.
+
+    Raises:
+        DataError: the `run.yaml` of a run is not valid.
+    """
+    same_name = defaultdict(list)
+    for place, (_, header) in enumerate(runs):
+        same_name[header.suite, header.name].append(place)
+    labels = [header.name for _, header in runs]
+    for places in same_name.values():
+        if len(places) > 1:  # otherwise no file is read
+            for place, label in zip(
+                places, _label_alike([runs[place] for place in places], ignore), strict=True
+            ):
+                labels[place] = label
+    return labels
+
+
+def _label_alike(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]) -> Iterator[str]:
+    """Yield the labels of runs of one name."""
+    options = [_options(folder) for folder, _ in runs]
+    names = sorted({name for given in options for name in given} - set(ignore))
+    values = {name: [given.get(name) for given in options] for name in names}
+    shown = {name: _shorten(given) for name, given in values.items() if len(set(given)) > 1}
+    # A run that differs in nothing but ignored options is another row of the same label.
+    keys = [
+        (given, sorted(header.config.get("tasks", {})))
+        for given, (_, header) in zip(options, runs, strict=True)
+    ]
+    for given, key, (folder, header) in zip(options, keys, runs, strict=True):
+        differing = ", ".join(
+            f"{name}={texts[given[name]]}" for name, texts in shown.items() if name in given
+        )
+        remarks = [
+            *([differing] if differing else []),
+            *([folder.name] if keys.count(key) > 1 else []),
+        ]
+        yield f"{header.name} ({', '.join(remarks)})" if remarks else header.name
+
+
+def _options(folder: Path) -> dict[str, str]:
+    """Return the options of a run's command as text, those of the model among them."""
+    command = read_stored_command(folder)
+    every = dict(command.options) if command else {}
+    of_model = every.pop("model_args", None)
+    if isinstance(of_model, Mapping):
+        every |= of_model
+    return {name: str(value) for name, value in every.items() if name not in _NOT_SHOWN}
+
+
+def _shorten(values: Sequence[str | None]) -> Mapping[str, str]:
+    """Return the values as they are; paths without the folders that all of them share."""
+    given = sorted({value for value in values if value is not None})
+    parts = {value: PurePath(value).parts for value in given}
+    if not all(PurePath(value).is_absolute() for value in given):
+        return {value: value for value in given}
+    shortest = min(map(len, parts.values())) - 1  # the last part is always shown
+    n_shared = next(
+        (n for n in range(shortest) if len({path[n] for path in parts.values()}) > 1), shortest
+    )
+    return {value: str(PurePath(*path[n_shared:])) for value, path in parts.items()}

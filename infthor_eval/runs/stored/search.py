@@ -1,0 +1,115 @@
+"""Finding the runs below a folder, without their suites."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from infthor_eval.errors import DataError, InfthorError, wrap_errors
+from infthor_eval.formats.reading import NOT_JSON, read_bytes
+from infthor_eval.rates import Rate
+from infthor_eval.runs.journals.records import RunHeader
+from infthor_eval.runs.journals.shards import FOLDER, read_failures, read_header
+from infthor_eval.runs.results import RESULTS
+
+__all__ = ["BrokenRun", "Results", "StoredRun", "find_runs", "read_results", "run_folders"]
+
+_DEPTH = 4  # levels of folders that are searched: results may hold sets with thousands of frames
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run on disk.
+
+    Attributes:
+        n_done: number of units with a record, failed ones included.
+        n_missing: number of units that were not attempted; None if the run was killed before it wrote results.
+        primary_metrics: primary metric of each task; empty if there are no results yet.
+        changed: time of the last change to the journal, in seconds since 1970.
+    """
+
+    folder: Path
+    header: RunHeader
+    n_done: int
+    n_failed: int
+    n_missing: int | None
+    primary_metrics: Mapping[str, Rate]
+    changed: float
+
+
+@dataclass(frozen=True)
+class BrokenRun:
+    """The folder of a run that cannot be read, and why."""
+
+    folder: Path
+    reason: str
+
+
+class Results(msgspec.Struct, frozen=True):
+    """The fields of `results.json` that need no suite."""
+
+    n_missing: int
+    primary_metrics: dict[str, Rate] = {}
+
+
+def find_runs(folder: Path) -> Iterator[StoredRun | BrokenRun]:
+    """Yield the runs below a folder, in the order of their paths.
+
+    Raises:
+        DataError: there is no such folder, or it cannot be searched.
+    """
+    if not folder.is_dir():
+        raise DataError(
+            f"{folder}: no such folder; give the results folder of a run (`--output`, else results)"
+        )
+    for run in run_folders(folder):
+        try:
+            yield _read_run(run)
+        except InfthorError as error:
+            yield BrokenRun(run, str(error))
+
+
+def read_results(folder: Path) -> Results | None:
+    """Read `results.json` of a run; None if there is none yet.
+
+    Raises:
+        DataError: the file is not valid.
+    """
+    path, hint = folder / RESULTS, "run the same command again"
+    if not path.is_file():
+        return None
+    with wrap_errors(f"{path}: not the results of a run", hint, catch=NOT_JSON):
+        return msgspec.json.decode(read_bytes(path, hint), type=Results)
+
+
+def run_folders(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
+    """Yield the folders of runs at and below a folder, at most `depth` levels deep.
+
+    Raises:
+        DataError: a folder cannot be searched.
+    """
+    if (folder / FOLDER).is_dir() or (folder / RESULTS).is_file():
+        yield folder
+    elif depth:
+        with wrap_errors(
+            f"{folder}: cannot be searched", "make it readable, or give another folder"
+        ):
+            below = sorted(
+                path for path in folder.iterdir() if path.is_dir() and not path.is_symlink()
+            )
+        for path in below:
+            yield from run_folders(path, depth - 1)
+
+
+def _read_run(folder: Path) -> StoredRun:
+    header, failures, results = read_header(folder), read_failures(folder), read_results(folder)
+    return StoredRun(
+        folder=folder,
+        header=header,
+        n_done=len(failures),
+        n_failed=sum(failures.values()),
+        n_missing=results.n_missing if results else None,
+        primary_metrics=results.primary_metrics if results else {},
+        changed=max(path.stat().st_mtime for path in (folder / FOLDER).iterdir()),
+    )

@@ -1,0 +1,73 @@
+"""A run whose subject is loaded: a model, a policy, or one of its suite's baselines."""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Generic
+
+from infthor_eval.errors import UsageError
+from infthor_eval.runs.journals.records import P, RunHeader, U
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.run_config import header_of
+from infthor_eval.runs.suite import BoundEvaluation, Need, Suite
+from model_adapters import Model, Policy, Subject, load
+
+__all__ = ["BoundRun", "bind_run", "require_capability"]
+
+
+_NEEDED: dict[Need, tuple[type, str]] = {
+    "conversation": (Model, "a model that answers in words"),
+    "policy": (Policy, "a policy that drives an arm (openvla, spatialvla, ...)"),
+}
+
+
+@dataclass(frozen=True)
+class BoundRun(Generic[U, P]):
+    """A run whose subject is loaded, and the header of its journal."""
+
+    subject: Subject
+    evaluation: BoundEvaluation[U, P]
+    header: RunHeader
+
+    def close(self) -> None:
+        """Release the evaluation, then the subject."""
+        with ExitStack() as stack:
+            stack.callback(self.subject.close)
+            stack.callback(self.evaluation.close)
+
+
+def bind_run(run: PreparedRun[U, P]) -> BoundRun[U, P]:
+    """Load the subject of a run and find its work.
+
+    Raises:
+        UsageError: the suite cannot evaluate the subject, or there is nothing to evaluate.
+        ModelError: the subject cannot be loaded, or can take none of the units.
+        DataError: the data do not match their format.
+    """
+    subject = _load_subject(run)
+    with ExitStack() as stack:  # released only if anything below raises
+        stack.callback(subject.close)
+        evaluation = run.evaluation.bind(subject)
+        stack.callback(evaluation.close)
+        bound = BoundRun(subject, evaluation, header_of(run, subject, evaluation.workload))
+        stack.pop_all()
+    return bound
+
+
+def _load_subject(run: PreparedRun[U, P]) -> Subject:
+    request, suite = run.request, run.suite
+    if request.model in suite.baselines:
+        return suite.baselines[request.model](request.tasks.seed)
+    subject = load(request.model, request.model_options, request.tasks.seed)
+    try:
+        require_capability(subject, request.model, suite)
+    except UsageError:
+        subject.close()
+        raise
+    return subject
+
+
+def require_capability(subject: Subject, name: str, suite: Suite[U, P]) -> None:
+    """Refuse a subject, by the name that it was requested by, that lacks what a suite needs (UsageError)."""
+    kind, description = _NEEDED[suite.needs]
+    if not isinstance(subject, kind):
+        raise UsageError(f"{name} cannot be evaluated on {suite.name}, which needs {description}")

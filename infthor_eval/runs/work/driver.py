@@ -1,0 +1,141 @@
+"""One run of any suite: its journal, and the order of its work."""
+
+from collections.abc import Callable, Iterable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, Protocol
+
+from infthor_eval.runs.journals import journal as journals
+from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.journals.records import P, U, Unit, UnitRecord
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.results import write_run_files
+from infthor_eval.runs.samples import StoredSamples
+from infthor_eval.runs.stored.command import write_command
+from infthor_eval.runs.suite import RunSummary, UnitSample, Workload
+from infthor_eval.runs.usage import Usage
+from infthor_eval.runs.work.executor import Executor, LocalExecutor
+from infthor_eval.runs.work.worker_executor import WorkerPoolExecutor
+
+__all__ = ["Observer", "RunOutcome", "Silent", "execute"]
+
+
+class Observer(Protocol):
+    """Follows a run."""
+
+    def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
+        """Called before the first unit, with all the work and the number of bad lines taken out of the journal."""
+
+    def done(self, record: UnitRecord[Any], resumed: bool) -> None:
+        """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
+
+    def note(self, text: str) -> None:
+        """Called with a line when a worker is lost or cannot be started."""
+
+
+class Silent:
+    """An observer that does nothing."""
+
+    def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
+        """Nothing."""
+
+    def done(self, record: UnitRecord[Any], resumed: bool) -> None:
+        """Nothing."""
+
+    def note(self, text: str) -> None:
+        """Nothing."""
+
+
+@dataclass(frozen=True)
+class RunOutcome(Generic[U, P]):
+    """A run that has ended.
+
+    Attributes:
+        records: records of all units that were attempted.
+        n_missing: number of units that were not attempted, as the run was stopped.
+        usage: usage of all requests, those for cached artifacts included.
+        samples: the records in their order, converted for other readers.
+    """
+
+    folder: Path
+    run: PreparedRun[U, P]
+    summary: RunSummary
+    records: list[UnitRecord[P]]
+    n_missing: int
+    usage: Usage
+    samples: Iterable[UnitSample]
+
+
+def execute(
+    run: PreparedRun[U, P],
+    observer: Observer | None = None,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> RunOutcome[U, P]:
+    """Load the model, do what the journal does not hold yet, and write the results.
+
+    The folder `<output>/<name>/<tasks>-<config hash>/` holds the journal, `run.yaml` (the options of the command),
+    `results.json` (the summary) and `scores.jsonl` (of every unit), equal for equal runs, and `usage.json`.
+
+    Args:
+        run: the prepared run.
+        observer: follows the run.
+        should_stop: called after each unit; once it returns True, the units in hand are finished, and the results so
+            far are written.
+
+    Raises:
+        UsageError: another process at the same run, a subject that the suite cannot evaluate, or nothing to do.
+        ModelError: the model cannot be loaded.
+        DataError: the journal has a bad line, or the results cannot be written.
+    """
+    observer = observer or Silent()
+    with closing(_start_executor(run, observer.note)) as executor:
+        header, workload = executor.header, executor.workload
+        folder = run.request.folder(header)
+        if run.request.fresh:
+            journals.set_aside(folder)
+        n_recovered = (
+            journals.recover(folder, header, run.suite.records) if run.request.recover else 0
+        )
+        with Journal(folder, header, run.suite.records) as journal:
+            write_command(folder, run.request)
+            observer.begin(workload, n_recovered)
+            try:
+                for record, resumed in executor.evaluate(folder, journal, should_stop):
+                    observer.done(record, resumed)
+            except Exception:
+                raise
+            except (
+                BaseException
+            ):  # stopped at once: the units that are done have their results all the same
+                _write_results(run, folder, workload, journal)
+                raise
+            summary, records, usage = _write_results(run, folder, workload, journal)
+        samples = StoredSamples(executor.samples(records))
+        return RunOutcome(
+            folder, run, summary, records, workload.n_units - len(records), usage, samples
+        )
+
+
+def _start_executor(run: PreparedRun[U, P], report: Callable[[str], None]) -> Executor[P]:
+    if run.request.worker_settings.is_local:
+        return LocalExecutor(run)
+    return WorkerPoolExecutor(run, report)
+
+
+def _write_results(
+    run: PreparedRun[U, P], folder: Path, workload: Workload[Unit[Any]], journal: Journal[P]
+) -> tuple[RunSummary, list[UnitRecord[P]], Usage]:
+    """Write the results of the units that the journal has by now; return summary, records and usage."""
+    asked = {
+        unit.key for group in workload.groups for unit in group.units
+    }  # the journal may hold more
+    records = [record for record in journal.records if record.key in asked]
+    journal.check_file()
+    summary = RunSummary(journal.header, run.suite.summarise(journal.header, records))
+    n_missing = workload.n_units - len(records)
+    usage = Usage.total(
+        [record.usage for record in records] + [artifact.usage for artifact in journal.artifacts]
+    )
+    write_run_files(folder, summary, run.suite, records, n_missing, usage)
+    return summary, records, usage

@@ -1,0 +1,79 @@
+"""Who does a run's work: this process, or several workers; either way the same records."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Generic, Protocol
+
+from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.journals.records import P, RunHeader, U, Unit, UnitRecord
+from infthor_eval.runs.journals.session import JournalSession
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.suite import UnitSample, Workload
+from infthor_eval.runs.work.binding import bind_run
+from infthor_eval.runs.work.groups import group_records
+from infthor_eval.runs.work.scheduling import run_groups
+
+__all__ = ["Executor", "LocalExecutor", "Recorded"]
+
+
+Recorded = tuple[
+    UnitRecord[P], bool
+]  # a record that is on disk; True if an earlier run had put it there
+
+
+class Executor(Protocol[P]):
+    """Does the work of a run. It is ready as soon as it is created."""
+
+    @property
+    def header(self) -> RunHeader:
+        """Header of the run's journal."""
+
+    @property
+    def workload(self) -> Workload[Unit[Any]]:
+        """All the work."""
+
+    def evaluate(
+        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[P], bool]]:
+        """Do all groups, or stop after the units in hand; yield every record as soon as it is on disk."""
+
+    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+        """Convert records for other readers, in their order; not after `close`."""
+
+    def close(self) -> None:
+        """Release everything, in whatever state it is."""
+
+
+class LocalExecutor(Generic[U, P]):
+    """The executor of this process."""
+
+    def __init__(self, run: PreparedRun[U, P]) -> None:
+        """Load the subject and find the work.
+
+        Raises:
+            InfthorError: see `bind_run`.
+        """
+        self._bound = bind_run(run)
+        self.header = self._bound.header
+        self.workload = self._bound.evaluation.workload
+
+    def evaluate(
+        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[P], bool]]:
+        """See `Executor`."""
+        session, evaluation = JournalSession(journal), self._bound.evaluation
+        in_flight = self._bound.subject.capabilities.max_in_flight
+        for record in run_groups(
+            self.workload.groups, lambda group: group_records(evaluation, group, session), in_flight
+        ):
+            yield session.append_new(record)
+            if should_stop():
+                return
+
+    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+        """See `Executor`."""
+        return map(self._bound.evaluation.to_sample, records)
+
+    def close(self) -> None:
+        """See `Executor`."""
+        self._bound.close()

@@ -1,0 +1,79 @@
+"""Doing groups in order, several at a time where the subject takes several requests."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from queue import Empty, SimpleQueue
+from threading import Event, Thread
+
+from infthor_eval.runs.journals.records import P, U, UnitRecord
+from infthor_eval.runs.suite import Group
+
+__all__ = ["run_groups"]
+
+
+def run_groups(
+    groups: Sequence[Group[U]],
+    do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
+    max_in_flight: int,
+) -> Iterator[UnitRecord[P]]:
+    """Yield the records of all groups as soon as they are there; several in flight are done in a thread each."""
+    if max_in_flight == 1 or len(groups) <= 1:
+        for group in groups:
+            yield from do(group)
+    else:
+        yield from _in_threads(groups, do, min(max_in_flight, len(groups)))
+
+
+def _in_threads(
+    groups: Sequence[Group[U]], do: Callable[[Group[U]], Iterable[UnitRecord[P]]], n_threads: int
+) -> Iterator[UnitRecord[P]]:
+    waiting: SimpleQueue[Group[U]] = SimpleQueue()
+    for group in groups:
+        waiting.put(group)
+    results: SimpleQueue[UnitRecord[P] | BaseException | None] = (
+        SimpleQueue()
+    )  # None: a thread has ended
+    stop = Event()
+    threads = [
+        Thread(target=_work, args=(waiting, do, results, stop), daemon=True)
+        for _ in range(n_threads)
+    ]
+    for thread in threads:
+        thread.start()
+    running = n_threads
+    try:
+        while running:
+            item = results.get()
+            if isinstance(item, BaseException):
+                raise item
+            if item is None:
+                running -= 1
+            else:
+                yield item
+    finally:
+        stop.set()
+
+
+def _work(
+    waiting: "SimpleQueue[Group[U]]",
+    do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
+    results: "SimpleQueue[UnitRecord[P] | BaseException | None]",
+    stop: Event,
+) -> None:
+    try:
+        while (group := _next(waiting)) is not None and not stop.is_set():
+            for record in do(group):
+                results.put(record)
+                if stop.is_set():
+                    return
+    except BaseException as error:  # noqa: BLE001 - raised again in the thread that waits for the records
+        results.put(error)
+    else:
+        results.put(None)
+
+
+def _next(waiting: "SimpleQueue[Group[U]]") -> Group[U] | None:
+    """Return the next group, or None if there is none."""
+    try:  # rather than a check whether it is empty: another thread may take the last group after it
+        return waiting.get_nowait()
+    except Empty:
+        return None

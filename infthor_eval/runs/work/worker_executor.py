@@ -1,0 +1,268 @@
+"""A run by several workers: each loads the subject, does groups, and writes a shard of the journal.
+
+The driver loads no model. It learns the run's header and workload from the first worker, and hands out groups by
+number, each with the records that earlier runs or a lost worker left of it. So nothing travels but numbers and records.
+"""
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Generic
+
+from infthor_eval.errors import UsageError
+from infthor_eval.runs.journals.journal import Journal
+from infthor_eval.runs.journals.records import P, RunHeader, U, Unit, UnitKey, UnitRecord
+from infthor_eval.runs.journals.session import JournalSession
+from infthor_eval.runs.request import PreparedRun
+from infthor_eval.runs.suite import Group, UnitSample, Workload
+from infthor_eval.runs.work.binding import bind_run
+from infthor_eval.runs.work.groups import group_records
+from infthor_eval.storage.digests import canonical_json
+from infthor_eval.workers import (
+    Event,
+    JobFailed,
+    JobResult,
+    Pool,
+    WorkerLost,
+    WorkerLostError,
+    WorkerWithdrawn,
+)
+
+__all__ = ["WorkerPoolExecutor"]
+
+
+_SHARD_WAIT_S = 20.0
+# A unit that kills its worker (out of memory, say) must not fail the others of its group: after so many losses in a
+# row the group is split, and each of its units gets so many tries alone.
+_GROUP_TRIES = 3
+_UNIT_TRIES = 2
+_BATCH = 256  # records that a worker converts at a time
+
+
+@dataclass(frozen=True)
+class _Greeting:
+    """What the driver learns from a worker before it hands out work: units without what only the suite needs."""
+
+    header: RunHeader
+    workload: Workload[Unit[Any]]
+
+
+@dataclass(frozen=True)
+class _Portion:
+    """A group of the workload by its number, or one unit of it; `unit` is None for all of them."""
+
+    group: int
+    unit: int | None = None
+
+    def select(self, groups: Sequence[Group[U]]) -> Group[U]:
+        group = groups[self.group]
+        return group if self.unit is None else replace(group, units=[group.units[self.unit]])
+
+
+@dataclass(frozen=True)
+class _GroupJob(Generic[P]):
+    """A portion for a worker to do, with the latest records of its units."""
+
+    portion: _Portion
+    folder: Path
+    earlier: tuple[UnitRecord[P], ...]
+
+
+@dataclass(frozen=True)
+class _SampleJob(Generic[P]):
+    """Records for a worker to convert to samples."""
+
+    records: tuple[UnitRecord[P], ...]
+
+
+@dataclass(frozen=True)
+class _OpenEvaluator(Generic[U, P]):
+    """Creates a worker in the process where it works; pickled and sent there."""
+
+    run: PreparedRun[U, P]
+
+    def __call__(self, number: int) -> "_Evaluator[U, P]":
+        return _Evaluator(self.run, number)
+
+
+class _Evaluator(Generic[U, P]):
+    """A worker of a run; see `infthor_eval.workers.Worker`."""
+
+    def __init__(self, run: PreparedRun[U, P], number: int) -> None:
+        self._records = run.suite.records
+        self._number = number
+        self._bound = bind_run(run)
+        self._session: JournalSession[P] | None = None
+
+    @property
+    def greeting(self) -> _Greeting:
+        workload = self._bound.evaluation.workload
+        groups = [
+            Group([unit.without_inputs() for unit in group.units], group.frames)
+            for group in workload.groups
+        ]
+        parts = (workload.skipped, workload.config, workload.costs, workload.warnings)
+        return _Greeting(self._bound.header, Workload(groups, *parts))
+
+    def do(
+        self, job: _GroupJob[P] | _SampleJob[P]
+    ) -> Iterator[tuple[UnitRecord[P], bool] | UnitSample]:
+        evaluation = self._bound.evaluation
+        if isinstance(job, _SampleJob):
+            yield from map(evaluation.to_sample, job.records)
+            return
+        session = self._open_session(job.folder)
+        for record in job.earlier:
+            session.journal.add(record)
+        for record in group_records(
+            evaluation, job.portion.select(evaluation.workload.groups), session
+        ):
+            yield session.append_new(record)
+
+    def close(self) -> None:
+        self._bound.close()
+
+    def _open_session(self, folder: Path) -> JournalSession[P]:
+        if self._session is None:
+            # A worker of a driver that was killed may still be ending, and holds the lock of the shard until then.
+            journal = Journal(
+                folder, self._bound.header, self._records, worker=self._number, wait_s=_SHARD_WAIT_S
+            )
+            self._session = JournalSession(journal)
+        return self._session
+
+
+@dataclass(frozen=True)
+class _Progress(Generic[P]):
+    """The state of a run that all its portions share; `done` are the units whose records were yielded."""
+
+    folder: Path
+    journal: Journal[P]
+    should_stop: Callable[[], bool]
+    done: set[UnitKey] = field(default_factory=set)
+
+
+class WorkerPoolExecutor(Generic[U, P]):
+    """The executor of several workers; see `infthor_eval.runs.work.executor.Executor`."""
+
+    def __init__(self, run: PreparedRun[U, P], report: Callable[[str], None]) -> None:
+        """Start the workers and wait for the first; `report` gets a line when one is lost or cannot be started.
+
+        Raises:
+            UsageError: there is no such cluster.
+            InfthorError: no worker can be started; the reason of the last one.
+        """
+        self._report = report
+        self._expected: dict[str, Any] | None = None
+        settings = run.request.worker_settings
+        self._n_workers = settings.workers
+        self._pool = Pool(
+            settings.connect(_OpenEvaluator(run)), settings.workers, self._check_config
+        )
+        try:
+            greeting: _Greeting = self._pool.open()
+        except BaseException:
+            self._pool.close()
+            raise
+        self.header = greeting.header
+        self.workload = greeting.workload
+
+    def evaluate(
+        self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
+    ) -> Iterator[tuple[UnitRecord[P], bool]]:
+        """See `Executor`."""
+        groups = self.workload.groups
+        progress = _Progress(folder, journal, should_stop)
+        given_up = yield from self._do_portions(
+            [_Portion(n) for n in range(len(groups))], progress, _GROUP_TRIES
+        )
+        # Some unit in them is to blame; the others must not fail with it.
+        alone = [
+            _Portion(portion.group, number)
+            for portion in given_up
+            for number, unit in enumerate(portion.select(groups).units)
+            if unit.key not in progress.done
+        ]
+        for portion, reason in (yield from self._do_portions(alone, progress, _UNIT_TRIES)).items():
+            (unit,) = portion.select(groups).units
+            failure = f"worker after worker was lost at it ({reason}); give it more memory, or leave it out"
+            yield journal.append(unit.record_failure(failure)), False
+        for worker in range(1, self._n_workers + 1):
+            journal.reread(worker)  # for cached artifacts, which workers do not send
+
+    def _do_portions(
+        self, portions: Sequence[_Portion], progress: _Progress[P], max_losses: int
+    ) -> Generator[tuple[UnitRecord[P], bool], None, dict[_Portion, str]]:
+        """Have portions done; yield the records, and return the portions that were given up, with the reason."""
+        journal = progress.journal
+        given_up: dict[_Portion, str] = {}
+
+        def job(number: int) -> _GroupJob[P]:
+            keys = [unit.key for unit in portions[number].select(self.workload.groups).units]
+            return _GroupJob(portions[number], progress.folder, journal.latest_records(keys))
+
+        for event in self._pool.run(len(portions), job, progress.should_stop, max_losses):
+            self._report_loss(event)
+            if isinstance(event, JobResult):
+                record, resumed = event.result
+                if not resumed:
+                    journal.add_from(event.worker, record)
+                if record.key not in progress.done:
+                    progress.done.add(record.key)
+                    yield record, resumed
+            elif isinstance(event, WorkerLost | JobFailed):
+                journal.reread(
+                    event.worker
+                )  # it may have written records that it could no longer send
+            if isinstance(event, JobFailed):
+                given_up[portions[event.job]] = event.reason
+        return given_up
+
+    def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
+        """See `Executor`.
+
+        Raises:
+            WorkerLostError: worker after worker was lost.
+        """
+        # In batches, as a worker is sent all records of a job at once.
+        jobs = [
+            _SampleJob(tuple(records[at : at + _BATCH])) for at in range(0, len(records), _BATCH)
+        ]
+        for job in jobs:
+            converted: list[UnitSample] = []
+            for event in self._pool.run(1, lambda _, job=job: job):  # type: ignore[misc]
+                if isinstance(event, JobResult):
+                    converted.append(event.result)
+                elif isinstance(event, WorkerLost):
+                    converted.clear()  # another worker begins the job again
+                elif isinstance(event, JobFailed):
+                    raise WorkerLostError(
+                        f"worker after worker was lost at it ({event.reason}); run it again"
+                    )
+            yield from converted
+
+    def close(self) -> None:
+        """See `Executor`."""
+        self._pool.close()
+
+    def _check_config(self, greeting: _Greeting) -> None:
+        """Refuse a worker that would evaluate something else: another version, a model that has changed."""
+        theirs = greeting.header.config
+        if self._expected is None:
+            self._expected = theirs
+        elif canonical_json(self._expected) != canonical_json(theirs):
+            names = {*self._expected, *theirs}
+            differing = sorted(
+                name for name in names if self._expected.get(name) != theirs.get(name)
+            )
+            raise UsageError(
+                f"the workers differ in {', '.join(differing)}; give all nodes the same versions and data"
+            )
+
+    def _report_loss(self, event: Event) -> None:
+        if isinstance(event, WorkerLost):
+            self._report(f"{event.reason}; what it had not finished goes to another")
+        elif isinstance(event, WorkerWithdrawn):
+            self._report(
+                f"worker {event.worker} cannot be started, the others go on: {event.reason}"
+            )

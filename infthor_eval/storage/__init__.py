@@ -1,0 +1,1 @@
+"""Files and folders of this machine: written whole or not at all, found, limited, hashed."""

@@ -1,0 +1,87 @@
+"""Limits on the size of files that are read, and on the time that others may take.
+
+Input is untrusted: a small file can unpack to more than the memory, or keep a template engine busy for ever. The limits
+are far above what real data need. Each can be raised by an environment variable, which the error message names.
+"""
+
+import os
+from dataclasses import dataclass
+
+from infthor_eval.errors import UsageError
+
+__all__ = [
+    "ACTION_SECONDS",
+    "ALIAS_NODES",
+    "FILE_MB",
+    "IMAGE_ASPECT",
+    "IMAGE_MEGAPIXELS",
+    "LINE_MB",
+    "OBJECT_POSES",
+    "TEMPLATE_CHARACTERS",
+    "TEMPLATE_MB",
+    "TEMPLATE_SECONDS",
+    "TRAJECTORIES",
+    "UNITY_ACTION_SECONDS",
+    "Limit",
+]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A limit, named as the environment variable that changes it."""
+
+    name: str
+    default: int
+
+    @property
+    def value(self) -> int:
+        """The limit in force.
+
+        Raises:
+            UsageError: the variable is not a whole number above 0.
+        """
+        given = os.environ.get(self.name)
+        if given is None:
+            return self.default
+        if not (given.isascii() and given.isdecimal() and len(given) <= 18 and int(given) > 0):
+            raise UsageError(
+                f"{self.name}={given[:40]}: not a whole number above 0; set it to one, or unset it"
+            )
+        return int(given)
+
+    @property
+    def hint(self) -> str:
+        """The way to raise it, for messages."""
+        return f"if this is intended, set {self.name} to more than {self.value}"
+
+
+FILE_MB = Limit("INFTHOR_EVAL_MAX_FILE_MB", 2048)  # size of a file, unpacked
+LINE_MB = Limit(
+    "INFTHOR_EVAL_MAX_LINE_MB", 256
+)  # size of one line in files that are read line by line
+IMAGE_MEGAPIXELS = Limit("INFTHOR_EVAL_MAX_IMAGE_MEGAPIXELS", 50)
+IMAGE_ASPECT = Limit(
+    "INFTHOR_EVAL_MAX_IMAGE_ASPECT", 100
+)  # longer side over shorter; image processors refuse 200
+ALIAS_NODES = Limit(
+    "INFTHOR_EVAL_MAX_YAML_NODES", 100_000
+)  # values of a YAML document with all aliases expanded
+OBJECT_POSES = Limit(
+    "INFTHOR_EVAL_MAX_OBJECT_POSES", 1000
+)  # recorded poses of one scene; real ones have up to 60
+TRAJECTORIES = Limit(
+    "INFTHOR_EVAL_MAX_TRAJECTORIES", 1_000_000
+)  # trajectories that one command may generate
+TEMPLATE_SECONDS = Limit(
+    "INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", 60
+)  # processor time of a chat template, per text
+TEMPLATE_MB = Limit("INFTHOR_EVAL_MAX_TEMPLATE_MB", 2048)  # memory of a chat template, per text
+TEMPLATE_CHARACTERS = Limit(
+    "INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS", 16_000_000
+)  # length of the text it produces
+ACTION_SECONDS = Limit(
+    "INFTHOR_EVAL_MAX_ACTION_SECONDS", 30
+)  # time of one action in the embedded simulator
+UNITY_ACTION_SECONDS = Limit(
+    "INFTHOR_EVAL_MAX_UNITY_ACTION_SECONDS", 100
+)  # in Unity; AI2-THOR's own limit

@@ -1,0 +1,179 @@
+# ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
+"""Picking up, putting, opening, closing, toggling and slicing."""
+
+from functools import partial
+
+from infthor_sim.actions.registry import action
+from infthor_sim.actions.targets import BY_ID_OR_PIXEL, held_object, interactable, object_action
+from infthor_sim.effects import slice_object, toggle
+from infthor_sim.errors import ActionError, ErrorCode
+from infthor_sim.object_types import allowed_in
+from infthor_sim.objects import SimObject
+from infthor_sim.physics.free_places import find_place
+from infthor_sim.physics.receptacles import drawer_offset
+from infthor_sim.physics.unfolding import unfold
+from infthor_sim.simulation import Simulation
+
+# Overlaps of boxes that `forceAction` tolerates in a full receptacle of a recording, smallest first: recorded boxes are
+# coarse. Where things are drawn to the box, an overlap would show.
+_CROWDED = (0.12, 0.24, 0.35)
+
+
+@action("PickupObject", forms=BY_ID_OR_PIXEL)
+def pick_up(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    manualInteract: bool = False,
+) -> None:
+    """Take an object into the hand, with all it contains."""
+    target = interactable(sim, objectId, forceAction, x, y)
+    if not target.type.pickupable:
+        raise ActionError(
+            f"{target.object_id} must have the property CanPickup to be picked up.",
+            ErrorCode.NOT_PICKUPABLE,
+        )
+    if sim.world.held is not None:
+        raise ActionError(
+            f"Agent hand has something in it already! Can't pick up anything else. Holding {sim.world.held}.",
+            ErrorCode.INVENTORY_FULL,
+        )
+    world = sim.world
+    world.detach(target)
+    world.held = target.object_id
+    target.state.picked_up = True
+    world.carry()
+
+
+@action("PutObject", forms=BY_ID_OR_PIXEL)
+def put(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    placeStationary: bool = True,
+    randomSeed: int = 0,
+    putNearXY: bool = False,
+) -> None:
+    """Put the held object into or onto the receptacle `objectId`."""
+    held = held_object(sim, "Can't place an object if Agent isn't holding anything in their hand.")
+    target = interactable(sim, objectId, forceAction, x, y)
+    _check_receptacle(held, target)
+    placed = _find_place(sim, held, target, forceAction)
+    if placed is None:
+        raise ActionError("No valid positions to place object found", ErrorCode.RECEPTACLE_FULL)
+    sim.world.set_pose(held, placed.position, placed.rotation)
+    sim.world.release()
+    sim.world.attach(held, target)
+    sim.world.mark_changed()
+
+
+def _find_place(
+    sim: Simulation, held: SimObject, target: SimObject, force: bool
+) -> SimObject | None:
+    """Return the held object at the best free place; a forced put squeezes in where it is crowded."""
+    # Best first: without overlap, clear of fixed things, in view. Recorded boxes of fixed things are too large, so a
+    # place within one is better than none; Unity, which has the meshes, would find room there.
+    for overlap in (0.0, *_CROWDED) if force and sim.world.coarse else (0.0,):
+        for among_fixed in (False, True):
+            for point_filter in (sim.vision.in_frame, None):
+                placed = find_place(
+                    sim.world,
+                    held,
+                    target,
+                    overlap,
+                    point_filter=point_filter,
+                    among_fixed=among_fixed,
+                )
+                if placed is not None:
+                    return placed
+    return None
+
+
+def _check_receptacle(held: SimObject, target: SimObject) -> None:
+    if not target.type.receptacle:
+        raise ActionError(f"This target object is NOT a receptacle! {target.object_id}")
+    if target.type.encloses and target.type.openable and target.state.openness == 0:
+        raise ActionError("Target openable Receptacle is CLOSED, can't place if target is not open!",
+                          ErrorCode.RECEPTACLE_CLOSED)  # fmt: skip
+    if not allowed_in(held.object_type, target.object_type):
+        raise ActionError(
+            f"{held.object_id} cannot be placed in {target.object_id}", ErrorCode.NOT_ALLOWED
+        )
+
+
+@action("OpenObject", forms=BY_ID_OR_PIXEL)
+def open_object(
+    sim: Simulation,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    openness: float = 1.0,
+    moveMagnitude: float | None = None,
+) -> None:
+    """Open a door, drawer or lid to `openness`, 0 (closed) to 1."""
+    if moveMagnitude is not None:
+        openness = moveMagnitude or 1.0  # the old name of `openness`; its 0 meant wide open
+    if not 0 <= openness <= 1:
+        raise ActionError(f"openness must be in [0:1], not {openness}")
+    target = interactable(sim, objectId, forceAction, x, y)
+    if not target.type.openable:
+        raise ActionError(f"{target.object_id} is not an Openable object")
+    if target.state.openness == openness and openness > 0:
+        raise ActionError(f"object already open: {target.object_id}")
+    if target.state.toggled and target.type.runs_closed and openness > 0:
+        raise ActionError(f"Can't open {target.object_id}: it is on. Turn it off first.")
+    set_openness(sim, target, openness)
+
+
+@object_action("CloseObject")
+def close_object(sim: Simulation, target: SimObject) -> None:
+    """Close a door, drawer or lid."""
+    if not target.type.openable:
+        raise ActionError(f"{target.object_id} is not an Openable object")
+    if target.state.openness == 0:
+        raise ActionError(f"object already closed: {target.object_id}")
+    set_openness(sim, target, 0.0)
+
+
+def set_openness(sim: Simulation, target: SimObject, openness: float) -> None:
+    """Open or close an object; the contents of a drawer move with it."""
+    before = drawer_offset(target)
+    unfold(target, openness)
+    target.state.openness = float(openness)
+    sim.world.shift(sim.world.children(target), drawer_offset(target) - before)
+    sim.world.mark_changed(target)
+
+
+def _toggle(sim: Simulation, target: SimObject, on: bool) -> None:
+    if not target.type.toggleable:
+        raise ActionError(f"{target.object_id} is not toggleable")
+    if target.type.switched_by:
+        raise ActionError(
+            f"{target.object_id} is not self controlled; toggle its {target.type.switched_by}"
+        )
+    if target.state.toggled == on:
+        raise ActionError(f"{target.object_id} is already toggled {'on' if on else 'off'}!")
+    if on and target.type.runs_closed and target.state.openness > 0:
+        raise ActionError(f"Target {target.object_id} must be closed to be toggled on.")
+    if target.state.broken:
+        raise ActionError(f"{target.object_id} is broken and cannot be toggled.")
+    toggle(sim.world, target, on)
+
+
+for _name, _on in (("ToggleObjectOn", True), ("ToggleObjectOff", False)):
+    object_action(_name)(partial(_toggle, on=_on))
+
+
+@object_action("SliceObject")
+def slice_target(sim: Simulation, target: SimObject) -> None:
+    """Cut an object into slices, which are new objects."""
+    if not target.type.sliceable:
+        raise ActionError(f"{target.object_id} Does not have the CanBeSliced property!")
+    if target.object_id in sim.world.held_ids():
+        raise ActionError("target object is in the agent's hand; put it down to slice it")
+    slice_object(sim.world, target)

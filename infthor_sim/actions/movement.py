@@ -1,0 +1,162 @@
+# ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
+"""Moving, turning and looking."""
+
+import math
+from functools import partial
+
+import numpy as np
+
+from infthor_sim.actions.registry import Vector3, action
+from infthor_sim.agent import MAX_DOWN, MAX_UP
+from infthor_sim.errors import ActionError, ErrorCode
+from infthor_sim.geometry import Array
+from infthor_sim.physics.obstacles import blocking_object, held_object_blocks, nearest_name
+from infthor_sim.simulation import Simulation
+
+_DIRECTIONS = {
+    "Ahead": 0.0,
+    "Back": 180.0,
+    "Left": -90.0,
+    "Right": 90.0,
+}  # degrees from the agent's own
+
+
+def _move(
+    turn: float,
+    sim: Simulation,
+    moveMagnitude: float | None = None,
+    objectId: str | None = None,
+    maxAgentsDistance: float = -1.0,
+    forceAction: bool = False,
+    manualInteract: bool = False,
+    allowAgentsToIntersect: bool = False,
+    speed: float = 1.0,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+) -> None:
+    """Walk, keeping within `maxAgentsDistance` metres of the object `objectId` if both are given."""
+    size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
+    if size <= 0:
+        raise ActionError("moveMagnitude must be > 0")
+    agent = sim.world.agent
+    angle = math.radians(agent.yaw + turn)
+    offset = np.array([math.sin(angle), 0.0, math.cos(angle)]) * size
+    target = agent.position + offset
+    if (
+        sim.settings.snap_to_grid
+        and abs(size / sim.settings.grid_size - round(size / sim.settings.grid_size)) < 1e-6
+    ):
+        # Rounding takes off the noise of sine and cosine, which would add up over a long walk on the grid.
+        target = np.array(
+            [round(float(target[0]), 5), float(target[1]), round(float(target[2]), 5)]
+        )
+    if objectId and maxAgentsDistance > 0:
+        away = float(np.linalg.norm(sim.world.get(objectId).position - target))
+        if away > maxAgentsDistance:
+            raise ActionError(
+                f"Agent movement would bring it beyond the max distance of {objectId}: {away:.4f}"
+            )
+    _check_path(sim, target, offset, forceAction)
+    agent.position = target
+    sim.world.carry(manualInteract)
+
+
+for _name, _angle in _DIRECTIONS.items():
+    action(f"Move{_name}")(partial(_move, _angle))
+
+
+def _check_path(sim: Simulation, target: Array, offset: Array, force: bool) -> None:
+    start = sim.world.agent.position
+    by = f"({offset[0]:.4f}, {offset[1]:.4f}, {offset[2]:.4f})"
+    obstacle = blocking_object(sim.world, target)
+    if obstacle is not None:
+        raise ActionError(f"{obstacle} is blocking Agent 0 from moving by {by}.")
+    if not sim.world.nav.can_walk((start[0], start[2]), (target[0], target[2])):
+        raise ActionError(
+            f"{nearest_name(sim.world, target)} is blocking Agent 0 from moving by {by}."
+        )
+    if not force and sim.world.held is not None and held_object_blocks(sim.world, target):
+        raise ActionError(f"{sim.world.held} is blocking Agent 0 from moving by {by}.")
+
+
+def _rotate(
+    sign: float,
+    sim: Simulation,
+    degrees: float | None = None,
+    speed: float = 1.0,
+    waitForFixedUpdate: bool = False,
+    returnToStart: bool = True,
+    disableRendering: bool = True,
+    manualInteract: bool = False,
+    forceAction: bool = False,
+) -> None:
+    # Unity takes 0 degrees, its default, for `rotateStepDegrees`.
+    amount = sim.settings.rotate_step if degrees is None or degrees == 0 else degrees
+    agent = sim.world.agent
+    # The second modulus turns a 360.0 that rounding produced into 0.
+    agent.yaw = round((agent.yaw + sign * amount) % 360.0, 6) % 360.0
+    sim.world.carry(manualInteract)
+
+
+for _name, _sign in (("RotateRight", 1.0), ("RotateLeft", -1.0)):
+    action(_name)(partial(_rotate, _sign))
+
+
+def _look(
+    name: str,
+    sign: float,
+    sim: Simulation,
+    degrees: float = 30.0,
+    forceAction: bool = False,
+    manualInteract: bool = False,
+) -> None:
+    if degrees < 0:
+        raise ActionError(
+            f"{name} action requires positive degree value. Invalid value used: {degrees}"
+        )
+    agent = sim.world.agent
+    target = round(agent.horizon + sign * degrees, 4)
+    if target > MAX_DOWN:
+        text = f"can't look down beyond {MAX_DOWN:g} degrees below the forward horizon"
+        raise ActionError(text, ErrorCode.LOOK_DOWN_LIMIT)
+    if target < -MAX_UP:
+        raise ActionError(
+            f"can't look up beyond {MAX_UP:g} degrees above the forward horizon",
+            ErrorCode.LOOK_UP_LIMIT,
+        )
+    agent.horizon = target
+    sim.world.carry(manualInteract)
+
+
+for _name, _sign in (("LookDown", 1.0), ("LookUp", -1.0)):
+    action(_name)(partial(_look, _name, _sign))
+
+
+@action("RotateLook")
+def rotate_look(sim: Simulation, rotation: Vector3 | None = None, horizon: float = 0.0) -> None:
+    """Turn the agent to a rotation and its camera to a horizon, whatever both were before."""
+    agent = sim.world.agent
+    agent.yaw = float((rotation or Vector3()).get("y", 0.0)) % 360.0
+    agent.horizon = float(horizon)
+    sim.world.carry()
+
+
+@action("Crouch")
+def crouch(sim: Simulation) -> None:
+    """Lower the camera."""
+    if not sim.world.agent.standing:
+        raise ActionError("Already crouching")
+    sim.world.agent.standing = False
+
+
+@action("Stand")
+def stand(sim: Simulation) -> None:
+    """Raise the camera again."""
+    if sim.world.agent.standing:
+        raise ActionError("Already standing")
+    sim.world.agent.standing = True
+
+
+@action("Pass", "Done", "NoOp", "Stop")
+def wait(sim: Simulation) -> None:
+    """Do nothing."""

@@ -1,0 +1,185 @@
+# ruff: noqa: SIM905 - tables of names read best as words
+"""The table of actions, and the checks of their arguments, which imitate Unity's dispatcher."""
+
+import inspect
+import json
+import types
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Concatenate, TypeGuard
+
+from infthor_sim.actions.signatures import type_name, unknown_arguments_text
+from infthor_sim.actions.vectors import Vector3
+from infthor_sim.errors import ActionError, ErrorCode
+from infthor_sim.settings import AGENT_MODES
+from infthor_sim.simulation import Simulation
+
+__all__ = ["Action", "Vector3", "action", "action_names", "bind", "is_vector"]
+
+# The client adds these to messages of any action; Unity reads them before it looks for the action's own arguments.
+_MESSAGE_KEYS = frozenset(
+    "action sequenceId agentId renderImage renderDepthImage renderClassImage renderObjectImage renderNormalsImage"
+    " renderFlowImage renderSemanticSegmentation renderInstanceSegmentation visibilityDistance fixedDeltaTime"
+    " physicsSimulationParams".split()
+)
+_LARGEST = 1e9  # of a number; squares of larger ones would overflow in the geometry
+
+
+ActionFunction = Callable[Concatenate[Simulation, ...], Any]
+Form = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Action:
+    """One action.
+
+    Attributes:
+        name: name on the wire.
+        run: function that takes the simulation and the wire's arguments by name.
+        parameters: parameters of `run` without the simulation; their annotations are the accepted types.
+        query: it changes nothing that is seen, so the client keeps its last frame.
+        lenient: unknown arguments are ignored, as in the actions that take Unity's whole ServerAction.
+        forms: alternative sets of required arguments, for actions that Unity overloads; empty for a single form.
+    """
+
+    name: str
+    run: ActionFunction
+    parameters: Mapping[str, inspect.Parameter]
+    query: bool
+    lenient: bool
+    forms: tuple[Form, ...] = ()
+
+
+_ACTIONS: dict[str, dict[str, Action]] = {mode: {} for mode in AGENT_MODES}
+
+
+def action(
+    *names: str,
+    query: bool = False,
+    lenient: bool = False,
+    forms: tuple[Form, ...] = (),
+    modes: tuple[str, ...] = AGENT_MODES,
+) -> Callable[[ActionFunction], ActionFunction]:
+    """Register a function as the action(s) `names` of some agent modes; see `Action`."""
+
+    def register(run: ActionFunction) -> ActionFunction:
+        parameters = dict(list(inspect.signature(run).parameters.items())[1:])
+        for name in names:
+            new = Action(name, run, parameters, query, lenient, forms)
+            for mode in modes:
+                # Unity's arm agents descend from the default one and override some of its actions. An action of
+                # some modes wins over one of all modes, whichever module is imported first.
+                if modes == AGENT_MODES:
+                    _ACTIONS[mode].setdefault(name, new)
+                else:
+                    _ACTIONS[mode][name] = new
+        return run
+
+    return register
+
+
+def action_names(mode: str = "default") -> list[str]:
+    """Return the names of an agent mode's actions, sorted."""
+    return sorted(_ACTIONS[mode])
+
+
+def bind(message: Mapping[str, Any], mode: str = "default") -> tuple[Action, dict[str, Any]]:
+    """Return the action that a message names in an agent mode, and its checked arguments.
+
+    Raises:
+        ActionError: no such action; an argument is unknown, missing or of the wrong type.
+    """
+    name = message.get("action")
+    called = _ACTIONS[mode].get(name) if isinstance(name, str) else None
+    if called is None:
+        raise ActionError(f"Invalid action: {name}", ErrorCode.INVALID_ACTION)
+    given = {
+        key: value
+        for key, value in message.items()
+        if key not in _MESSAGE_KEYS or key in called.parameters
+    }
+    # Of several forms the one is meant that most of the given arguments belong to; the first if they tie.
+    form = max(
+        called.forms, key=lambda form: sum(given.get(key) is not None for key in form), default=()
+    )
+    other_forms = {key for other in called.forms for key in other if key not in form}
+    unknown = [
+        key
+        for key in given
+        if key not in called.parameters or (key in other_forms and given[key] is not None)
+    ]
+    if unknown and not called.lenient:
+        text = unknown_arguments_text(called.name, unknown, called.parameters, given)
+        raise ActionError(text, ErrorCode.INVALID_ARGUMENT)
+    arguments = {key: value for key, value in given.items() if key in called.parameters}
+    for key, value in arguments.items():
+        _check_type(called, key, value)
+    required = [
+        k for k, p in called.parameters.items() if k in form or p.default is inspect.Parameter.empty
+    ]
+    missing = [key for key in required if arguments.get(key) is None]
+    if missing:
+        raise ActionError(
+            f"action: {called.name} is missing the following arguments: {','.join(missing)}",
+            ErrorCode.MISSING_ARGUMENTS,
+        )
+    return called, arguments
+
+
+def _check_type(called: Action, key: str, value: Any) -> None:
+    """Refuse an argument of the wrong type.
+
+    Raises:
+        ActionError: with a code only where Unity has one, as the client raises ValueError by the code.
+    """
+    annotation = called.parameters[key].annotation
+    if _matches(value, annotation):
+        return
+    expected, given = type_name(annotation), value if isinstance(value, str) else json.dumps(value)
+    # Unity's dispatcher converts scalars itself and reports a code. A scalar in place of a vector or list fails
+    # earlier, in its JSON parser, without a code.
+    if _is_structured(annotation) and not isinstance(value, dict | list):
+        raise ActionError(f"Error converting value {given} to type '{expected}'. Path '{key}'.")
+    raise ActionError(
+        f"action: {called.name} has an invalid argument: {key} (=={given}). Cannot convert to: {expected}",
+        ErrorCode.INVALID_ARGUMENT,
+    )
+
+
+def _is_structured(annotation: Any) -> bool:
+    """Return whether values of this type are objects or lists in JSON."""
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin in (types.UnionType, typing.Union):
+        return any(_is_structured(option) for option in inner)
+    return annotation is Vector3 or origin is list
+
+
+def _matches(value: Any, annotation: Any) -> bool:
+    """Return whether a JSON value is of a parameter's type; stricter than Unity: "1" is no number, 1 no boolean."""
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if annotation is Any or annotation is types.NoneType:
+        return annotation is Any or value is None
+    if origin in (types.UnionType, typing.Union):
+        return any(_matches(value, option) for option in inner)
+    if annotation is Vector3:
+        return is_vector(value)
+    if annotation in (int, float):
+        return _is_number(value) and (annotation is float or value == int(value))
+    if origin is list:
+        return isinstance(value, list) and all(_matches(v, inner[0]) for v in value)
+    return isinstance(value, origin or annotation)
+
+
+def is_vector(value: Any) -> TypeGuard[dict[str, float]]:
+    """Return whether a JSON value is a vector: {"x", "y", "z"}, where what is absent is 0."""
+    return (
+        isinstance(value, dict)
+        and set(value) <= set("xyz")
+        and all(_is_number(v) for v in value.values())
+    )
+
+
+def _is_number(value: Any) -> bool:
+    """Return whether a value is a finite number of usable size; JSON as Python reads it has NaN and infinities."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST

@@ -1,0 +1,95 @@
+"""Starting scenes: Reset, Initialize, CreateHouse."""
+
+from typing import Any
+
+from infthor_eval.errors import DataError
+from infthor_sim.actions.registry import action
+from infthor_sim.errors import ActionError, ErrorCode
+from infthor_sim.render.camera import FAR, NEAR
+from infthor_sim.settings import AGENT_MODES, SimulatorSettings
+from infthor_sim.simulation import Simulation
+
+
+@action("Reset")
+def reset(sim: Simulation, sceneName: str) -> None:
+    """Load a scene by name."""
+    try:
+        world = sim.catalogue.load(sceneName)
+    except DataError as error:
+        sim.failed_reset = str(error)
+        raise ActionError(str(error)) from error
+    sim.failed_reset = ""
+    sim.settings = SimulatorSettings()
+    sim.display.map_view = False
+    sim.load(world)
+
+
+@action("Initialize", lenient=True)
+def initialize(
+    sim: Simulation,
+    agentMode: str = "default",
+    gridSize: float = 0.25,
+    snapToGrid: bool = True,
+    rotateStepDegrees: float = 90.0,
+    visibilityDistance: float = 1.5,
+    fieldOfView: float = 90.0,
+    renderDepthImage: bool = False,
+    renderNormalsImage: bool = False,
+    renderInstanceSegmentation: bool = False,
+    renderObjectImage: bool = False,
+    renderSemanticSegmentation: bool = False,
+    renderClassImage: bool = False,
+    fastActionEmit: bool = True,
+    agentCount: int = 1,
+    massThreshold: float | None = None,
+) -> dict[str, float]:
+    """Set up the agent; arguments that only Unity knows are ignored, as Unity ignores unknown ones here."""
+    # The client does not look at the reply to Reset, but raises on the reply to Initialize that it sends next.
+    if sim.failed_reset:
+        raise ActionError(sim.failed_reset)
+    if agentMode.lower() not in AGENT_MODES:
+        raise ActionError(
+            f"agentMode {agentMode!r} is not offered by the embedded simulator; use one of {', '.join(AGENT_MODES)}"
+        )
+    _check(agentCount == 1, f"agentCount must be 1, not {agentCount}")
+    _check(gridSize > 0, f"gridSize must be positive, not {gridSize}")
+    _check(rotateStepDegrees > 0, f"rotateStepDegrees must be positive, not {rotateStepDegrees}")
+    _check(
+        0 < fieldOfView < 180, f"fieldOfView must be in (0, 180) noninclusive, not {fieldOfView}"
+    )
+    _check(
+        visibilityDistance >= 0, f"visibilityDistance must be at least 0, not {visibilityDistance}"
+    )
+    if massThreshold is not None and massThreshold <= 0:
+        raise ActionError(f"massThreshold must have nonzero value - invalid value: {massThreshold}")
+    settings = SimulatorSettings(
+        agent_mode=agentMode.lower(),
+        mass_threshold=massThreshold,
+        grid_size=float(gridSize),
+        snap_to_grid=snapToGrid,
+        rotate_step=float(rotateStepDegrees),
+        visibility_distance=float(visibilityDistance),
+        field_of_view=float(fieldOfView),
+        depth=renderDepthImage,
+        normals=renderNormalsImage,
+        instances=renderInstanceSegmentation or renderObjectImage,
+        classes=renderSemanticSegmentation or renderClassImage,
+        fast_emit=fastActionEmit,
+    )
+    sim.configure(settings)
+    return {"cameraNearPlane": NEAR, "cameraFarPlane": FAR}
+
+
+@action("CreateHouse")
+def create_house(sim: Simulation, house: dict[str, Any]) -> None:
+    """Build a ProcTHOR house from its JSON."""
+    try:
+        world = sim.catalogue.house(house)
+    except DataError as error:
+        raise ActionError(str(error)) from error
+    sim.load(world)
+
+
+def _check(holds: bool, message: str) -> None:
+    if not holds:
+        raise ActionError(message, ErrorCode.INVALID_ARGUMENT)

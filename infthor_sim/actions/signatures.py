@@ -1,0 +1,46 @@
+"""The words of messages about wrong arguments: parameters by the names and types that Unity prints."""
+
+import inspect
+import types
+import typing
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from infthor_sim.actions.vectors import Vector3
+
+__all__ = ["type_name", "unknown_arguments_text"]
+
+_SCALARS = {int: "int", float: "float", str: "String", bool: "Boolean", Vector3: "Vector3"}
+
+
+def type_name(annotation: Any) -> str:
+    """Return Unity's name of a type; an optional type is called as its value."""
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin in (types.UnionType, typing.Union):
+        return type_name(next(option for option in inner if option is not types.NoneType))
+    if origin is list:
+        return f"{type_name(inner[0])}[]"
+    return _SCALARS.get(annotation, "Object")
+
+
+def unknown_arguments_text(
+    name: str, unknown: Sequence[str], parameters: Mapping[str, inspect.Parameter], given: Any
+) -> str:
+    """Return Unity's message about arguments that an action does not take, with those that it does."""
+    plural = "s" if len(unknown) > 1 else ""
+    expected = ", ".join(_parameter_text(parameter) for parameter in parameters.values())
+    return (
+        f'\n\tAction: "{name}" called with invalid argument{plural}: {_quote(unknown)}'
+        f"\n\tExpected arguments: {expected}\n\tYour arguments: {_quote(given)}"
+    )
+
+
+def _parameter_text(parameter: inspect.Parameter) -> str:
+    text = f"{type_name(parameter.annotation)} {parameter.name}"
+    if parameter.default is inspect.Parameter.empty:
+        return text
+    return f"{text} = {'' if parameter.default is None else parameter.default}"
+
+
+def _quote(names: Any) -> str:
+    return ", ".join(f"'{name}'" for name in names)

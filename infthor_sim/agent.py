@@ -1,0 +1,58 @@
+"""The agent's body: its position, the direction it looks in, and its grip on an object."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from infthor_sim.geometry import Array, euler_matrix, yaw_matrix
+
+__all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "CROUCH", "MAX_DOWN", "MAX_UP", "Agent", "Grip"]
+
+AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
+CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
+MAX_DOWN, MAX_UP = 60.0, 30.0  # degrees that the camera tilts below and above the horizon
+CROUCH = 0.35  # metres that crouching lowers the camera
+
+
+@dataclass
+class Agent:
+    """The agent.
+
+    Attributes:
+        position: metres (3,).
+        yaw: direction, degrees clockwise from +z.
+        horizon: tilt of the camera below the horizon, degrees.
+        standing: not crouching.
+        eye: camera relative to the agent's position (right, up, ahead), metres; the stretch robot's is off centre.
+        crouch: metres that crouching lowers the camera; 0 for a robot that cannot crouch.
+    """
+
+    position: Array
+    yaw: float = 0.0
+    horizon: float = 0.0
+    standing: bool = True
+    eye: tuple[float, float, float] = (0.0, CAMERA_HEIGHT, 0.0)
+    crouch: float = CROUCH
+
+    def camera_position(self) -> Array:
+        """Return the position of the camera in the world, metres (3,)."""
+        lift = self.eye[1] if self.standing else self.eye[1] - self.crouch
+        aside = yaw_matrix(self.yaw) @ np.array([self.eye[0], 0.0, self.eye[2]])
+        return self.position + aside + np.array([0.0, lift, 0.0])
+
+    def camera_matrix(self) -> Array:
+        """Return the rotation matrix (3, 3) of the camera."""
+        return euler_matrix((self.horizon, self.yaw, 0.0))
+
+
+@dataclass(frozen=True)
+class Grip:
+    """Pose of a held object relative to what holds it: the camera, or the wrist of an arm.
+
+    Attributes:
+        offset: the object's origin, metres (3,).
+        turn: the object's rotation (3, 3).
+    """
+
+    offset: Array
+    turn: Array

@@ -1,0 +1,198 @@
+"""The metadata of AI2-THOR 5.x, for one object and for the agent, as plain values."""
+
+import re
+from typing import Any
+
+import numpy as np
+
+from infthor_sim.arm.metadata import arm_metadata
+from infthor_sim.geometry import Array, corners, matrix_euler, round_vector, round_xyz
+from infthor_sim.objects import DOOR_SWING, SimObject
+from infthor_sim.physics.obstacles import door_leaf
+from infthor_sim.pictures.cameras import ThirdPartyCamera
+from infthor_sim.simulation import Simulation
+from infthor_sim.world import World
+
+__all__ = ["Outcome", "agent_metadata", "object_metadata", "third_party_metadata"]
+
+_ITHOR = re.compile(r"FloorPlan\d+")
+_LEGACY: dict[str, Any] = {
+    "colorBounds": None, "visibleRange": None, "flatSurfacesOnGrid": [], "distances": [], "normals": [],
+    "isOpenableGrid": [], "segmentedObjectIds": [], "objectIdsInBox": [], "actionIntReturn": 0,
+    "actionFloatReturn": 0.0, "actionFloatsReturn": [], "actionStringsReturn": [], "actionVector3sReturn": [],
+}  # fmt: skip
+"""Keys of old actions, which Unity sends empty with every reply."""
+
+
+class Outcome:
+    """The outcome of the last action.
+
+    Args:
+        action: name of the action.
+        error: message of the failure; empty for success.
+        code: error code; empty where Unity has none.
+        value: what the action returned.
+    """
+
+    def __init__(self, action: str, error: str = "", code: str = "", value: Any = None) -> None:
+        self.action, self.error, self.code, self.value = action, error, code, value
+
+    def fields(self) -> dict[str, Any]:
+        """Return the metadata's fields about the last action."""
+        return {
+            "lastAction": self.action,
+            "lastActionSuccess": not self.error,
+            "errorMessage": self.error,
+            "errorCode": self.code or None,  # Unity sends null and not an empty text
+            "actionReturn": self.value,
+        }
+
+
+def object_metadata(item: SimObject) -> dict[str, Any]:
+    """Return all fields of one object but those that depend on the agent: `visible`, `isInteractable`, `distance`."""
+    abilities, state = item.type, item.state
+    movable = abilities.pickupable or abilities.moveable
+    return {
+        "name": item.name,
+        "position": round_xyz(item.position),
+        "rotation": round_xyz(item.rotation),
+        "receptacle": abilities.receptacle,
+        "toggleable": abilities.toggleable,
+        "isToggled": abilities.toggleable and state.toggled,
+        "breakable": abilities.breakable,
+        "isBroken": state.broken,
+        "canFillWithLiquid": abilities.fillable,
+        "isFilledWithLiquid": state.fill_liquid is not None,
+        "fillLiquid": state.fill_liquid,
+        "dirtyable": abilities.dirtyable,
+        "isDirty": state.dirty,
+        "canBeUsedUp": abilities.usable_up,
+        "isUsedUp": state.used_up,
+        "cookable": abilities.cookable,
+        "isCooked": state.cooked,
+        "temperature": state.temperature,
+        "isHeatSource": abilities.heat_source,
+        "isColdSource": abilities.cold_source,
+        "sliceable": abilities.sliceable,
+        "isSliced": state.sliced,
+        "openable": abilities.openable,
+        "isOpen": state.openness > 0,
+        "openness": state.openness,
+        "pickupable": abilities.pickupable,
+        "isPickedUp": state.picked_up,
+        "moveable": abilities.moveable,
+        "mass": abilities.mass,
+        "salientMaterials": list(abilities.materials) if movable else None,
+        "receptacleObjectIds": list(item.contents) if abilities.receptacle else None,
+        "objectType": item.object_type,
+        "objectId": item.object_id,
+        "assetId": item.asset_id,
+        "parentReceptacles": None if item.parent is None else [item.parent],
+        "controlledObjects": list(item.controls) or None,
+        "isMoving": False,
+        "axisAlignedBoundingBox": _axis_aligned(item),
+        # Null for fixed things, as in Unity.
+        "objectOrientedBoundingBox": {
+            "cornerPoints": [round_vector(c) for c in _corners_with_lid(item)]
+        }
+        if movable
+        else None,
+    }
+
+
+def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
+    """Return the fields of the agent, of the scene and of the last action: all but `objects` and `colors`."""
+    world, agent = sim.world, sim.world.agent
+    held = None if world.held is None else world.objects[world.held]
+    low, high = world.scene_bounds()
+    pose = _hand_pose(world)
+    return {
+        **_LEGACY,
+        **outcome.fields(),
+        "isSceneAtRest": True,
+        "agent": {
+            "name": "agent",
+            "position": round_xyz(agent.position),
+            "rotation": {"x": 0.0, "y": agent.yaw, "z": 0.0},
+            "cameraHorizon": agent.horizon,
+            "isStanding": agent.standing,
+            "inHighFrictionArea": False,
+        },
+        "heldObjectPose": pose,
+        "hand": pose,
+        "arm": None if world.arm is None else arm_metadata(world, world.arm),
+        "fov": sim.settings.field_of_view,
+        "cameraPosition": round_xyz(agent.camera_position()),
+        "cameraOrthSize": 0.0,
+        "thirdPartyCameras": [
+            third_party_metadata(index, camera) for index, camera in enumerate(sim.cameras)
+        ],
+        "collided": False,
+        "collidedObjects": [],
+        "inventoryObjects": []
+        if held is None
+        else [{"objectId": held.object_id, "objectType": held.object_type}],
+        # As in Unity, iTHOR's floor plans go by the name of their physics scene.
+        "sceneName": f"{world.scene}_physics" if _ITHOR.fullmatch(world.scene) else world.scene,
+        "screenWidth": sim.display.width,
+        "screenHeight": sim.display.height,
+        "agentId": 0,
+        "depthFormat": "Meters",
+        "currentTime": 0.0,
+        "sceneBounds": _box((low + high) / 2, high - low),
+    }
+
+
+def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]:
+    """Return the pose of one third-party camera."""
+    return {
+        "thirdPartyCameraId": index,
+        "position": round_xyz(camera.position),
+        "rotation": round_xyz(camera.rotation),
+        "fieldOfView": camera.field_of_view,
+    }
+
+
+def _hand_pose(world: World) -> dict[str, Any]:
+    """Return the hand's pose in the world and in the camera's frame; all zeros where nothing is held.
+
+    AI2-THOR calls it the held object's, but it is the hand's: 0 in the camera's frame until the hand is turned,
+    however the object lies in it.
+    """
+    if world.held is None:
+        return dict.fromkeys(
+            ("position", "rotation", "localPosition", "localRotation"), round_xyz(np.zeros(3))
+        )
+    agent, hand = world.agent, world.hand
+    camera = agent.camera_matrix()
+    return {
+        "position": round_xyz(agent.camera_position() + camera @ hand.offset),
+        "rotation": round_xyz(matrix_euler(camera @ hand.turn)),
+        "localPosition": round_xyz(hand.offset),
+        "localRotation": round_xyz(matrix_euler(hand.turn)),
+    }
+
+
+def _corners_with_lid(item: SimObject) -> Array:
+    """Return the 8 corners (8, 3) of an object's box, turned with it, which is higher by what its open lid stands up.
+
+    Only the metadata has the higher box: the lid's room is above the object's back and keeps nothing from its top.
+    """
+    lid = item.type.lid * float(item.front_size[2])
+    rise = np.array([0.0, lid * np.sin(np.radians(DOOR_SWING * item.state.openness)), 0.0])
+    return corners(item.center + item.matrix @ rise / 2, item.box_size + rise, item.matrix)
+
+
+def _axis_aligned(item: SimObject) -> dict[str, Any]:
+    """Return the box around an object and its open lid, door or drawer."""
+    points = _corners_with_lid(item)
+    low, high = points.min(axis=0), points.max(axis=0)
+    leaf = door_leaf(item) if item.state.openness > 0 else None
+    if leaf is not None:
+        low, high = np.minimum(low, leaf[0]), np.maximum(high, leaf[1])
+    return _box((low + high) / 2, high - low)
+
+
+def _box(center: Any, size: Any) -> dict[str, Any]:
+    points = [round_vector(point) for point in corners(center, size)]
+    return {"cornerPoints": points, "center": round_xyz(center), "size": round_xyz(size)}

@@ -1,0 +1,1 @@
+"""What is solid, what is free, what falls and slides: rules on the boxes and parts of objects."""

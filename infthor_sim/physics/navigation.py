@@ -1,0 +1,149 @@
+"""The cells of 0.25 m that the agent can stand on, from recordings or from the free floor of a procedural room."""
+
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from infthor_sim.geometry import Array
+
+__all__ = ["CELL", "NavGrid"]
+
+CELL = 0.25  # metres
+_SAME = 1e-3  # metres between two positions that count as one
+_TOLERANCE = 0.06  # metres that a recorded position may be off its cell's centre, by rounding in the recordings
+
+
+class NavGrid:
+    """The cells of one scene.
+
+    Args:
+        points: (x, z) positions in metres where the agent can stand; whole cells apart.
+    """
+
+    def __init__(self, points: Iterable[tuple[float, float]]) -> None:
+        # Keys are whole multiples of `CELL` from the first point's own offset: a recording's grid need not pass through
+        # the origin.
+        listed = [(float(x), float(z)) for x, z in points]
+        first = listed[0] if listed else (0.0, 0.0)
+        self._offset = (_phase(first[0]), _phase(first[1]))
+        self._cells = {self._key(x, z): (x, z) for x, z in sorted(listed)}
+
+    def __len__(self) -> int:
+        return len(self._cells)
+
+    def __iter__(self) -> Iterator[tuple[float, float]]:
+        return iter(self._cells.values())
+
+    def can_stand(self, x: float, z: float) -> bool:
+        """Return whether the agent can stand at (x, z): its cell is one of the grid's, and its centre near enough."""
+        cell = self._cells.get(self._key(x, z))
+        return cell is not None and max(abs(cell[0] - x), abs(cell[1] - z)) <= CELL / 2 + _TOLERANCE
+
+    def nearest(self, x: float, z: float) -> tuple[float, float]:
+        """Return the cell nearest to (x, z)."""
+        # The cell itself breaks ties, so that the order of the points does not matter.
+        return min(
+            self._cells.values(), key=lambda cell: ((cell[0] - x) ** 2 + (cell[1] - z) ** 2, cell)
+        )
+
+    def can_walk(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
+        """Return whether the agent can stand all along the straight way from `start` to `end`, checked each 0.1 m."""
+        steps = max(1, math.ceil(math.dist(start, end) / 0.1))
+        return all(
+            self.can_stand(
+                start[0] + (end[0] - start[0]) * i / steps,
+                start[1] + (end[1] - start[1]) * i / steps,
+            )
+            for i in range(1, steps + 1)
+        )
+
+    def reachable_cells(self, x: float, z: float) -> list[tuple[float, float]]:
+        """Return the cells connected to the one at (x, z) by steps of one cell, sorted."""
+        return sorted(self._cells[key] for key in self._distances(x, z))
+
+    def reachable_points(
+        self, x: float, z: float, size: float, yaw: float
+    ) -> list[tuple[float, float]]:
+        """Return the points reachable from (x, z) by steps of `size` metres along axes turned by `yaw`, sorted."""
+        # Steps of one cell from a cell reach cells: quicker, and the points are those of the grid to the last bit.
+        start = self._cells.get(self._key(x, z))
+        if (
+            size == CELL
+            and yaw % 90 == 0
+            and start is not None
+            and math.dist(start, (x, z)) < _SAME
+        ):
+            return self.reachable_cells(x, z)
+        ahead = (math.sin(math.radians(yaw)) * size, math.cos(math.radians(yaw)) * size)
+        reached = {(0, 0): (x, z)}  # by whole steps aside and ahead
+        queue = deque(reached)
+        while queue:
+            key = queue.popleft()
+            for other in _neighbours(key):
+                point = (
+                    x + other[0] * ahead[1] + other[1] * ahead[0],
+                    z - other[0] * ahead[0] + other[1] * ahead[1],
+                )
+                if other not in reached and self.can_walk(reached[key], point):
+                    reached[other] = point
+                    queue.append(other)
+        return sorted((round(px, 6), round(pz, 6)) for px, pz in reached.values())
+
+    def path(
+        self, start: tuple[float, float], end: tuple[float, float]
+    ) -> list[tuple[float, float]] | None:
+        """Return a shortest path of cells from `start` to the cell of `end`; None if there is none."""
+        distances = self._distances(*end)
+        key = self._key(*start)
+        if key not in distances:
+            return None
+        cells = [key]
+        while distances[key]:
+            # Of several neighbours that are one step nearer the smallest is taken: the path is always the same one.
+            key = min(k for k in _neighbours(key) if distances.get(k) == distances[key] - 1)
+            cells.append(key)
+        return [self._cells[k] for k in cells]
+
+    def count_free_ahead(self, x: float, z: float, yaw: float, reach: float = 1.25) -> int:
+        """Return the number of cells within `reach` metres ahead of (x, z), in a cone towards `yaw` (degrees)."""
+        if not self._cells:
+            return 0
+        cells: Array = np.array(list(self._cells.values()))
+        offset = cells - (x, z)
+        angle = math.radians(yaw)
+        ahead = offset @ (math.sin(angle), math.cos(angle))
+        aside = np.abs(offset @ (math.cos(angle), -math.sin(angle)))
+        return int(np.sum((ahead > 0.05) & (ahead <= reach) & (aside <= 0.3 + ahead * 0.4)))
+
+    def freest_yaw(self, x: float, z: float, reach: float = 1.25) -> float:
+        """Return the yaw (0, 90, 180 or 270 degrees) with the most cells ahead of (x, z); see `count_free_ahead`."""
+        return max(
+            (0.0, 90.0, 180.0, 270.0), key=lambda yaw: self.count_free_ahead(x, z, yaw, reach)
+        )
+
+    def _key(self, x: float, z: float) -> tuple[int, int]:
+        return round((x - self._offset[0]) / CELL), round((z - self._offset[1]) / CELL)
+
+    def _distances(self, x: float, z: float) -> dict[tuple[int, int], int]:
+        """Return the steps to every cell that is connected to the one at (x, z), by key."""
+        start = self._key(x, z)
+        distances = {start: 0} if start in self._cells else {}
+        queue = deque(distances)
+        while queue:
+            key = queue.popleft()
+            for other in _neighbours(key):
+                if other in self._cells and other not in distances:
+                    distances[other] = distances[key] + 1
+                    queue.append(other)
+        return distances
+
+
+def _neighbours(key: tuple[int, int]) -> list[tuple[int, int]]:
+    return [(key[0] + 1, key[1]), (key[0] - 1, key[1]), (key[0], key[1] + 1), (key[0], key[1] - 1)]
+
+
+def _phase(value: float) -> float:
+    """Return the offset of a grid that passes through `value` from one that passes through 0."""
+    return value - round(value / CELL) * CELL

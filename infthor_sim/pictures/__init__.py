@@ -1,0 +1,1 @@
+"""What cameras see: views, colours of instances, visibility."""

@@ -1,0 +1,51 @@
+"""Colours of objects and classes in the segmentation frames; the same name always has the same colour."""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infthor_eval.storage.digests import digest
+from infthor_sim.render.picture import Picture
+from infthor_sim.world import World
+
+__all__ = ["class_color", "class_image", "instance_color", "instance_image"]
+
+
+@lru_cache(maxsize=65536)
+def instance_color(object_id: str) -> tuple[int, int, int]:
+    """Return the colour of one object."""
+    return _color("instance", object_id)
+
+
+@lru_cache(maxsize=4096)
+def class_color(name: str) -> tuple[int, int, int]:
+    """Return the colour of one object type."""
+    return _color("class", name)
+
+
+def instance_image(picture: Picture) -> NDArray[np.uint8]:
+    """Return the instance frame (h, w, 4) RGBA, bottom row first; walls have the colour of their class."""
+    colors = [instance_color(name) if "|" in name else class_color(name) for name in picture.names]
+    return _paint(picture, colors)
+
+
+def class_image(picture: Picture, world: World) -> NDArray[np.uint8]:
+    """Return the class frame (h, w, 4) RGBA, bottom row first."""
+    colors = [
+        class_color(world.objects[n].object_type if n in world.objects else n)
+        for n in picture.names
+    ]
+    return _paint(picture, colors)
+
+
+def _paint(picture: Picture, colors: list[tuple[int, int, int]]) -> NDArray[np.uint8]:
+    # The void, instance -1, takes the last entry: black. One lookup of 32-bit words is faster than one of four bytes.
+    table = np.array([(*color, 255) for color in [*colors, (0, 0, 0)]], dtype=np.uint8)
+    packed = table.view(np.uint32).ravel()
+    return packed[picture.instances].view(np.uint8).reshape(*picture.instances.shape, 4)
+
+
+def _color(namespace: str, name: str) -> tuple[int, int, int]:
+    red, green, blue = bytes.fromhex(digest(f"{namespace}:{name}", 3))
+    return red, green, max(blue, 1)  # never black, which is the void

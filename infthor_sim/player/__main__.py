@@ -1,0 +1,70 @@
+"""`python -m infthor_sim [--data DIR] [--supplement FILE] <arguments of a Unity player>`.
+
+The Controller starts this process as if it were Unity and names the pipes in the environment. Of Unity's own
+arguments only the screen's size and the quality have an effect.
+"""
+
+import os
+import sys
+from argparse import ArgumentParser
+from contextlib import closing
+from pathlib import Path
+
+__all__ = ["main"]
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the simulator until the controller hangs up; return the exit code."""
+    # Both must be set before numba is imported, hence the imports below. OpenMP's threads must not spin between frames:
+    # the controller needs the core meanwhile. At most four threads, as several simulators often share a machine.
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    os.environ.setdefault("NUMBA_NUM_THREADS", str(min(4, os.cpu_count() or 1)))
+    from infthor_eval.errors import InfthorError
+    from infthor_sim.pictures.views import Display
+    from infthor_sim.player.fifo import FifoPipes
+    from infthor_sim.player.server import SimulatorServer
+    from infthor_sim.scenes.catalogue import Catalogue
+    from infthor_sim.settings import SMOOTH_LEVELS
+    from infthor_sim.simulation import Simulation
+
+    parser = ArgumentParser(
+        prog="python -m infthor_sim",
+        description="The embedded simulator that takes the place of AI2-THOR's Unity build",
+        add_help=False,
+    )
+    parser.add_argument("--data", type=Path)
+    parser.add_argument("--supplement", type=Path)
+    parser.add_argument("-screen-width", dest="width", type=int, default=300)
+    parser.add_argument("-screen-height", dest="height", type=int, default=300)
+    parser.add_argument("-screen-quality", dest="quality", type=int, default=max(SMOOTH_LEVELS))
+    options, _ = parser.parse_known_args(arguments)
+    try:
+        paths = _pipe("AI2THOR_FIFO_SERVER_PIPE_PATH"), _pipe("AI2THOR_FIFO_CLIENT_PIPE_PATH")
+        with closing(FifoPipes(*paths)) as pipes:
+            display = Display(
+                options.width, options.height, antialias=options.quality in SMOOTH_LEVELS
+            )
+            sim = Simulation(Catalogue(options.data, options.supplement), display)
+            SimulatorServer(sim).serve(pipes)
+    except BrokenPipeError:
+        return 0  # the controller went away while a reply was under way
+    except InfthorError as error:
+        print(f"infthor_sim: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+def _pipe(variable: str) -> Path:
+    from infthor_eval.errors import UsageError
+
+    path = os.environ.get(variable)
+    if not path:
+        raise UsageError(
+            f"{variable} is not set: ai2thor's Controller starts this process (local_executable_path, FIFO server);"
+            " it cannot be started by hand"
+        )
+    return Path(path)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

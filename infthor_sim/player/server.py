@@ -1,0 +1,103 @@
+"""The process's loop: receive an action, run it, reply with the metadata and the requested pictures."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from infthor_sim.actions import bind
+from infthor_sim.effects import apply_sources
+from infthor_sim.errors import ActionError, ErrorCode
+from infthor_sim.metadata import Outcome
+from infthor_sim.pictures.instances import class_image, instance_image
+from infthor_sim.player.fifo import FieldType, FifoPipes
+from infthor_sim.player.packing import MetadataPacker
+from infthor_sim.render.normals import normal_image
+from infthor_sim.render.picture import Picture
+from infthor_sim.simulation import Simulation
+
+__all__ = ["SimulatorServer"]
+
+Frames = Iterator[tuple[FieldType, bytes | memoryview]]
+_AGENT = (FieldType.RGB, FieldType.DEPTH, FieldType.NORMALS, FieldType.IDS, FieldType.CLASSES)
+_THIRD = (
+    FieldType.THIRD_PARTY_RGB,
+    FieldType.THIRD_PARTY_DEPTH,
+    FieldType.THIRD_PARTY_NORMALS,
+    FieldType.THIRD_PARTY_IDS,
+    FieldType.THIRD_PARTY_CLASSES,
+)
+
+
+class SimulatorServer:
+    """Answers one controller until it hangs up."""
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+        self._packer = MetadataPacker()
+
+    def serve(self, pipes: FifoPipes) -> None:
+        """Send the first state, then one reply to each action."""
+        # The client waits for a state before it sends its first action, as Unity sends one when it has started.
+        pipes.send(self._reply(Outcome("Initialize"), 0, {}))
+        while (message := pipes.receive()) is not None:
+            pipes.send(self.answer(message))
+
+    def answer(self, message: Mapping[str, Any]) -> Frames:
+        """Run one action and return the frames of the reply, which are made as they are asked for.
+
+        So the client reads the metadata while the pictures are drawn.
+        """
+        sequence = int(message.get("sequenceId", 0))
+        outcome, query = self.run(message)
+        # Unity's fast emit: after a query the client keeps its last frame and gets only what the action returned.
+        if query and self._sim.settings.fast_emit:
+            return iter([(FieldType.METADATA_PATCH, self._packer.patch(outcome))])
+        return self._reply(outcome, sequence, message)
+
+    def run(self, message: Mapping[str, Any]) -> tuple[Outcome, bool]:
+        """Run one action; return its outcome, and whether it succeeded as a query."""
+        name = str(message.get("action"))
+        try:
+            if message.get("renderFlowImage"):
+                raise ActionError(
+                    "renderFlowImage is not offered by the embedded simulator",
+                    ErrorCode.INVALID_ARGUMENT,
+                )
+            action, arguments = bind(message, self._sim.settings.agent_mode)
+            value = action.run(self._sim, **arguments)
+            if not action.query:
+                apply_sources(self._sim.world)
+            return Outcome(name, value=value), action.query
+        except ActionError as error:
+            return Outcome(name, error.message, str(error.code)), False
+
+    def _reply(self, outcome: Outcome, sequence: int, message: Mapping[str, Any]) -> Frames:
+        sim = self._sim
+        # An argument of the action decides about its own reply, else what Initialize set.
+        requested = {
+            "rgb": message.get("renderImage", True),
+            "depth": message.get("renderDepthImage", sim.settings.depth),
+            "normals": message.get("renderNormalsImage", sim.settings.normals),
+            "ids": message.get("renderInstanceSegmentation", sim.settings.instances),
+            "classes": message.get("renderSemanticSegmentation", sim.settings.classes),
+        }
+        segmented = bool(requested["ids"] or requested["classes"])
+        yield FieldType.METADATA, self._packer.message(sim, outcome, sequence, segmented)
+        yield from self._pictures(sim.views.agent_frame(), requested, _AGENT)
+        for camera in sim.cameras:
+            yield from self._pictures(sim.views.third_party(camera), requested, _THIRD)
+
+    def _pictures(
+        self, picture: Picture, requested: Mapping[str, Any], field_types: tuple[FieldType, ...]
+    ) -> Frames:
+        if requested["rgb"]:
+            yield field_types[0], self._sim.views.colours(picture).data
+        if requested["depth"]:
+            yield field_types[1], picture.depth.astype(np.float32).data
+        if requested["normals"]:
+            yield field_types[2], normal_image(picture).data
+        if requested["ids"]:
+            yield field_types[3], instance_image(picture).data
+        if requested["classes"]:
+            yield field_types[4], class_image(picture, self._sim.world).data

@@ -1,0 +1,173 @@
+"""Rearranging a scene's loose objects, to recorded poses or at random."""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from infthor_eval.formats.object_ids import modern_type
+from infthor_sim.default_objects import default_object
+from infthor_sim.geometry import Array, object_id
+from infthor_sim.object_types import ObjectType, allowed_in, type_named
+from infthor_sim.objects import SimObject
+from infthor_sim.physics.free_places import find_place
+from infthor_sim.physics.receptacles import find_parent
+from infthor_sim.world import World
+
+__all__ = ["NamedPose", "assign_parents", "set_poses", "spawn_randomly"]
+
+_SUNK = 0.2  # metres below a surface; what lies deeper is inside the furniture
+
+
+@dataclass(frozen=True)
+class NamedPose:
+    """A pose for one object, as AI2-THOR's SetObjectPoses takes it.
+
+    Attributes:
+        name: AI2-THOR's name of the object.
+        position: metres (3,).
+        rotation: Unity's Euler angles in degrees (3,).
+    """
+
+    name: str
+    position: Array
+    rotation: Array
+
+
+def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
+    """Give the named objects new poses, and new ids made of the poses; loose objects that are not named vanish.
+
+    A name that the scene does not have means any object of its type: the part of a name after the type differs between
+    versions of AI2-THOR.
+    """
+    chooser = _Templates(world)
+    world.release()
+    for item in [o for o in world.objects.values() if o.type.pickupable]:
+        world.remove(item)
+    for pose in poses:
+        template = chooser.choose(pose.name)
+        if template is None:
+            continue
+        if not template.type.pickupable:
+            if not keep_moveable:
+                world.set_pose(template, pose.position, pose.rotation)
+            continue
+        item = template.duplicate(_unused_id(world, pose.name.split("_", 1)[0], pose.position))
+        item.name, item.position, item.rotation = (
+            pose.name,
+            pose.position.copy(),
+            pose.rotation.copy(),
+        )
+        item.state.picked_up = False
+        world.add(item)
+    assign_parents(world)
+    _lower_supports(world)
+
+
+def _lower_supports(world: World) -> None:
+    """Lower surfaces that the placed objects would be sunk in: their poses are more exact than recorded boxes."""
+    for item in world.objects.values():
+        if not _has_surface(item.type):
+            continue
+        bottoms = [float(o.bounds()[0][1]) for o in world.children(item)]
+        level = item.surface_height()
+        lowest = min(bottoms, default=level)
+        if level - _SUNK < lowest < level - 0.002:
+            item.support = lowest - 0.002 - float(item.bounds()[0][1])
+            world.mark_changed(item)
+
+
+def _has_surface(furniture: ObjectType) -> bool:
+    """Return whether things stand on it, and not in it."""
+    hollow = furniture.encloses or furniture.open_top > 0 or furniture.basin
+    return furniture.receptacle and not furniture.pickupable and not hollow
+
+
+def assign_parents(world: World) -> None:
+    """Attach every loose object without a parent to the receptacle that it is in or on."""
+    held = world.held_ids()
+    for item in world.objects.values():
+        if item.type.pickupable and item.parent is None and item.object_id not in held:
+            parent = find_parent(world, item)
+            if parent is not None:
+                world.attach(item, parent)
+
+
+class _Templates:
+    """Chooses the object that a name means: the one of that name, else one of its type.
+
+    Args:
+        world: the scene as it is now; removed objects are looked for in its templates.
+    """
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._named: dict[str, SimObject] = {}
+        self._typed: dict[str, list[SimObject]] = defaultdict(list)
+        for item in [
+            *(o for listed in world.templates.values() for o in listed),
+            *world.objects.values(),
+        ]:
+            self._named.setdefault(item.name, item)
+            self._typed[item.object_type].append(item)
+        self._chosen: dict[str, SimObject] = {}
+        self._count: dict[str, int] = defaultdict(int)
+
+    def choose(self, name: str) -> SimObject | None:
+        """Return the object that a name means; the same for the same name, and in turn for different ones."""
+        if name in self._named:
+            return self._named[name]
+        if name not in self._chosen:
+            object_type = modern_type(name.split("_", maxsplit=1)[0])
+            candidates = self._typed.get(object_type)
+            if not candidates:
+                if not type_named(object_type).pickupable:
+                    return None
+                candidates = [default_object(object_type, np.zeros(3))]
+            self._chosen[name] = candidates[self._count[object_type] % len(candidates)]
+            self._count[object_type] += 1
+        return self._chosen[name]
+
+
+def _unused_id(world: World, object_type: str, position: Array) -> str:
+    base = object_id(object_type, position)
+    number, unused = 1, base
+    while unused in world.objects:
+        unused, number = f"{base}|{number}", number + 1
+    return unused
+
+
+def spawn_randomly(
+    world: World,
+    random: np.random.Generator,
+    excluded_types: frozenset[str],
+    kept: frozenset[str],
+    in_open_only: bool,
+) -> None:
+    """Put every loose object into or onto a random receptacle that takes its type and has room.
+
+    Args:
+        world: the scene, changed in place.
+        random: random numbers that choose the order of the objects and their receptacles.
+        excluded_types: types of receptacles that get nothing.
+        kept: ids of objects that stay where they are.
+        in_open_only: use no receptacle that hides its contents when closed.
+    """
+    held = world.held_ids()
+    loose = [o for o in world.objects.values() if o.type.pickupable and o.object_id not in kept]
+    for index in random.permutation(len(loose)):
+        item = loose[index]
+        if item.object_id in held:
+            continue
+        homes = [
+            o for o in world.objects.values()
+            if o.type.receptacle and not o.type.pickupable and allowed_in(item.object_type, o.object_type)
+            and o.object_type not in excluded_types and not (in_open_only and o.type.encloses)
+        ]  # fmt: skip
+        for home_index in random.permutation(len(homes)):
+            place = find_place(world, item, homes[home_index])
+            if place is not None:
+                world.set_pose(item, place.position, place.rotation)
+                world.attach(item, homes[home_index])
+                break

@@ -1,0 +1,40 @@
+"""The lights of a picture: one sun, the sky's ambient light, a weak light at the camera, and lamps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from infthor_sim.geometry import Array
+
+__all__ = ["AMBIENT", "HEADLIGHT", "LAMP_REACH", "SKY", "SUN", "SUN_DIRECTION", "Lights"]
+
+AMBIENT, SKY, SUN, HEADLIGHT = (
+    0.46,
+    0.12,
+    0.3,
+    0.16,
+)  # brightness; the headlight shows shapes that the sun misses
+SUN_DIRECTION = (
+    0.40824829046386296,
+    0.8164965809277259,
+    -0.40824829046386313,
+)  # towards the sun, unit length
+LAMP_REACH = 0.35  # squared metres at which a lamp's light has fallen to half
+
+
+@dataclass(frozen=True)
+class Lights:
+    """The lights of a picture that vary.
+
+    Attributes:
+        lamps: positions and strength of the lamps that are on (n, 4).
+        daylight: factor of all other light; 1 with the ceiling light on.
+    """
+
+    lamps: Array
+    daylight: float = 1.0
+
+    @classmethod
+    def none(cls) -> "Lights":
+        """Return full daylight without lamps."""
+        return cls(np.zeros((0, 4)))

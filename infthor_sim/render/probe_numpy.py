@@ -1,0 +1,41 @@
+"""Checking whether an object is visible, in numpy; gives the same answer as `probe_numba`."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infthor_sim.geometry import Array
+from infthor_sim.render.camera import PinholeCamera, Projection
+from infthor_sim.render.raster_numpy import cast, hit
+
+__all__ = ["is_visible"]
+
+
+def is_visible(
+    prims: Array,
+    projection: Projection,
+    camera: PinholeCamera,
+    own: NDArray[np.bool_],
+    min_pixels: int,
+) -> bool:
+    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked in `own` (n,)."""
+    us, vs = camera.rays()
+    # First the pixels that the object would show alone; then each other primitive takes away those that it hides.
+    fields = ("index", "origin", "steps", "box", "near")
+    kept = replace(projection, **{name: getattr(projection, name)[own] for name in fields})
+    depths, nearest = cast(prims, kept, camera)
+    ys, xs = np.nonzero(nearest >= 0)
+    depth, first = depths[ys, xs], np.nonzero(own)[0][nearest[ys, xs]]
+    for k in np.nonzero(~own)[0]:
+        if len(ys) < min_pixels:
+            break
+        x0, x1, y0, y1 = projection.box[k]
+        within = np.nonzero((xs >= x0) & (xs <= x1) & (ys >= y0) & (ys <= y1))[0]
+        t = hit(prims, projection, int(k), (us[xs[within]], vs[ys[within]]), camera.near)
+        hidden = (t > camera.near) & (
+            (t < depth[within]) | ((t == depth[within]) & (k < first[within]))
+        )
+        left = np.delete(np.arange(len(ys)), within[hidden])
+        ys, xs, depth, first = ys[left], xs[left], depth[left], first[left]
+    return len(ys) >= min_pixels

@@ -1,0 +1,148 @@
+"""Colours of the cast pixels in numpy: the formulas of `shading_numba`, in the same order of operations."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from infthor_sim.geometry import Array
+from infthor_sim.render.camera import PinholeCamera, Projection
+from infthor_sim.render.lighting import (
+    AMBIENT,
+    HEADLIGHT,
+    LAMP_REACH,
+    SKY,
+    SUN,
+    SUN_DIRECTION,
+    Lights,
+)
+from infthor_sim.render.patterns import PATTERNS
+from infthor_sim.render.primitives import (
+    AXES,
+    BOTTOM,
+    COLOR,
+    EMISSION,
+    FORM,
+    HALF,
+    MATERIAL,
+    TOP,
+    Form,
+)
+
+__all__ = ["brightness_at", "shade", "surface_normals"]
+
+_RIM = 1.0 - 1e-6
+
+
+def shade(
+    prims: Array,
+    projection: Projection,
+    camera: PinholeCamera,
+    depth: Array,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
+) -> NDArray[np.uint8]:
+    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times its factor."""
+    us, vs = camera.rays()
+    rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
+    ys, xs = np.nonzero(nearest >= 0)
+    if not len(ys):
+        return rgb
+    order = nearest[ys, xs]
+    p = prims[projection.index[order]]
+    rays = us[xs], vs[ys], depth[ys, xs]
+    level = (
+        brightness_at(p, projection.origin[order], projection.steps[order], rays, camera, lights)
+        * factors[ys, xs]
+    )
+    for i in range(3):
+        rgb[ys, xs, i] = np.minimum(p[:, COLOR + i] * level * 255.0, 255.0).astype(np.uint8)
+    return rgb
+
+
+def brightness_at(
+    p: Array,
+    o: Array,
+    s: Array,
+    rays: tuple[Array, Array, Array],
+    camera: PinholeCamera,
+    lights: Lights,
+) -> Array:
+    """Return the brightness (n,) of primitives `p` (n, COLUMNS) at depth t on the rays (u, v, t)."""
+    u, v, t = rays
+    local = [o[:, i] + t * ((s[:, 0, i] + u * s[:, 1, i]) + v * s[:, 2, i]) for i in range(3)]
+    normal, a, b = _surface(p, local)
+    ray = [
+        (camera.matrix[i, 2] + u * camera.matrix[i, 0]) + v * camera.matrix[i, 1] for i in range(3)
+    ]
+    world = [camera.position[i] + t * ray[i] for i in range(3)]
+    light = _light(normal, ray, world, lights)
+    factor = np.ones(len(p))
+    for material, pattern in PATTERNS.items():
+        at = p[:, MATERIAL] == material
+        factor[at] = pattern(a[at], b[at])
+    glow = p[:, EMISSION]
+    level: Array = glow * 1.15 + (1.0 - glow) * (light * factor)
+    return level
+
+
+def surface_normals(
+    prims: Array,
+    projection: Projection,
+    camera: PinholeCamera,
+    depth: Array,
+    nearest: NDArray[np.int32],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+    """Return rows, columns and world normals (n, 3), of either sign, of the pixels that `cast` hit."""
+    us, vs = camera.rays()
+    ys, xs = np.nonzero(nearest >= 0)
+    order = nearest[ys, xs]
+    u, v, t = us[xs], vs[ys], depth[ys, xs]
+    o, s = projection.origin[order], projection.steps[order]
+    local = [o[:, i] + t * (s[:, 0, i] + u * s[:, 1, i] + v * s[:, 2, i]) for i in range(3)]
+    normal, _, _ = _surface(prims[projection.index[order]], local)
+    return ys, xs, np.stack(normal, axis=1)
+
+
+def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
+    """Return world normals (3 arrays) and two surface coordinates in metres of hit points in scaled frames."""
+    x, y, z = local
+    form = p[:, FORM]
+    ax, ay, az = np.abs(x), np.abs(y), np.abs(z)
+    on_x = (ax >= ay) & (ax >= az)
+    on_y = ~on_x & (ay >= az)
+    k = (p[:, TOP] - p[:, BOTTOM]) * 0.5
+    m = (p[:, BOTTOM] + p[:, TOP]) * 0.5
+    box, ball = form == Form.BOX, (form == Form.ELLIPSOID) | (form == Form.BOWL)
+    cap = (ay >= _RIM) & ~((y > 0) & (form == Form.CUP))
+    nx = np.where(box, np.where(on_x, x, 0.0), np.where(ball | ~cap, x, 0.0))
+    nz = np.where(box, np.where(on_x | on_y, 0.0, z), np.where(ball | ~cap, z, 0.0))
+    ny = np.where(
+        box, np.where(on_y, y, 0.0), np.where(ball, y, np.where(cap, y, -k * (m + k * y)))
+    )
+    ny = np.where(form == Form.BOWL, (y - 1.0) * 0.25, ny)
+    hx, hy, hz = p[:, HALF], p[:, HALF + 1], p[:, HALF + 2]
+    nx, ny, nz = nx / hx, ny / hy, nz / hz
+    normal = [
+        p[:, AXES + i] * nx + p[:, AXES + 3 + i] * ny + p[:, AXES + 6 + i] * nz for i in range(3)
+    ]
+    length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) + 1e-12
+    mx, my, mz = x * hx, y * hy, z * hz
+    a = np.where(box, np.where(on_x, mz, mx), mx + mz)
+    b = np.where(box & on_y, mz, my)
+    return [n / length for n in normal], a, b
+
+
+def _light(normal: list[Array], ray: list[Array], world: list[Array], lights: Lights) -> Array:
+    nx, ny, nz = normal
+    length = np.sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
+    facing = (nx * ray[0] + ny * ray[1] + nz * ray[2]) / length
+    flip = np.where(facing > 0.0, -1.0, 1.0)
+    nx, ny, nz, facing = nx * flip, ny * flip, nz * flip, np.abs(facing)
+    sun = nx * SUN_DIRECTION[0] + ny * SUN_DIRECTION[1] + nz * SUN_DIRECTION[2]
+    light = (AMBIENT + SKY * ny + SUN * np.maximum(sun, 0.0) + HEADLIGHT * facing) * lights.daylight
+    for lamp in lights.lamps:
+        lx, ly, lz = lamp[0] - world[0], lamp[1] - world[1], lamp[2] - world[2]
+        square = lx * lx + ly * ly + lz * lz
+        cosine = (nx * lx + ny * ly + nz * lz) / (np.sqrt(square) + 1e-6)
+        light = light + lamp[3] * np.maximum(cosine, 0.0) * (LAMP_REACH / (LAMP_REACH + square))
+    return light

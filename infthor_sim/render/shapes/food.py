@@ -1,0 +1,99 @@
+"""Fruit, vegetables, bread and eggs, whole."""
+
+from infthor_sim.render.primitives import Color, Form, Material
+from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.register import draws
+
+__all__ = ["APPLES", "CRUST", "LETTUCE", "POTATO", "TOMATO"]
+
+APPLES: tuple[Color, ...] = ((0.72, 0.07, 0.09), (0.52, 0.7, 0.2), (0.55, 0.05, 0.12))
+CRUST: Color = (0.72, 0.48, 0.24)
+LETTUCE: Color = (0.4, 0.66, 0.25)
+POTATO: Color = (0.7, 0.55, 0.32)
+TOMATO: Color = (0.85, 0.16, 0.1)
+
+
+@draws
+def apple(b: Builder) -> None:
+    """Broad shoulders around a dimple with a stalk and a leaf, narrower below."""
+    color = APPLES[b.style % 3]
+    b.ball((0, 0.1, 0), (1, 0.7, 1), color)
+    b.ball((0, -0.2, 0), (0.92, 0.8, 0.92), color)
+    b.tube((0, 0.77, 0), (0.3, 0.04, 0.3), shade_of(color, 0.5))
+    b.add(Form.CYLINDER, (0.03, 0.82, 0), (0.08, 0.18, 0.08), (0.3, 0.18, 0.08), tilt=(0, 0, -14))
+    b.ball((0.4, 0.88, 0.1), (0.4, 0.08, 0.2), (0.25, 0.55, 0.15))
+
+
+@draws
+def tomato(b: Builder) -> None:
+    """A flat red ball with a green star of leaves."""
+    b.ball((0, -0.05, 0), (1, 0.95, 1), TOMATO)
+    for turn in (0, 60, 120):
+        b.box((0, 0.84, 0), (0.62, 0.06, 0.13), (0.16, 0.45, 0.12), tilt=(0, turn, 0))
+    b.tube((0, 0.9, 0), (0.09, 0.1, 0.09), (0.25, 0.4, 0.12))
+
+
+@draws
+def potato(b: Builder) -> None:
+    """A lopsided tuber with eyes; baked it is darker."""
+    color: Color = shade_of(POTATO, 0.62) if b.state.cooked else POTATO
+    b.ball((0.06, -0.06, 0.3), (0.9, 0.92, 0.7), color, Material.STONE)
+    b.ball((-0.08, 0.0, -0.34), (0.84, 0.96, 0.66), shade_of(color, 0.97), Material.STONE)
+    b.ball((-0.3, 0.22, 0.05), (0.66, 0.72, 0.6), shade_of(color, 1.04), Material.STONE)
+    eye = shade_of(color, 0.55)
+    for x, y, z in ((0.3, 0.72, 0.4), (-0.4, 0.82, -0.2), (0.72, 0.2, 0.2), (-0.74, 0.1, -0.5), (0.3, 0.72, -0.5),
+                    (0.25, 0.25, 0.9), (-0.1, 0.3, -0.94), (-0.55, 0.55, 0.5), (0.75, 0.1, -0.4)):  # fmt: skip
+        b.ball((x, y, z), (0.1, 0.1, 0.07), eye)
+
+
+@draws
+def bread(b: Builder) -> None:
+    """A tin loaf: a rounded top over a body, with scores across it."""
+    axis = 2 if b.half[2] >= b.half[0] else 0
+    loaf(b, axis, 1.0, 1.0, CRUST, Material.STONE)
+    for at in (-0.6, -0.2, 0.2, 0.6):
+        b.box(
+            b.lengthwise(at, 0.88, 0),
+            b.lengthwise(0.03, 0.13, 0.5),
+            (0.9, 0.76, 0.52),
+            tilt=(0, 12, 0),
+        )
+
+
+def loaf(
+    b: Builder, axis: int, share: float, length: float, color: Color, material: Material
+) -> None:
+    """Add a tin loaf along `axis`, with a share of its width and height and a share of its length."""
+    at, half = (0.0, -0.3 * share, 0.0), [0.86 * share] * 3
+    half[1], half[axis] = 0.7 * share, length
+    b.box(at, half, shade_of(color, 0.92), material)
+    metres = [float(v) for v in b.half]
+    wide, high = metres[2 - axis] * share, metres[1] * 0.62 * share
+    turned = (wide, high)
+    tilt = (90.0, 0.0, 0.0) if axis == 2 else (0.0, 0.0, 90.0)
+    radii = [0.0, metres[axis] * length, 0.0]
+    radii[0], radii[2] = turned if axis == 2 else (high, wide)
+    fractions = [radii[i] / metres[i] for i in range(3)]
+    b.add(Form.CYLINDER, (0, 0.38 * share, 0), fractions, color, material, tilt=tilt)
+
+
+@draws
+def lettuce(b: Builder) -> None:
+    """A head of leaves."""
+    b.ball((0, 0, 0), (1, 1, 1), LETTUCE, Material.STONE)
+    for x, z in ((-0.4, 0.3), (0.4, 0.2), (0.0, -0.45)):
+        b.ball((x, 0.25, z), (0.6, 0.7, 0.55), (0.52, 0.76, 0.34))
+
+
+@draws
+def egg(b: Builder) -> None:
+    """An egg."""
+    b.ball((0, 0, 0), (1, 1, 1), (0.93, 0.86, 0.76))
+
+
+@draws
+def egg_cracked(b: Builder) -> None:
+    """White and yolk, or fried."""
+    white: Color = (0.98, 0.95, 0.88) if b.state.cooked else (0.95, 0.95, 0.92)
+    b.tube((0, -0.5, 0), (1, 0.5, 1), white)
+    b.ball((0, 0.1, 0), (0.4, 0.9, 0.4), (0.96, 0.72, 0.15))

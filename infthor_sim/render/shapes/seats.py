@@ -1,0 +1,121 @@
+"""Chairs, sofas, beds and stools."""
+
+from infthor_sim.render.primitives import Color, Material
+from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.palette import CLOTHS, WHITE, WOODS, pick
+from infthor_sim.render.shapes.register import draws
+
+
+def _seat_level(b: Builder, usual: float) -> float:
+    """Return the height of the seat as a fraction of the half box: the object's surface height if it is known."""
+    if b.item.support is None:
+        return usual
+    return min(0.9, max(-0.8, b.item.support / float(b.half[1]) - 1))
+
+
+@draws
+def chair(b: Builder) -> None:
+    """A wooden chair with a back of slats."""
+    color = pick(WOODS, b.style)
+    level = _seat_level(b, -0.05)
+    x, y, z = b.thick(0.018, 0), b.thick(0.015, 1), b.thick(0.018, 2)
+    b.box((0, level - y, 0), (1, y, 1), color, Material.WOOD)
+    for side in (-1, 1):
+        b.box(
+            (side * (0.93 - x), (level - 1) / 2, 0.9 - z),
+            (x, (level + 1) / 2, z),
+            shade_of(color, 0.85),
+        )
+        b.box((side * (0.93 - x), 0, -0.93), (x, 1, z), shade_of(color, 0.85))
+    for share in (0.35, 0.65, 0.95):
+        b.box(
+            (0, level + (1 - level) * share - 0.06, -0.93),
+            (0.9, 0.07, z * 0.7),
+            color,
+            Material.WOOD,
+        )
+
+
+@draws
+def stool(b: Builder) -> None:
+    """A round seat on legs."""
+    color = pick(WOODS, b.style)
+    b.tube((0, 0.92, 0), (1, 0.08, 1), color, Material.WOOD)
+    for sx in (-1, 1):
+        for sz in (-1, 1):
+            b.box(
+                (sx * 0.6, -0.08, sz * 0.6),
+                (b.thick(0.018, 0), 0.92, b.thick(0.018, 2)),
+                shade_of(color, 0.8),
+            )
+
+
+@draws
+def sofa(b: Builder) -> None:
+    """A padded bench with a back and arms."""
+    color = pick(CLOTHS, b.style)
+    level = _seat_level(b, -0.05)
+    arm, back = min(0.3, b.thick(0.11, 0)), min(0.5, b.thick(0.11, 2))
+    b.box(
+        (0, (level - 1) / 2 - 0.02, 0),
+        (1 - arm, (level + 1) / 2 - 0.05, 0.97),
+        shade_of(color, 0.85),
+        Material.FABRIC,
+    )
+    b.box((0, 0.0, -1 + back), (1 - arm, 1, back), color, Material.FABRIC)
+    for side in (-1, 1):
+        top = min(0.9, level + 0.45)
+        b.box(
+            (side * (1 - arm), (top - 1) / 2, 0),
+            (arm, (top + 1) / 2, 1),
+            shade_of(color, 0.95),
+            Material.FABRIC,
+        )
+    count = max(1, round(float(b.half[0]) / 0.4))
+    width = (1 - 2 * arm) / count
+    for index in range(count):
+        at = -(1 - 2 * arm) + width * (2 * index + 1)
+        b.box(
+            (at, level - 0.1, back),
+            (width * 0.97, 0.1, 1 - back),
+            shade_of(color, 1.12),
+            Material.FABRIC,
+        )
+
+
+@draws
+def ottoman(b: Builder) -> None:
+    """A padded block."""
+    color = pick(CLOTHS, b.style)
+    b.box((0, 0.1, 0), (1, 0.9, 1), color, Material.FABRIC)
+    b.box((0, -0.9, 0), (0.9, 0.1, 0.9), shade_of(pick(WOODS, b.style), 0.7))
+
+
+@draws
+def bed(b: Builder) -> None:
+    """A frame with a headboard at its back, a mattress and a blanket."""
+    wood, cloth = pick(WOODS, b.style), pick(CLOTHS, b.style)
+    level = _seat_level(b, 0.2)
+    z = b.thick(0.03, 2)
+    frame = -1 + (level + 1) * 0.45
+    b.box((0, (frame - 1) / 2, 0), (1, (frame + 1) / 2, 1), shade_of(wood, 0.8), Material.WOOD)
+    b.box((0, 0, -1 + z), (1, 1, z), wood, Material.WOOD)
+    linen: Color = (0.75, 0.68, 0.55) if b.state.dirty else WHITE
+    b.box(
+        (0, (frame + level) / 2, z), (0.97, (level - frame) / 2, 0.97 - z), linen, Material.FABRIC
+    )
+    if not b.state.dirty:
+        b.box(
+            (0, (frame + level) / 2 + 0.012, 0.35),
+            (0.985, (level - frame) / 2, 0.64),
+            cloth,
+            Material.FABRIC,
+        )
+
+
+@draws
+def pet_bed(b: Builder) -> None:
+    """A flat round cushion with a border."""
+    color = pick(CLOTHS, b.style)
+    b.tube((0, -0.05, 0), (1, 0.95, 1), shade_of(color, 0.7), Material.FABRIC, top=0.96)
+    b.tube((0, 0.9, 0), (0.84, 0.1, 0.84), shade_of(color, 1.15), Material.FABRIC)

@@ -1,0 +1,289 @@
+"""Objects with an inside: cabinets, drawers, fridges, microwaves, safes, boxes, bins."""
+
+from infthor_sim.objects import DOOR_SWING, DRAWER_SLIDE, WALL
+from infthor_sim.render.primitives import Color, Material
+from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, WHITE, WOODS, pick
+from infthor_sim.render.shapes.register import draws
+
+_LEAF = 0.02  # thickness of a door, metres
+_FRIDGE_GRIP = (
+    0.022  # metres that a fridge's grips stand out within its box, as recorded in FloorPlan28
+)
+_LIT = 0.2  # glow of the insides of open things: their contents would be hard to see otherwise
+_BODY = 0.82  # of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same share.
+_TRAY = 0.9  # top of a drawer's sides, in fractions: a little lower than its front
+_COLD: Color = (0.93, 0.97, 1.0)
+_TINTED: Color = (0.55, 0.76, 0.84)
+_WINDOW: Color = (0.13, 0.14, 0.16)
+# Of a fridge's shelves, in fractions: one looks down between glass and rim onto the lower ones, as through clear glass.
+_GLASS_END, _RIM = 0.3, 0.76
+
+
+def _door(
+    b: Builder,
+    color: Color,
+    material: Material,
+    grip: Color,
+    low: float = -1.0,
+    high: float = 1.0,
+    grip_in: float = 0.0,
+) -> None:
+    """Add a hinged door over the front from height fraction `low` to `high`, at the object's openness.
+
+    With `grip_in`, the grip is within the object's box, and the door so many metres behind its front.
+    """
+    side = b.item.hinge or -1
+    width, height, depth = (float(v) for v in b.half)
+    middle, half = (low + high) / 2 * height, (high - low) / 2 * height
+    angle = side * DOOR_SWING * b.state.openness
+    leaf = min(_LEAF / 2, depth * 0.3)
+    hinge = (side, 0.0, 1.0)
+    back = -leaf - grip_in
+    b.hinged_box(
+        hinge,
+        (-side * width, middle, back),
+        (width * 0.985, half * 0.985, leaf),
+        angle,
+        color,
+        material,
+    )
+    reach = 2 * width * (0.94 if grip_in else 0.88)
+    tall = min(half * 0.35, 0.2)
+    b.hinged_box(
+        hinge,
+        (-side * reach, middle, 0.01 - grip_in),
+        (0.008, tall, 0.01),
+        angle,
+        grip,
+        Material.METAL,
+    )
+
+
+@draws
+def cabinet(b: Builder) -> None:
+    """A cupboard of wood with one door."""
+    color = pick(WOODS, b.style // 7 if b.item.asset_id else 2)
+    if b.state.openness > 0:
+        b.open_front(shade_of(color, 0.8), shade_of(color, 1.2), Material.WOOD, b.item.floors[0], glow=_LIT,
+                     top=not b.item.hollow)  # fmt: skip
+    elif not b.item.hollow:
+        back = b.thick(_LEAF, 2)
+        b.box((0, 0, -back / 2), (1, 1, 1 - back / 2), shade_of(color, 0.8), Material.WOOD)
+    else:  # nothing but a panel behind the door, so that the wall is not seen past its edges
+        leaf = b.thick(_LEAF, 2)
+        b.span((-1, -1, 1 - 1.4 * leaf), (1, 1, 1 - leaf), shade_of(color, 0.8), Material.WOOD)
+    _door(b, color, Material.WOOD, CHROME)
+
+
+@draws
+def drawer(b: Builder) -> None:
+    """A drawer: its front, and when open the tray behind it, as wide as what may lie in it."""
+    color = shade_of(pick(WOODS, 2), 1.05)
+    out = 2 * DRAWER_SLIDE * b.state.openness
+    leaf = b.thick(_LEAF / 2, 2)
+    if b.state.openness > 0:
+        x, gap, back = b.thick(WALL, 0), b.thick(0.004, 0), out - 1 + b.thick(WALL, 2)
+        side = shade_of(color, 1.1)
+        floor, front = b.floor, out + 1 - 2 * leaf
+        b.span((gap - 1, -0.96, out - 1), (1 - gap, floor, front), shade_of(color, 1.3), glow=_LIT)
+        b.span((gap - 1, floor, out - 1), (1 - gap, _TRAY, back), side, Material.WOOD, glow=_LIT)
+        b.span((gap - 1, floor, back), (x - 1, _TRAY, front), side, Material.WOOD, glow=_LIT)
+        b.span((1 - x, floor, back), (1 - gap, _TRAY, front), side, Material.WOOD, glow=_LIT)
+    else:
+        b.box((0, 0, -leaf), (0.94, 0.92, 1 - leaf), shade_of(color, 0.75), Material.WOOD)
+    b.box((0, 0, out + 1 - leaf), (0.985, 0.96, leaf), color, Material.WOOD)
+    b.rod(
+        (0, 0.25, out + 1 + 0.012 / max(float(b.half[2]), 0.01)),
+        0.006,
+        min(float(b.half[0]) * 0.4, 0.08),
+        0,
+        CHROME,
+    )
+
+
+@draws
+def fridge(b: Builder) -> None:
+    """A fridge: a freezer door above, a tall door below, each with a grip."""
+    color = (WHITE, STEEL, (0.86, 0.87, 0.88))[b.style % 3]
+    if b.state.openness == 0:
+        z = b.thick(0.025, 2)
+        b.box((0, 0, -z), (1, 1, 1 - z), shade_of(color, 0.92), Material.METAL)
+    else:
+        _lit_inside(b, shade_of(color, 0.92))
+    _door(b, color, Material.METAL, DARK, -0.97, 0.3, _FRIDGE_GRIP)
+    _door(b, shade_of(color, 1.03), Material.METAL, DARK, 0.33, 1.0, _FRIDGE_GRIP)
+    if b.state.openness > 0:
+        _door_racks(b)
+
+
+def _lit_inside(b: Builder, outside: Color) -> None:
+    """The body of an open fridge: white and bright within, shelves of tinted glass, a lamp."""
+    b.open_front(outside, _COLD, Material.METAL, WALL, glow=0.45)
+    x, y = 1 - b.thick(WALL, 0), b.thick(0.008, 1)
+    back, edge = b.thick(WALL, 2) - 1, b.thick(0.012, 0)
+    rim, middle, half = shade_of(_TINTED, 0.62), (_RIM + _GLASS_END) / 2, (_RIM - _GLASS_END) / 2
+    for metres in b.item.floors:
+        level = b.level(metres)
+        b.span((-x, level - y, back), (x, level, _GLASS_END), _TINTED, Material.GLASS, glow=0.3)
+        b.span((-x, level - 2 * y, _RIM), (x, level, _RIM + 0.06), rim, glow=0.2)
+        for side in (-1, 1):
+            b.box((side * (x - edge), level - y, middle), (edge, y, half), rim, glow=0.2)
+    b.box((0, 0.9, -0.2), (0.3, 0.02, 0.3), (1.0, 1.0, 0.9), glow=0.9)
+
+
+def _door_racks(b: Builder) -> None:
+    """The white inner side of the open doors, with racks."""
+    side = b.item.hinge or -1
+    angle = side * DOOR_SWING * b.state.openness
+    width, height, _ = (float(v) for v in b.half)
+    hinge, inward = (side, 0.0, 1.0), -_LEAF - _FRIDGE_GRIP
+    for low, high in ((-0.93, 0.26), (0.37, 0.96)):
+        half, middle = (high - low) / 2 * height, (high + low) / 2 * height
+        b.hinged_box(hinge, (-side * width, middle, inward - 0.006), (width * 0.9, half, 0.006), angle, _COLD,
+                Material.PLAIN, glow=0.3)  # fmt: skip
+        for share in (-0.6, 0.1):
+            offset = (-side * width, middle + share * half, inward - 0.035)
+            b.hinged_box(
+                hinge,
+                offset,
+                (width * 0.8, 0.03, 0.03),
+                angle,
+                (0.6, 0.72, 0.8),
+                Material.PLAIN,
+                glow=0.15,
+            )
+
+
+@draws
+def microwave(b: Builder) -> None:
+    """A microwave oven: a dark window, a panel of keys; lit inside while it runs."""
+    body = (STEEL, DARK, WHITE)[b.style % 3]
+    x, z = b.thick(0.02, 0), b.thick(0.01, 2)
+    lit = 0.75 if b.state.toggled else 0.0
+    panel, door = shade_of(body, 0.9), shade_of(body, 0.85)
+    if b.state.openness == 0:
+        b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
+        window: Color = (0.9, 0.75, 0.4) if b.state.toggled else _WINDOW
+        b.box((0.22, 0, 1 - z), (0.74, 0.92, z), door, Material.METAL)
+        b.box((0.27, 0, 1 - z / 2), (0.58, 0.68, z), window, Material.GLASS, glow=lit)
+        b.box((-0.44, 0, 1 + z), (x, 0.7, z), CHROME, Material.METAL)
+    else:
+        b.open_front(body, shade_of(STEEL, 1.1), Material.METAL, b.item.floors[0], glow=0.3)
+        b.tube(
+            (0.2, b.floor, 0), (0.55, b.thick(0.002, 1), 0.75), (0.8, 0.86, 0.88), Material.GLASS
+        )
+        b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), panel, Material.METAL)
+        wide, high = float(b.half[0]), float(b.half[1])
+        angle = DOOR_SWING * b.state.openness
+        b.hinged_box(
+            (1, 0, 1),
+            (-0.74 * wide, 0, -0.01),
+            (0.74 * wide, 0.92 * high, 0.01),
+            angle,
+            door,
+            Material.METAL,
+        )
+        b.hinged_box((1, 0, 1), (-0.72 * wide, 0, -0.01), (0.55 * wide, 0.65 * high, 0.012), angle, _WINDOW,
+                Material.GLASS)  # fmt: skip
+        b.hinged_box(
+            (1, 0, 1),
+            (-1.44 * wide, 0, 0.01),
+            (0.02, 0.7 * high, 0.01),
+            angle,
+            CHROME,
+            Material.METAL,
+        )
+    b.box((-0.76, 0.1, 1 - z / 2), (0.18, 0.7, z), BLACK)
+    b.box((-0.76, 0.62, 1), (0.14, 0.12, z), (0.2, 0.85, 0.45), glow=0.6)
+    for row in range(3):
+        b.box((-0.76, 0.25 - 0.25 * row, 1), (0.12, 0.07, z), (0.55, 0.56, 0.58))
+
+
+@draws
+def safe(b: Builder) -> None:
+    """A steel box with a thick door that has a dial and a wheel of spokes."""
+    body: Color = (0.3, 0.32, 0.35)
+    if b.state.openness == 0:
+        z = b.thick(0.02, 2)
+        b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
+    else:
+        b.open_front(body, shade_of(body, 1.7), Material.METAL, b.item.floors[0], glow=_LIT)
+    _door(b, shade_of(body, 1.25), Material.METAL, CHROME)
+    if b.state.openness == 0:
+        b.coin(2, (0, 0.2, 1), (0.3, 0.3, b.thick(0.008, 2)), DARK)
+        b.coin(2, (0, 0.2, 1), (0.14, 0.14, b.thick(0.016, 2)), CHROME, Material.METAL)
+        b.box((0, 0.42, 1), (0.02, 0.06, b.thick(0.009, 2)), WHITE)
+        b.box((0.0, -0.35, 1), (0.34, 0.28, b.thick(0.006, 2)), (0.1, 0.1, 0.11))
+        for row in range(3):
+            b.box((0.0, -0.17 - 0.18 * row, 1), (0.26, 0.05, b.thick(0.009, 2)), (0.75, 0.78, 0.8))
+
+
+@draws
+def carton(b: Builder) -> None:
+    """A cardboard box, its flaps spread when open."""
+    color: Color = (0.72, 0.55, 0.35)
+    if b.state.openness == 0:
+        b.box((0, 0, 0), (1, 1, 1), color)
+        b.box((0, 1, 0), (1.003, 0.01, 0.12), (0.88, 0.78, 0.58))
+        b.box((0, 0.8, 0), (1.006, 0.2, 0.12), (0.88, 0.78, 0.58))
+        b.box((0.1, -0.1, 1.0), (0.4, 0.25, 0.01), (0.92, 0.9, 0.85), Material.PAPER)
+        return
+    body = _BODY / (_BODY + (1 - _BODY) * b.state.openness)  # of the box as it is now
+    _body(b, color, body)
+    _flaps(b, shade_of(color, 1.16), body)
+
+
+def _body(b: Builder, color: Color, share: float) -> None:
+    """Add four sides and a bottom, within the share of the box that the flaps leave."""
+    x, z = b.thick(0.006, 0), b.thick(0.006, 2)
+    b.span((-share, -1, -share), (share, b.floor, share), shade_of(color, 0.88), glow=0.12)
+    for side in (-1, 1):
+        b.box((side * (share - x), 0, 0), (x, 1, share), color, glow=0.12)
+        b.box((0, 0, side * (share - z)), (share - 2 * x, 1, z), color, glow=0.12)
+
+
+def _flaps(b: Builder, color: Color, share: float) -> None:
+    """Four flaps that hang outwards from the rim, to the edges of the box."""
+    for axis in (0, 2):
+        out = (1 - share) * float(b.half[axis])  # metres
+        length, drop = 2.2 * out, 1.96 * out
+        half = [share, 0.005 / float(b.half[1]), share]
+        half[axis] = length / 2 / float(b.half[axis])
+        lean = 63.0
+        for side in (-1, 1):
+            at = b.along(side * (1 + share) / 2, axis)
+            tilt = (side * lean, 0.0, 0.0) if axis == 2 else (0.0, 0.0, -side * lean)
+            b.box((at[0], 1 - drop / 2 / float(b.half[1]), at[2]), half, color, tilt=tilt)
+
+
+@draws
+def garbage_can(b: Builder) -> None:
+    """A garbage can."""
+    color = ((0.35, 0.38, 0.4), (0.75, 0.76, 0.78), (0.3, 0.42, 0.36), (0.2, 0.2, 0.22))[
+        b.style % 4
+    ]
+    b.cup((0, 0, 0), (1, 1, 1), color, Material.METAL, bottom=0.82, top=1.0)
+    b.tube((0, (b.floor - 1) / 2, 0), (0.82, (b.floor + 1) / 2, 0.82), shade_of(color, 0.5))
+
+
+@draws
+def bag(b: Builder) -> None:
+    """A tied garbage bag."""
+    b.ball((0, -0.15, 0), (1, 0.85, 1), (0.12, 0.12, 0.14), Material.METAL)
+    b.tube((0, 0.8, 0), (0.2, 0.2, 0.2), (0.1, 0.1, 0.12), bottom=0.5)
+
+
+@draws
+def hamper(b: Builder) -> None:
+    """A laundry basket."""
+    if b.state.openness == 0:
+        b.tube((0, 0, 0), (1, 1, 1), (0.72, 0.6, 0.42), Material.FABRIC, bottom=0.88)
+        return
+    b.cup((0, 0, 0), (1, 1, 1), (0.72, 0.6, 0.42), Material.FABRIC, bottom=0.88)
+    b.tube(
+        (0, (b.floor - 1) / 2, 0),
+        (0.88, (b.floor + 1) / 2, 0.88),
+        (0.55, 0.45, 0.32),
+        Material.FABRIC,
+    )

@@ -1,0 +1,178 @@
+"""Smoothing of jagged pixels, compiled by numba."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from infthor_sim.geometry import Array
+from infthor_sim.render.camera import PinholeCamera, Projection
+from infthor_sim.render.lighting import Lights
+from infthor_sim.render.primitives import BOTTOM, COLOR, FORM, TOP
+from infthor_sim.render.raster_numba import hit
+from infthor_sim.render.shading_numba import brightness, eye_of
+from infthor_sim.render.smoothing import JUMP, NEIGHBOURS, SUBPIXELS
+from infthor_sim.render.table import ORIGIN, STEPS, shading_table
+
+__all__ = ["smooth"]
+
+_NEIGHBOURS, _SUBPIXELS = np.array(NEIGHBOURS), np.array(SUBPIXELS)
+
+
+def smooth(
+    prims: Array,
+    projection: Projection,
+    camera: PinholeCamera,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    lights: Lights,
+    rgb: NDArray[np.uint8],
+) -> None:
+    """Give the jagged pixels of `rgb` the mean colour of their rays, in place."""
+    us, vs = camera.rays()
+    table = shading_table(prims, projection, lights)
+    _smooth(
+        table, len(projection.index), eye_of(camera), us, vs, camera.near, camera.far, nearest, factors,
+        lights.daylight, _find_jagged(rgb), rgb,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return the row and column (n, 2) of each pixel that differs much from a neighbour."""
+    height, width, _ = rgb.shape
+    total = np.empty((height, width), dtype=np.int16)
+    for y in range(height):
+        for x in range(width):
+            total[y, x] = np.int16(rgb[y, x, 0]) + np.int16(rgb[y, x, 1]) + np.int16(rgb[y, x, 2])
+    marked = np.zeros((height, width), dtype=np.uint8)
+    for y in range(height):
+        for x in range(width - 1):
+            jump = np.uint8(abs(total[y, x + 1] - total[y, x]) > JUMP)
+            marked[y, x] |= jump
+            marked[y, x + 1] |= jump
+    for y in range(height - 1):
+        for x in range(width):
+            jump = np.uint8(abs(total[y + 1, x] - total[y, x]) > JUMP)
+            marked[y, x] |= jump
+            marked[y + 1, x] |= jump
+    places, count = np.empty((height * width, 2), dtype=np.int64), 0
+    for y in range(height):
+        for x in range(width):
+            if marked[y, x]:
+                places[count, 0], places[count, 1] = y, x
+                count += 1
+    return places[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def _candidates(
+    nearest: NDArray[np.int32], y: int, x: int, orders: NDArray[np.int32], at: NDArray[np.int64]
+) -> int:
+    """Write the primitives that a pixel and its neighbours show to `orders`, and where to `at`; return how many."""
+    count = 0
+    for j in range(len(_NEIGHBOURS)):
+        yy, xx = y + _NEIGHBOURS[j, 0], x + _NEIGHBOURS[j, 1]
+        if (
+            yy < 0
+            or xx < 0
+            or yy >= nearest.shape[0]
+            or xx >= nearest.shape[1]
+            or nearest[yy, xx] < 0
+        ):
+            continue
+        order, listed = nearest[yy, xx], False
+        for k in range(count):
+            listed = listed or orders[k] == order
+        if not listed:
+            orders[count], at[count, 0], at[count, 1] = order, yy, xx
+            count += 1
+    return count
+
+
+@njit(cache=True, error_model="numpy")
+def _smooth(
+    table: Array,
+    first: int,
+    eye: Any,
+    us: Array,
+    vs: Array,
+    clip: float,
+    far: float,
+    nearest: NDArray[np.int32],
+    factors: Array,
+    daylight: float,
+    jagged: NDArray[np.int64],
+    rgb: NDArray[np.uint8],
+) -> None:
+    pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
+    # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
+    parts = len(_SUBPIXELS)
+    shown = np.full(
+        len(jagged) * parts, -1, dtype=np.int32
+    )  # the primitive that each ray hits; -1 for none
+    ray_u, ray_v, depths = np.empty(len(shown)), np.empty(len(shown)), np.empty(len(shown))
+    crease, levels = np.empty(len(shown)), np.empty(len(shown))
+    orders = np.empty(len(_NEIGHBOURS), dtype=np.int32)
+    at = np.empty((len(_NEIGHBOURS), 2), dtype=np.int64)
+    for place in range(len(jagged)):
+        y, x = jagged[place, 0], jagged[place, 1]
+        count = _candidates(nearest, y, x, orders, at)
+        for part in range(parts):
+            u, v = us[x] + _SUBPIXELS[part, 0] * pixel, vs[y] + _SUBPIXELS[part, 1] * pixel
+            best, chosen = math.inf, -1
+            for k in range(count):
+                order = orders[k]
+                dx = (table[order, STEPS] + u * table[order, STEPS + 3]) + v * table[
+                    order, STEPS + 6
+                ]
+                dy = (table[order, STEPS + 1] + u * table[order, STEPS + 4]) + v * table[
+                    order, STEPS + 7
+                ]
+                dz = (table[order, STEPS + 2] + u * table[order, STEPS + 5]) + v * table[
+                    order, STEPS + 8
+                ]
+                ox, oy, oz = (
+                    table[order, ORIGIN],
+                    table[order, ORIGIN + 1],
+                    table[order, ORIGIN + 2],
+                )
+                t = hit(
+                    table[order, FORM],
+                    table[order, BOTTOM],
+                    table[order, TOP],
+                    ox,
+                    oy,
+                    oz,
+                    dx,
+                    dy,
+                    dz,
+                    clip,
+                )
+                if clip < t < far and t < best:
+                    best, chosen = t, k
+            if chosen >= 0:
+                i = place * parts + part
+                shown[i], ray_u[i], ray_v[i], depths[i] = orders[chosen], u, v, best
+                # The crease factor is that of the pixel that showed it, as there is no depth around the ray.
+                crease[i] = factors[at[chosen, 0], at[chosen, 1]]
+    brightness(table, first, eye, daylight, shown, ray_u, ray_v, depths, levels)
+    for place in range(len(jagged)):
+        y, x = jagged[place, 0], jagged[place, 1]
+        red, green, blue = 0.0, 0.0, 0.0
+        for i in range(place * parts, (place + 1) * parts):
+            order = shown[i]
+            if order < 0:  # the ray misses all candidates: the pixel's own colour is taken
+                red, green, blue = red + rgb[y, x, 0], green + rgb[y, x, 1], blue + rgb[y, x, 2]
+                continue
+            level = levels[i] * crease[i]
+            red += min(table[order, COLOR] * level * 255.0, 255.0)
+            green += min(table[order, COLOR + 1] * level * 255.0, 255.0)
+            blue += min(table[order, COLOR + 2] * level * 255.0, 255.0)
+        rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = (
+            np.uint8(red / parts),
+            np.uint8(green / parts),
+            np.uint8(blue / parts),
+        )

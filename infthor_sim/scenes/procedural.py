@@ -1,0 +1,154 @@
+"""Building rooms and houses from a seed: the same name is always the same scene."""
+
+import zlib
+from collections.abc import Callable
+
+import numpy as np
+
+from infthor_eval.errors import SimulatorError
+from infthor_sim.geometry import level_gaps
+from infthor_sim.scenes.bathroom import furnish_bathroom
+from infthor_sim.scenes.bedroom import furnish_bedroom
+from infthor_sim.scenes.kitchen import furnish_kitchen
+from infthor_sim.scenes.living_room import furnish_living_room
+from infthor_sim.scenes.roomplan import RoomPlan, build_world
+from infthor_sim.world import FLOOR_STYLES, RoomShell, World
+
+__all__ = ["SCENE_TYPES", "build_scene"]
+
+_FURNISH: dict[str, Callable[[RoomPlan], None]] = {
+    "kitchen": furnish_kitchen,
+    "living-room": furnish_living_room,
+    "bedroom": furnish_bedroom,
+    "bathroom": furnish_bathroom,
+}
+_FLOORS = {"kitchen": "tiles", "bathroom": "tiles", "bedroom": "carpet", "living-room": "wood"}
+_SIZES = {  # metres: least and most width, least and most length
+    "kitchen": (4.4, 5.4, 3.8, 4.8),
+    "living-room": (4.6, 5.6, 4.6, 5.6),
+    "bedroom": (4.4, 5.2, 4.2, 5.0),
+    "bathroom": (3.4, 4.2, 3.2, 4.0),
+}
+_DOOR = 0.5  # half of a doorway's width, metres
+_DRAWS = 20  # attempts at a scene
+_REACHABLE_SHARE = 0.85  # of a room's free floor that the agent must get to
+_REACH = 0.75  # metres from a place to stand to a receptacle's box
+SCENE_TYPES = (*_FURNISH, "house")
+
+
+def build_scene(scene_type: str, seed: int) -> World:
+    """Return the world of `<scene_type>-<seed>`: the first draw of furniture that leaves every room accessible.
+
+    Raises:
+        SimulatorError: no draw does.
+    """
+    for attempt in range(_DRAWS):
+        # Each attempt of each scene has a random stream of its own, whatever the attempts before it drew.
+        random = np.random.default_rng([zlib.crc32(scene_type.encode()), seed, attempt])
+        if scene_type == "house":
+            plans, doors = _house_plans(random, seed)
+        else:
+            plans, doors = [RoomPlan(_shell(scene_type, random, seed), random)], []
+            _furnish(plans[0], scene_type)
+        world = build_world(f"{scene_type}-{seed}", seed, plans, doors)
+        if all(_is_accessible(world, plan) for plan in plans):
+            return world
+    raise SimulatorError(
+        f"{scene_type}-{seed}: all {_DRAWS} draws of furniture block the way; use another seed"
+    )
+
+
+def _is_accessible(world: World, plan: RoomPlan) -> bool:
+    """Return whether the agent gets to most of a room's free floor, and near all its receptacles."""
+    free = plan.free_cells()
+    reached = [cell for cell in free if world.nav.can_stand(*cell)]
+    if len(reached) < _REACHABLE_SHARE * len(free):
+        return False
+    cells = np.array(reached)
+    for item in plan.objects:
+        low, high = item.bounds()
+        if item.type.receptacle and level_gaps(cells, low, high).min() > _REACH:
+            return False
+    return True
+
+
+def _shell(room_type: str, random: np.random.Generator, seed: int) -> RoomShell:
+    """Return a room around (0, 0), of a random size that suits its type."""
+    least_x, most_x, least_z, most_z = _SIZES[room_type]
+    width, length = (
+        round(random.uniform(least_x, most_x) / 2, 2),
+        round(random.uniform(least_z, most_z) / 2, 2),
+    )
+    return RoomShell(-width, width, -length, length, floor_style=_FLOORS[room_type], style=seed)
+
+
+def _furnish(plan: RoomPlan, room_type: str) -> None:
+    """Put in the floor, the furniture of a type of room, and a light switch that is on."""
+    room = plan.room
+    floor = plan.place(
+        "Floor", (room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2, y=room.floor - 0.1,
+        size=(room.x_max - room.x_min, 0.1, room.z_max - room.z_min),
+    )  # fmt: skip
+    floor.style = FLOOR_STYLES.index(room.floor_style)
+    _FURNISH[room_type](plan)
+    switch = plan.try_against("LightSwitch", ["z-", "x-", "x+"], (0.1, 0.14, 0.02), y=1.2)
+    if switch is not None:
+        switch.state.toggled = True
+
+
+def _house_plans(
+    random: np.random.Generator, seed: int
+) -> tuple[list[RoomPlan], list[tuple[float, float]]]:
+    """Return the plans of four rooms, two by two with doorways between them, and the cells in the doorways."""
+    west, east = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.6, 5.2), 2)
+    south, north = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.4, 5.0), 2)
+    gap = 0.1  # the thickness of an inner wall
+    spans = {
+        "living-room": (-west, 0.0, -south, 0.0),
+        "bedroom": (gap, east, -south, 0.0),
+        "kitchen": (-west, 0.0, gap, north),
+        "bathroom": (gap, min(east, 4.2), gap, min(north, 4.2)),
+    }
+    door_x, door_z = -round(west * 0.22, 2), -round(south * 0.72, 2)
+    upper_z = round(gap + 1.0, 2)
+    openings = {
+        "living-room": (
+            ("z+", door_x - _DOOR, door_x + _DOOR),
+            ("x+", door_z - _DOOR, door_z + _DOOR),
+        ),
+        "bedroom": (("x-", door_z - _DOOR, door_z + _DOOR),),
+        "kitchen": (
+            ("z-", door_x - _DOOR, door_x + _DOOR),
+            ("x+", upper_z - _DOOR, upper_z + _DOOR),
+        ),
+        "bathroom": (("x-", upper_z - _DOOR, upper_z + _DOOR),),
+    }
+    plans: list[RoomPlan] = []
+    for room_type, (x0, x1, z0, z1) in spans.items():
+        style, doorways = seed + len(plans), openings[room_type]
+        room = RoomShell(
+            x0, x1, z0, z1, floor_style=_FLOORS[room_type], style=style, openings=doorways
+        )
+        plan = RoomPlan(room, random)
+        plan.keep_doors_free()
+        _furnish(plan, room_type)
+        plans.append(plan)
+    doors = _doorway_cells(door_x, gap / 2, True)
+    doors += _doorway_cells(door_z, gap / 2, False)
+    doors += _doorway_cells(upper_z, gap / 2, False)
+    return plans, doors
+
+
+def _doorway_cells(at: float, across: float, along_x: bool) -> list[tuple[float, float]]:
+    """Return the cells in a doorway with its middle at `at` along a wall, and the wall at `across`.
+
+    The free floor of each room ends before the wall, so these cells join the rooms.
+    """
+    lines = [
+        v
+        for v in np.arange(round((at - _DOOR) * 4), round((at + _DOOR) * 4) + 1) * 0.25
+        if abs(v - at) < 0.28
+    ]
+    steps = np.arange(-3, 4) * 0.25
+    near = [s for s in steps if abs(s - across) < 0.4]
+    return [(float(a), float(s)) if along_x else (float(s), float(a)) for a in lines for s in near]

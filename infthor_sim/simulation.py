@@ -1,0 +1,95 @@
+"""The state of a running simulator: its scene, settings, cameras, random numbers and saved states."""
+
+import copy
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from infthor_sim.arm.equipment import equip
+from infthor_sim.objects import SimObject
+from infthor_sim.pictures.cameras import ThirdPartyCamera
+from infthor_sim.pictures.views import Display, Views
+from infthor_sim.pictures.vision import AgentVision
+from infthor_sim.scenes.catalogue import Catalogue
+from infthor_sim.settings import SimulatorSettings
+from infthor_sim.world import World
+
+__all__ = ["Simulation"]
+
+
+@dataclass
+class Simulation:
+    """The state that actions read and change.
+
+    Attributes:
+        catalogue: builds worlds from scene names.
+        display: size and quality of the pictures.
+        settings: the agent's settings, as the last Initialize left them.
+        cameras: third-party cameras, by their ids.
+        random: random numbers of the actions that draw some.
+        object_filter: ids of the objects that replies list; None for all.
+        failed_reset: why the last Reset loaded no scene. Initialize repeats it, as the client reads only its reply.
+        world: the scene.
+        views: pictures of the scene.
+        vision: queries about what the agent sees.
+    """
+
+    catalogue: Catalogue
+    display: Display = field(default_factory=Display)
+    settings: SimulatorSettings = field(default_factory=SimulatorSettings)
+    cameras: list[ThirdPartyCamera] = field(default_factory=list)
+    random: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+    object_filter: frozenset[str] | None = None
+    failed_reset: str = ""
+    world: World = field(init=False)
+    views: Views = field(init=False)
+    vision: AgentVision = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.load(self.catalogue.empty())
+
+    def load(self, world: World) -> None:
+        """Make `world` the present scene; settings stay until the next Initialize."""
+        self.cameras.clear()
+        self.object_filter = None
+        self.random = np.random.default_rng(world.seed)
+        self._saved: dict[int, tuple[World, np.random.Generator]] = {}
+        equip(world, self.settings.agent_mode)
+        self._show(world)
+
+    def configure(self, settings: SimulatorSettings) -> None:
+        """Give the agent other settings and the arm of their agent mode."""
+        self.settings = self.views.settings = self.vision.settings = settings
+        equip(self.world, settings.agent_mode)
+
+    def save(self, slot: int) -> None:
+        """Keep a copy of the scene's state and of the random numbers; replaces what the slot held."""
+        self._saved[slot] = copy.deepcopy((self.world, self.random))
+
+    def restore(self, slot: int) -> bool:
+        """Bring back the state that a slot keeps, which stays kept; return False if it has none of this scene."""
+        if slot not in self._saved:
+            return False
+        world, self.random = copy.deepcopy(self._saved[slot])
+        # Caches (packed metadata, primitives) compare versions. Objects of the restored state get versions that
+        # neither state has used, so that nothing cached for the abandoned one is taken for theirs.
+        newest = max(
+            (item.version for w in (self.world, world) for item in w.objects.values()), default=0
+        )
+        for item in world.objects.values():
+            item.version = newest + 1
+        world.version = self.world.version + 1
+        self._show(world)
+        return True
+
+    def _show(self, world: World) -> None:
+        self.world = world
+        self.views = Views(world, self.display, self.settings)
+        self.vision = AgentVision(world, self.views, self.display, self.settings)
+
+    def reported_objects(self) -> list[SimObject]:
+        """Return the objects that replies list, in the order of the metadata."""
+        objects = self.world.objects.values()
+        return [
+            o for o in objects if self.object_filter is None or o.object_id in self.object_filter
+        ]

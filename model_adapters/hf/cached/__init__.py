@@ -1,0 +1,1 @@
+"""A model behind a KV cache: encoded prefixes, several continuations, replies token by token."""

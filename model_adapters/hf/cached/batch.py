@@ -1,0 +1,117 @@
+"""Continuations of one encoded prefix, answered together: behind the prefix in one sequence, decoded in lockstep."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import torch
+
+from model_adapters.hf.cached.branch_attention import BranchAttention
+from model_adapters.hf.cached.decoding import ReplyState, decode_replies
+from model_adapters.hf.cached.prefix import Prefix, chunks
+from model_adapters.hf.prompting.embedding import EmbeddedSpan, Embedder
+from model_adapters.hf.prompting.prompt import Piece
+
+__all__ = ["answer_together"]
+
+_Span = tuple[int, EmbeddedSpan]  # of a branch
+
+
+class _Branches:
+    """Continuations of a prefix, each with the positions that it has alone."""
+
+    def __init__(self, model: Any, embed: Embedder, prefix: Prefix, n_branches: int) -> None:
+        self._model = model
+        self._embed = embed
+        self._prefix = prefix
+        self._ends = [prefix.end] * n_branches  # position of the next token of each
+        self._places = [prefix.n_tokens] * n_branches  # tokens of each, with the prefix
+        device = model.get_input_embeddings().weight.device
+        self._attention = BranchAttention(model.get_decoder().config, prefix.n_tokens, device)
+
+    @torch.inference_mode()
+    def feed(self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int) -> torch.Tensor:
+        """Encode all continuations; return the logits of each one's next token, (branches, vocabulary)."""
+        logits: dict[int, torch.Tensor] = {}
+        for group in self._groups(continuations, chunk_tokens):
+            logits |= self._forward(
+                group
+            )  # the last chunk of a branch has the logits of its next token
+        return torch.stack([logits[branch] for branch in range(len(continuations))])
+
+    def _groups(
+        self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int
+    ) -> Iterator[list[_Span]]:
+        """Yield chunks of branches that are encoded in one forward pass."""
+        group: list[_Span] = []
+        n_tokens = 0
+        for branch, pieces in enumerate(continuations):
+            for chunk in chunks(pieces, chunk_tokens):
+                span = self._embed(chunk, self._ends[branch])
+                self._ends[branch] = span.end
+                if group and n_tokens + len(span.embeds) > chunk_tokens:
+                    yield group
+                    group, n_tokens = [], 0
+                group.append((branch, span))
+                n_tokens += len(span.embeds)
+        yield group
+
+    @torch.inference_mode()
+    def step(self, tokens: Mapping[int, int]) -> torch.Tensor:
+        """Feed one token to each of some branches; return the logits of the next, (these branches, vocabulary)."""
+        span = self._embed.words(list(tokens.values()), [self._ends[branch] for branch in tokens])
+        for branch in tokens:
+            self._ends[branch] += 1
+        return self._logits(span.embeds, span.positions, list(tokens), slice(None))
+
+    def _forward(self, group: Sequence[_Span]) -> dict[int, torch.Tensor]:
+        """Encode chunks of branches; return the logits behind each branch's last one, (vocabulary,)."""
+        owners = [branch for branch, span in group for _ in span.embeds]
+        last = {branch: at for at, branch in enumerate(owners)}
+        positions = torch.cat([span.positions for _, span in group], dim=-1)
+        embeds = torch.cat([span.embeds for _, span in group])
+        rows = self._logits(embeds, positions, owners, torch.tensor(list(last.values())))
+        return dict(zip(last, rows, strict=True))
+
+    def _logits(
+        self,
+        embeds: torch.Tensor,
+        positions: torch.Tensor,
+        owners: Sequence[int],
+        keep: slice | torch.Tensor,
+    ) -> torch.Tensor:
+        """Encode tokens of the owners' branches; return the logits of the kept ones, (kept, vocabulary)."""
+        places = []
+        for branch in owners:
+            places.append(self._places[branch])
+            self._places[branch] += 1
+        with self._attention.appended(owners, places):
+            output = self._model(
+                inputs_embeds=embeds[None],
+                position_ids=positions,
+                past_key_values=self._prefix.cache,
+                use_cache=True,
+                logits_to_keep=keep,
+            )
+        logits: torch.Tensor = output.logits[0]
+        return logits
+
+
+def answer_together(
+    model: Any,
+    embed: Embedder,
+    *,
+    prefix: Prefix,
+    prompts: Sequence[Sequence[Piece]],
+    n_shared: int,
+    replies: Sequence[ReplyState],
+    chunk_tokens: int,
+) -> None:
+    """Decode the replies to prompts that begin with the same `n_shared` pieces, each prompt with more behind them.
+
+    `prefix` has encoded the shared pieces and nothing more, and has no more afterwards; `replies` are empty, one for
+    each prompt.
+    """
+    continuations = [prompt[n_shared:] for prompt in prompts]
+    branches = _Branches(model, embed, prefix, len(prompts))
+    with prefix.extended(continuations, sum(reply.decoding.max_new_tokens for reply in replies)):
+        decode_replies(branches.feed(continuations, chunk_tokens), branches.step, replies)

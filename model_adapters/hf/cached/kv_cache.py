@@ -1,0 +1,107 @@
+"""A KV cache that is cut and refilled in place.
+
+transformers' DynamicCache concatenates, which copies the whole prefix for every decoded token and again after every
+crop. Here keys and values are views on buffers with spare capacity: an update writes its own rows only, and a crop
+moves no memory, so rewinding a conversation costs nothing.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from transformers.cache_utils import Cache, DynamicLayer
+
+__all__ = ["BufferedCache"]
+
+_STEP = 1024  # capacities are multiples of this, so that a slightly longer question does not reallocate the prefix
+
+
+@dataclass
+class _Allocation:
+    """Allocation settings that a cache shares with its layers.
+
+    Layers do not refer to the cache itself: in a reference cycle, unused buffers would stay in memory beside their
+    successors until Python's cyclic garbage collector runs.
+    """
+
+    storage: (
+        torch.device | None
+    )  # device of the buffers; the device of the layers' weights where None
+    capacity: int = 0  # tokens that a buffer holds when it is next allocated
+
+
+class BufferedCache(Cache):
+    """A cache of `BufferedLayer`s, which are created as the model reaches its layers."""
+
+    def __init__(self, storage: torch.device | None = None) -> None:
+        """Create an empty cache with buffers on the `storage` device; on that of the layers' weights where None.
+
+        With the CPU as storage, only the computing layer's keys and values are on the weights' device: a context that
+        does not fit on the device runs, at the speed of the connection.
+        """
+        self._allocation = _Allocation(storage)
+        super().__init__(layers=[])
+
+    def update(
+        self,
+        key_states: torch.Tensor,
+        value_states: torch.Tensor,
+        layer_idx: int,
+        *args: Any,
+        **kwargs: Any,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Append one layer's new states to its old ones and return all."""
+        while len(self.layers) <= layer_idx:
+            self.layers.append(BufferedLayer(self._allocation))
+        return super().update(key_states, value_states, layer_idx, *args, **kwargs)
+
+    def reserve(self, n_tokens: int) -> None:
+        """Set the capacity of buffers that are allocated from now on, so that they need not grow step by step."""
+        self._allocation.capacity = -(-n_tokens // _STEP) * _STEP
+
+    def truncate(self, n_tokens: int) -> None:
+        """Keep the first `n_tokens` tokens; memory stays allocated."""
+        excess = self.get_seq_length() - n_tokens
+        if excess > 0:
+            self.crop(-excess)
+
+
+class BufferedLayer(DynamicLayer):
+    """Keys and values of one layer; `keys` and `values` are views on the used part of the buffers.
+
+    Buffers have the shape (batch, heads, capacity, head size).
+    """
+
+    def __init__(self, allocation: _Allocation) -> None:
+        super().__init__()
+        self._allocation = allocation
+        self._buffers: tuple[torch.Tensor, torch.Tensor] | None = None
+
+    def update(
+        self, key_states: torch.Tensor, value_states: torch.Tensor, *args: Any, **kwargs: Any
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Append the new states to the old ones and return all, on the states' device."""
+        if not self.is_initialized:
+            self.lazy_initialization(key_states, value_states)
+        old = self.get_seq_length()
+        new = old + key_states.shape[-2]
+        if self._buffers is None or self._buffers[0].shape[-2] < new:
+            capacity = max(new, self._allocation.capacity)
+            self._buffers = (
+                self._grow(key_states, old, capacity, self.keys),
+                self._grow(value_states, old, capacity, self.values),
+            )
+        keys, values = self._buffers
+        keys[..., old:new, :] = key_states
+        values[..., old:new, :] = value_states
+        self.keys, self.values = keys[..., :new, :], values[..., :new, :]
+        return self.keys.to(key_states.device), self.values.to(value_states.device)
+
+    def _grow(
+        self, like: torch.Tensor, old: int, capacity: int, used: torch.Tensor | None
+    ) -> torch.Tensor:
+        device = self._allocation.storage or like.device
+        buffer = like.new_empty((*like.shape[:-2], capacity, like.shape[-1]), device=device)
+        if used is not None and old:
+            buffer[..., :old, :] = used
+        return buffer

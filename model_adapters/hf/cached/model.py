@@ -1,0 +1,145 @@
+"""Any transformers model of a known family as a `Model`: conversations that share one encoded prefix."""
+
+from collections.abc import Sequence
+
+import torch
+
+from infthor_eval.errors import ModelError
+from model_adapters.hf.cached.batch import answer_together
+from model_adapters.hf.cached.branch_attention import can_branch
+from model_adapters.hf.cached.decoding import ReplyState, decode_replies
+from model_adapters.hf.cached.prefix import Prefix
+from model_adapters.hf.cached.replies import begin_reply, end_reply
+from model_adapters.hf.checkpoint_model import HfModel
+from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.hf.loading.rope import take_length_rope
+from model_adapters.hf.prompting.embedding import Embedder
+from model_adapters.hf.prompting.features import FeatureCache
+from model_adapters.hf.prompting.prompt import Piece, n_common, n_tokens, token_ids
+from model_adapters.hf.threads import torch_threads
+from model_adapters.options.checkpoints import HfOptions
+from model_adapters.protocols import Decoding, Reply, Turn
+
+__all__ = ["TransformersModel"]
+
+
+class TransformersModel(HfModel):
+    """A loaded checkpoint behind the `Model` protocol.
+
+    All conversations of a model share one encoded sequence. A reply reuses what its prompt has in common with the
+    previous prompt, whichever conversation that was of, so conversations over the same frames encode them once.
+    """
+
+    def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
+        super().__init__(name, loaded, options)
+        cache_bytes = options.feature_cache_mb * 2**20 if options.share_prefix else 0
+        self._features = FeatureCache(loaded.family, cache_bytes)
+        self._embed = Embedder(loaded.model, loaded.family, self._features)
+        self._rope = take_length_rope(loaded.model)
+        self._prefix = Prefix(
+            loaded.model,
+            loaded.family,
+            self._embed,
+            chunk_tokens=options.chunk_tokens,
+            rope=self._rope,
+            storage=torch.device("cpu") if options.kv_offload else None,
+        )
+
+    def fix_rope(self, n_positions: int) -> None:
+        """Give all sequences of a training the rotary frequencies of one length, where they depend on the length."""
+        if self._rope is not None:
+            self._rope.set(n_positions)
+
+    def close(self) -> None:
+        """Free the KV cache, the features and the weights."""
+        self._prefix.reset()
+        self._features.clear()
+        del self._prefix, self._embed, self._features, self._rope
+        super().close()
+
+    def encode(self, pieces: Sequence[Piece]) -> torch.Tensor:
+        """Encode a prompt from scratch, in two parts; return the logits of the next token, (vocabulary,)."""
+        self._prefix.reset()
+        self._prefix.rewind_to(pieces)
+        self._prefix.feed(pieces[:2])
+        return self._prefix.feed(pieces[2:])
+
+    def answer_each(
+        self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
+    ) -> list[Reply]:
+        """Answer several conversations, `batch_size` at a time; see `Conversation.replies`."""
+        with wrap_model_errors(self.name):
+            prompts = [self.pieces(turns) for turns in conversations]
+        for prompt in prompts:
+            check_limit(
+                self.name, n_tokens(prompt), decoding.max_new_tokens, self.capabilities.max_tokens
+            )
+        size = self._batch_size
+        batches = [prompts[at : at + size] for at in range(0, len(prompts), size)]
+        with torch_threads(self._threads):
+            return [reply for batch in batches for reply in self._answer_batch(batch, decoding)]
+
+    @property
+    def _batch_size(self) -> int:
+        # Branches have to share one prefix and one set of rotary frequencies.
+        branches = (
+            self._options.share_prefix and self._rope is None and can_branch(self._loaded.model)
+        )
+        return self._options.batch_size if branches else 1
+
+    def _answer_batch(self, prompts: Sequence[Sequence[Piece]], decoding: Decoding) -> list[Reply]:
+        if not self._options.share_prefix:
+            self._prefix.reset()
+        replies = [begin_reply(self._loaded, decoding, token_ids(prompt)) for prompt in prompts]
+        decode = self._decode_one if len(prompts) == 1 else self._decode_branches
+        try:
+            with (
+                wrap_model_errors(self.name),
+                wrap_memory_errors(self.name, sum(map(n_tokens, prompts))),
+            ):
+                n_cached = decode(prompts, replies)
+        except ModelError:
+            # After running out of memory, the next request needs all of it.
+            self._prefix.reset()
+            self._features.clear()
+            raise
+        return [
+            end_reply(self._loaded, reply, n_tokens(prompt), cached)
+            for reply, prompt, cached in zip(replies, prompts, n_cached, strict=True)
+        ]
+
+    def _decode_one(
+        self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
+    ) -> list[int]:
+        """Decode a single reply; return how many tokens of the prompt were in the cache."""
+        (prompt,), (reply,) = prompts, replies
+        shared = self._prefix.rewind_to(prompt)
+        cached = self._prefix.n_tokens
+        logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)
+        decode_replies(
+            logits[None], lambda tokens: self._prefix.feed(list(tokens.values()))[None], [reply]
+        )
+        return [cached]
+
+    def _decode_branches(
+        self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
+    ) -> list[int]:
+        """Decode several replies together; return how many tokens of each prompt were in the cache."""
+        common = n_common(prompts)
+        shared = min(self._prefix.rewind_to(prompts[0]), common)
+        # The cached sequence may share more with the first prompt than all prompts share.
+        self._prefix.cut(shared)
+        cached = self._prefix.n_tokens
+        if shared < common:
+            self._prefix.feed(prompts[0][shared:common])
+        answer_together(
+            self._loaded.model,
+            self._embed,
+            prefix=self._prefix,
+            prompts=prompts,
+            n_shared=common,
+            replies=replies,
+            chunk_tokens=self._options.chunk_tokens,
+        )
+        return [cached, *[self._prefix.n_tokens] * (len(prompts) - 1)]

@@ -1,0 +1,184 @@
+"""The sequence that a model has encoded: its KV cache and the pieces in it.
+
+A new prompt is compared with the encoded pieces, the cache is cut behind the longest common prefix, and only the rest
+is encoded. This is done in chunks, so that the activations of one chunk are the most that a long prompt needs. Chunks
+attend to the cache, so the numbers differ from those of one pass only by rounding.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import torch
+
+from model_adapters.hf.cached.kv_cache import BufferedCache
+from model_adapters.hf.family import Family
+from model_adapters.hf.loading.rope import LengthRope
+from model_adapters.hf.prompting.embedding import Embedder
+from model_adapters.hf.prompting.prompt import Piece, n_tokens, token_ids
+
+__all__ = ["Prefix", "chunks"]
+
+
+class Prefix:
+    """The one encoded sequence of a model.
+
+    Args:
+        model: a transformers model that takes `inputs_embeds`, `position_ids` and `past_key_values`.
+        family: family of the model.
+        embed: embeds spans of prompts.
+        chunk_tokens: most tokens of one forward pass (a larger frame is a chunk alone).
+        rope: rotary embeddings of the model if their frequencies depend on the prompt's length, else None.
+        storage: device of keys and values; the device of the weights where None.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        family: Family,
+        embed: Embedder,
+        *,
+        chunk_tokens: int,
+        rope: LengthRope | None = None,
+        storage: torch.device | None = None,
+    ) -> None:
+        self._model = model
+        self._family = family
+        self._rope = rope
+        self._rope_key = -1
+        self._storage = storage
+        self._embed = embed
+        self._chunk_tokens = chunk_tokens
+        self.reset()
+
+    def reset(self) -> None:
+        """Drop the sequence and free its memory."""
+        self._cache = BufferedCache(self._storage)
+        self._pieces: list[Piece] = []
+        self._ends: list[int] = []  # tokens up to the end of each piece
+        self._starts: list[int] = [
+            0
+        ]  # position behind everything before each piece, and of the next token
+
+    @property
+    def n_tokens(self) -> int:
+        """Tokens in the sequence."""
+        return self._ends[-1] if self._ends else 0
+
+    @property
+    def end(self) -> int:
+        """Position of the next token."""
+        return self._starts[-1]
+
+    @property
+    def cache(self) -> BufferedCache:
+        """Keys and values of the sequence."""
+        return self._cache
+
+    @contextmanager
+    def extended(self, continuations: Sequence[Sequence[Piece]], reserve: int) -> Iterator[None]:
+        """Let others append to the cache within the context, what these continuations and some more tokens need."""
+        self._cache.reserve(self.n_tokens + sum(map(n_tokens, continuations)) + reserve)
+        done = False
+        try:
+            yield
+            done = True
+        finally:
+            if done:
+                self._cache.truncate(self.n_tokens)
+            else:  # some layers may have cached more than others
+                self.reset()
+
+    def rewind_to(self, pieces: Sequence[Piece]) -> int:
+        """Cut the sequence behind its longest common prefix with these pieces, of which at least one is left to feed.
+
+        The last piece is never shared: logits of the next token come only from feeding something.
+
+        Returns:
+            Number of shared pieces.
+        """
+        if self._rope is not None:
+            self._set_rope(self._rope, pieces)
+        shared = 0
+        for ours, theirs in zip(self._pieces, pieces[:-1], strict=False):
+            if ours is not theirs and ours != theirs:
+                break
+            shared += 1
+        self.cut(shared)
+        return shared
+
+    def _set_rope(self, rope: LengthRope, pieces: Sequence[Piece]) -> None:
+        """Set the rotary frequencies for a prompt; a sequence that was encoded with others is dropped."""
+        ids = torch.tensor(list(token_ids(pieces)))
+        shapes = [piece.shape for piece in pieces if not isinstance(piece, int)]
+        n_positions = int(self._family.positions(ids, shapes, 0).max()) + 1
+        if rope.key(n_positions) != self._rope_key:
+            self.reset()
+            rope.set(n_positions)
+            self._rope_key = rope.key(n_positions)
+
+    def cut(self, n_pieces: int) -> None:
+        """Keep the first `n_pieces` pieces."""
+        del self._pieces[n_pieces:], self._ends[n_pieces:], self._starts[n_pieces + 1 :]
+        self._cache.truncate(self.n_tokens)
+
+    def feed(self, pieces: Sequence[Piece], reserve: int = 0) -> torch.Tensor:
+        """Encode pieces behind the sequence.
+
+        Args:
+            pieces: pieces to append, at least one.
+            reserve: tokens to be fed later, for which memory is allocated at once.
+
+        Returns:
+            Logits of the token that follows the last piece, (vocabulary,).
+
+        Raises:
+            DataError: a frame cannot be read.
+            ModelError: processor and model disagree on the number of a frame's tokens.
+        """
+        self._cache.reserve(self.n_tokens + n_tokens(pieces) + reserve)
+        logits = None
+        for chunk in chunks(pieces, self._chunk_tokens):
+            logits = self._forward(chunk)
+        if logits is None:
+            raise ValueError("nothing to feed")
+        return logits
+
+    @torch.inference_mode()
+    def _forward(self, chunk: list[Piece]) -> torch.Tensor:
+        span = self._embed(chunk, self._starts[-1])
+        done = False
+        try:
+            output = self._model(
+                inputs_embeds=span.embeds[None],
+                position_ids=span.positions,
+                past_key_values=self._cache,
+                use_cache=True,
+                logits_to_keep=1,
+            )
+            done = True
+        finally:
+            if not done:  # some layers have cached the chunk and others have not
+                self.reset()
+        end = self.n_tokens
+        for piece in chunk:
+            end += 1 if isinstance(piece, int) else len(piece.ids)
+            self._pieces.append(piece)
+            self._ends.append(end)
+        self._starts[-1:] = [*span.starts, span.end]
+        return output.logits[0, -1]
+
+
+def chunks(pieces: Sequence[Piece], chunk_tokens: int) -> Iterator[list[Piece]]:
+    """Yield pieces in chunks of at most so many tokens; a larger frame is a chunk alone."""
+    chunk: list[Piece] = []
+    size = 0
+    for piece in pieces:
+        width = 1 if isinstance(piece, int) else len(piece.ids)
+        if chunk and size + width > chunk_tokens:
+            yield chunk
+            chunk, size = [], 0
+        chunk.append(piece)
+        size += width
+    if chunk:
+        yield chunk

@@ -1,0 +1,75 @@
+"""Start and end of a reply, however its tokens are computed."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from model_adapters.hf.cached.choices import read_choices
+from model_adapters.hf.cached.decoding import ReplyState
+from model_adapters.hf.loading.loaded import LoadedCheckpoint
+from model_adapters.protocols import Decoding, Reply
+from model_adapters.stopping import cut_at_stop
+
+__all__ = ["begin_reply", "end_reply", "reply_text", "stop_ids"]
+
+
+def begin_reply(loaded: LoadedCheckpoint, decoding: Decoding, context: Iterable[int]) -> ReplyState:
+    """Return an empty reply; the context has all ids before it.
+
+    Raises:
+        ModelError: one of the choices has more tokens than the reply may have.
+    """
+    ends = stop_ids(loaded.tokenizer, decoding)
+
+    def has_stopped(ids: list[int]) -> bool:
+        if not decoding.stop:  # saves decoding the text after every token
+            return False
+        return ids[-1] in ends or cut_at_stop(_text(loaded, ids), decoding.stop) is not None
+
+    choices = read_choices(loaded.tokenizer, decoding)
+    return ReplyState(
+        loaded.generation, decoding, context=context, choices=choices, finished=has_stopped
+    )
+
+
+def end_reply(loaded: LoadedCheckpoint, state: ReplyState, n_context: int, n_cached: int) -> Reply:
+    """Return a finished reply; `n_cached` tokens of its context were not encoded again."""
+    return Reply(
+        state.choice or reply_text(loaded, state.ids, state.decoding),
+        n_reply_tokens=len(state.ids),
+        n_context_tokens=n_context,
+        n_cached_tokens=n_cached,
+        token_ids=tuple(state.ids),
+    )
+
+
+def reply_text(loaded: LoadedCheckpoint, ids: Sequence[int], decoding: Decoding) -> str:
+    """Return the text of a free reply before its first stop string; the ids have no end token.
+
+    A marker of thoughts that the template wrote before the reply is there, too, as if the model had written it.
+    """
+    text = _text(loaded, ids)
+    before_stop = cut_at_stop(text, decoding.stop)
+    return loaded.opening + (text if before_stop is None else before_stop)
+
+
+def stop_ids(tokenizer: Any, decoding: Decoding) -> set[int]:
+    """Return the ids of stop strings that are single tokens; special tokens never appear in the text of a reply."""
+    if not decoding.stop:
+        return set()
+    added: dict[str, int] = tokenizer.get_added_vocab()
+    return {added[string] for string in decoding.stop if string in added}
+
+
+def _text(loaded: LoadedCheckpoint, ids: Sequence[int]) -> str:
+    """Return the text of a reply without special tokens, but for those that mark what the model thinks."""
+    pieces: list[str] = []
+    start = 0
+    for at, token in enumerate(ids):
+        if token in loaded.marker_ids:
+            pieces += _decoded(loaded, ids[start:at]), loaded.marker_ids[token]
+            start = at + 1
+    return "".join((*pieces, _decoded(loaded, ids[start:])))
+
+
+def _decoded(loaded: LoadedCheckpoint, ids: Sequence[int]) -> str:
+    return str(loaded.tokenizer.decode(list(ids), skip_special_tokens=True))

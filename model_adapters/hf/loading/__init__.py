@@ -1,0 +1,1 @@
+"""Loading a checkpoint: where it is, its weights, card and positions."""

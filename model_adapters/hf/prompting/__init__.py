@@ -1,0 +1,1 @@
+"""From the turns of a conversation to what a language model reads."""

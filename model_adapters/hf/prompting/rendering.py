@@ -1,0 +1,211 @@
+"""From the turns of a conversation to the text that the checkpoint's chat template renders."""
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from jinja2 import TemplateError
+
+from infthor_eval.errors import ModelError, wrap_errors
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.storage.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
+from model_adapters.hf.prompting.memory_limit import OutOfMemoryError, limit_memory
+from model_adapters.hf.prompting.time_limit import OutOfTimeError, limit_time
+from model_adapters.protocols import Part, Turn, Video
+
+__all__ = ["Marks", "prompt_end", "render", "starts_with_bos", "writes_videos"]
+
+# Errors of a template that is broken or does not support the turns: Jinja's, and those of its expressions.
+_REFUSALS = (
+    TemplateError,
+    TypeError,  # a list where the template joins strings
+    ValueError,
+    LookupError,
+    ArithmeticError,
+    AttributeError,
+    RecursionError,
+)
+_PRINTED = "{'type': 'text'"  # appears where a template that expects a string prints a list
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Tokens that stand for a frame and for a video in the text of a template; `video` is None if there is none."""
+
+    image: str
+    video: str | None = None
+
+    def of(self, part: Part) -> str:
+        """Return the text that a part has in a template: the token of a frame or a video, a text without its edges."""
+        if isinstance(part, Video):
+            return self.video or ""
+        return self.image if isinstance(part, FrameRef) else part.strip()
+
+
+def render(tokenizer: Any, template: str, turns: Sequence[Turn], marks: Marks) -> str:
+    """Render the chat template over all turns, asking for the reply.
+
+    Some templates (LLaVA's) write all images of a turn before its texts. If that would move frames or videos away from
+    between the texts, the turn is passed as one text that contains their tokens. Some templates (Pixtral's) accept a
+    system turn only as a string instead of a list of texts.
+
+    Raises:
+        ModelError: the template refuses the turns, or drops a text.
+    """
+    trials = [_render_alone(tokenizer, template, turn) for turn in turns]
+    ordered = [
+        _with_frames_in_place(turn, trial, marks) for turn, trial in zip(turns, trials, strict=True)
+    ]
+    if len(turns) == 1 and trials[0] is not None and ordered[0] == replace(turns[0], role="user"):
+        return trials[0]  # the trial rendered the whole conversation
+    with_lists = [_message(turn) for turn in ordered]
+    try:
+        return _apply(tokenizer, template, ordered, with_lists)
+    except ModelError:
+        with_strings = [_string_message(turn) for turn in ordered]
+        if with_strings == with_lists:
+            raise
+    return _apply(tokenizer, template, ordered, with_strings)
+
+
+def starts_with_bos(tokenizer: Any, text: str) -> bool:
+    """Return whether the template wrote the beginning-of-sequence token; if not, the tokenizer has to add it."""
+    return tokenizer.bos_token is not None and text.startswith(tokenizer.bos_token)
+
+
+def writes_videos(tokenizer: Any, template: str, marks: Marks) -> bool:
+    """Return whether a template writes the token of a video where a turn has one; no video is looked at."""
+    if marks.video is None:
+        return False
+    messages = [
+        {
+            "role": "user",
+            "content": [{"type": "video"}, {"type": "text", "text": "?", "content": "?"}],
+        }
+    ]
+    try:
+        return _apply(tokenizer, template, (), messages).count(marks.video) == 1
+    except ModelError:
+        return False
+
+
+def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
+    """Return the text of a turn with texts and more, as a user's only turn; None for other turns.
+
+    It is rendered alone because templates may treat a turn differently when another one follows.
+    """
+    if len({isinstance(part, str) for part in turn.parts}) < 2:
+        return None
+    alone = replace(turn, role="user")
+    return _apply(tokenizer, template, [alone], [_message(alone)])
+
+
+def prompt_end(tokenizer: Any, template: str) -> str:
+    """Return what the template writes behind a turn of the user; empty if it refuses one without frames."""
+    asked = "?"
+    try:
+        text = _apply(tokenizer, template, (turn := Turn("user", (asked,)),), [_message(turn)])
+    except ModelError:
+        return ""
+    return text.rpartition(asked)[2]
+
+
+def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:
+    """Return the turn as one text with tokens of frames and videos if the template would change its parts' order."""
+    parts = [marks.of(part) for part in turn.parts]
+    tokens = Counter(marks.of(part) for part in turn.parts if not isinstance(part, str))
+    if (
+        trial is None
+        or any(trial.count(token) != n for token, n in tokens.items())
+        or _in_order(trial, parts)
+    ):
+        return turn
+    return replace(
+        turn,
+        parts=("".join(part if isinstance(part, str) else marks.of(part) for part in turn.parts),),
+    )
+
+
+def _message(turn: Turn) -> dict[str, Any]:
+    return {"role": turn.role, "content": [_item(part) for part in turn.parts]}
+
+
+def _item(part: Part) -> dict[str, str]:
+    if isinstance(part, str):
+        return {
+            "type": "text",
+            "text": part,
+            "content": part,
+        }  # most templates read "text", a few "content"
+    return {"type": "video" if isinstance(part, Video) else "image"}
+
+
+def _string_message(turn: Turn) -> dict[str, Any]:
+    text = turn.parts[0]
+    if turn.role == "user" or len(turn.parts) > 1 or not isinstance(text, str):
+        return _message(turn)
+    return {"role": turn.role, "content": text}
+
+
+def _apply(
+    tokenizer: Any, template: str, turns: Sequence[Turn], messages: Sequence[dict[str, Any]]
+) -> str:
+    problem = f"the chat template refuses {_roles(turns)}"
+    # A template is code that comes with the checkpoint: it must neither run forever nor use up the memory.
+    with (
+        wrap_errors(
+            problem, f"fix it; {TEMPLATE_SECONDS.hint}", catch=OutOfTimeError, raise_as=ModelError
+        ),
+        wrap_errors(
+            problem, f"fix it; {TEMPLATE_MB.hint}", catch=OutOfMemoryError, raise_as=ModelError
+        ),
+        wrap_errors(problem, "use other turns, or fix it", catch=_REFUSALS, raise_as=ModelError),
+        limit_time(TEMPLATE_SECONDS.value),
+        limit_memory(TEMPLATE_MB.value),
+    ):
+        text: str = tokenizer.apply_chat_template(
+            list(messages), chat_template=template, tokenize=False, add_generation_prompt=True
+        )
+    if len(text) > TEMPLATE_CHARACTERS.value:  # the tokenizer would take minutes and gigabytes
+        raise ModelError(
+            f"{problem} (it writes {len(text):,} characters); fix it; {TEMPLATE_CHARACTERS.hint}"
+        )
+    _check_texts(text, turns)
+    return text
+
+
+def _check_texts(text: str, turns: Sequence[Turn]) -> None:
+    """Raise `ModelError` unless a rendered text contains every text of every turn."""
+    parts = [
+        (turn.role, part.strip()) for turn in turns for part in turn.parts if isinstance(part, str)
+    ]
+    # Counting scans the whole text for every part, so it is done only if the parts do not appear in order.
+    counts = (
+        {} if _in_order(text, (part for _, part in parts)) else Counter(part for _, part in parts)
+    )
+    for part, count in counts.items():
+        if text.count(part) < count:
+            roles = " or ".join(sorted({role for role, other in parts if other == part}))
+            raise ModelError(
+                f"the chat template drops the text {part[:40]!r} of a turn ({roles}); it cannot be used"
+            )
+    if _PRINTED in text and not any(_PRINTED in part for _, part in parts):
+        raise ModelError(
+            f"the chat template writes lists instead of texts for {_roles(turns)}; use other turns"
+        )
+
+
+def _roles(turns: Sequence[Turn]) -> str:
+    return "the turns " + ", ".join(turn.role for turn in turns)
+
+
+def _in_order(text: str, parts: Iterable[str]) -> bool:
+    """Return whether the parts appear in a rendered text in this order."""
+    at = 0
+    for part in parts:
+        at = text.find(part, at)
+        if at < 0:
+            return False
+        at += len(part)
+    return True

@@ -1,0 +1,118 @@
+"""Third-party cameras, the map view, resolutions: through the real Controller."""
+
+import numpy as np
+
+
+def test_third_party_frames(kitchen):
+    kitchen.reset("kitchen-1")
+    kitchen.step(
+        "AddThirdPartyCamera",
+        position={"x": 0, "y": 2, "z": 0},
+        rotation={"x": 60, "y": 0, "z": 0},
+        fieldOfView=90,
+    )
+    properties = kitchen.step("GetMapViewCameraProperties").metadata["actionReturn"]
+    event = kitchen.step(action="AddThirdPartyCamera", **properties)
+    assert len(event.third_party_camera_frames) == 2
+    assert len(event.third_party_depth_frames) == 2
+    assert len(event.third_party_instance_masks) == 2
+    above = event.third_party_instance_masks[1]
+    assert {name.split("|")[0] for name in above if "|" in name} >= {
+        "CounterTop",
+        "Fridge",
+        "DiningTable",
+    }
+    moved = kitchen.step(
+        "UpdateThirdPartyCamera", thirdPartyCameraId=0, rotation={"x": 60, "y": 90, "z": 0}
+    )
+    assert not np.array_equal(
+        moved.third_party_camera_frames[0], event.third_party_camera_frames[0]
+    )
+    assert np.array_equal(moved.third_party_camera_frames[1], event.third_party_camera_frames[1])
+    assert not kitchen.step("UpdateThirdPartyCamera", thirdPartyCameraId=7).metadata[
+        "lastActionSuccess"
+    ]
+    assert kitchen.reset("kitchen-1").third_party_camera_frames == []
+
+
+def test_map_view_is_to_scale(kitchen):
+    kitchen.reset("kitchen-1")
+    event = kitchen.step("ToggleMapView")
+    table = next(o for o in event.metadata["objects"] if o["objectType"] == "DiningTable")
+    bounds = event.metadata["sceneBounds"]["size"]
+    metres_per_pixel = (max(bounds["x"], bounds["z"]) + 0.2) / 300
+    x0, _, x1, _ = event.instance_detections2D[table["objectId"]]
+    width = table["axisAlignedBoundingBox"]["size"]["x"]
+    assert abs((x1 - x0 + 1) * metres_per_pixel - width) < 0.12
+    again = kitchen.step("ToggleMapView")
+    assert not np.array_equal(again.frame, event.frame)
+
+
+def test_resolution_changes(kitchen):
+    event = kitchen.reset("kitchen-1", width=200, height=120)
+    assert event.frame.shape == (120, 200, 3)
+    assert event.depth_frame.shape == (120, 200)
+    assert kitchen.reset("kitchen-1", width=300, height=300).frame.shape == (300, 300, 3)
+
+
+def test_frames_can_be_left_out(kitchen):
+    kitchen.reset("kitchen-1")
+    event = kitchen.step("Pass", renderImage=False, renderDepthImage=False)
+    assert event.frame is None
+    assert event.depth_frame is None
+    assert event.instance_masks is not None
+
+
+def test_a_camera_keeps_what_is_not_given(kitchen):
+    kitchen.reset("kitchen-1")
+    kitchen.step(
+        "AddThirdPartyCamera",
+        position={"x": 1, "y": 2, "z": 0},
+        rotation={"x": 30, "y": 40, "z": 50},
+        fieldOfView=45,
+    )
+    event = kitchen.step(
+        "UpdateThirdPartyCamera", position={"x": 0.5, "z": 0.2}, rotation={"y": 90}, fieldOfView=55
+    )
+    camera = event.metadata["thirdPartyCameras"][0]
+    assert camera["position"] == {"x": 0.5, "y": 2, "z": 0.2}
+    assert camera["rotation"] == {"x": 30, "y": 90, "z": 50}
+    assert camera["fieldOfView"] == 55
+    for angle in (-1, 0, 181):
+        refused = kitchen.step("UpdateThirdPartyCamera", fieldOfView=angle)
+        assert not refused.metadata["lastActionSuccess"]
+        assert refused.metadata["thirdPartyCameras"] == [camera]
+
+
+def test_a_camera_becomes_orthographic_and_back(kitchen):
+    kitchen.reset("kitchen-1")
+    above = {"position": {"x": 0, "y": 2.5, "z": 0}, "rotation": {"x": 90, "y": 0, "z": 0}}
+    plain = kitchen.step("AddThirdPartyCamera", **above).third_party_camera_frames[0]
+
+    def seen(**lens):
+        return kitchen.step(
+            "UpdateThirdPartyCamera", thirdPartyCameraId=0, **lens
+        ).third_party_camera_frames[0]
+
+    flat = seen(orthographic=True, orthographicSize=2.0)
+    assert not np.array_equal(flat, plain)
+    assert not np.array_equal(seen(orthographicSize=1.0), flat)
+    assert np.array_equal(seen(orthographicSize=2.0), flat)
+    assert np.array_equal(seen(orthographic=False), plain)
+
+
+def test_normals_face_the_camera(kitchen):
+    kitchen.reset("kitchen-1", renderNormalsImage=True)
+    kitchen.step("RotateLook", rotation=0, horizon=0)
+    event = kitchen.step(
+        "AddThirdPartyCamera", position={"x": 0, "y": 2, "z": 0}, rotation={"x": 90, "y": 0, "z": 0}
+    )
+    normals = event.normals_frame[..., :3] / 127.5 - 1
+    shown = event.normals_frame[..., :3].any(axis=-1)
+    assert np.allclose(np.linalg.norm(normals[shown], axis=-1), 1, atol=0.02)
+    assert (normals[shown][:, 2] > -0.65).all()  # rays at the frame's corner are 39 degrees off
+    assert (normals[shown][:, 2] > 0).mean() > 0.95
+    floor = event.third_party_normals_frames[0][..., :3] / 127.5 - 1
+    assert np.median(floor[..., 2]) > 0.98
+    assert kitchen.step("Pass", renderNormalsImage=False).normals_frame is None
+    kitchen.reset("kitchen-1", renderNormalsImage=False)

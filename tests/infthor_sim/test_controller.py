@@ -1,0 +1,73 @@
+"""The unmodified Controller against the simulator: handshake, pictures, errors."""
+
+import numpy as np
+import pytest
+
+
+def test_first_state_has_frame_depth_and_ids(kitchen):
+    event = kitchen.reset("kitchen-1")
+    assert event.frame.shape == (300, 300, 3)
+    assert event.depth_frame.shape == (300, 300)
+    assert event.metadata["sceneName"] == "kitchen-1"
+    assert len(event.metadata["objects"]) > 35
+    shown = [name for name in event.instance_masks if "|" in name]
+    assert shown, "no object is in view"
+    assert {o["objectId"] for o in event.metadata["objects"]} >= set(shown)
+
+
+def test_moves_and_turns(kitchen):
+    before = kitchen.reset("kitchen-1").metadata["agent"]
+    after = kitchen.step("RotateRight").metadata["agent"]
+    assert after["rotation"]["y"] == (before["rotation"]["y"] + 90) % 360
+    cells = {
+        (p["x"], p["z"]) for p in kitchen.step("GetReachablePositions").metadata["actionReturn"]
+    }
+    assert (before["position"]["x"], before["position"]["z"]) in cells
+    moved = kitchen.step("MoveAhead")
+    at = moved.metadata["agent"]["position"]
+    assert moved.metadata["lastActionSuccess"] == (
+        (round(at["x"], 2), round(at["z"], 2)) != (0.0, 0.0)
+    )
+    assert (at["x"], at["z"]) in cells
+
+
+def test_unknown_action_and_argument_raise_in_the_client(kitchen):
+    kitchen.reset("kitchen-1")
+    with pytest.raises(ValueError, match="Invalid action"):
+        kitchen.step("FlyAhead")
+    with pytest.raises(ValueError, match="speedy"):
+        kitchen.step("MoveAhead", speedy=2)
+    with pytest.raises(ValueError, match="sceneName"):
+        kitchen.step("Reset")
+    assert kitchen.last_event.metadata["errorCode"] == "MissingArguments"
+
+
+def test_look_limits(kitchen):
+    kitchen.reset("kitchen-1")
+    assert kitchen.step("LookDown", degrees=15).metadata["agent"]["cameraHorizon"] == 15
+    kitchen.step("LookDown")
+    kitchen.step("LookDown", degrees=15)
+    refused = kitchen.step("LookDown", degrees=15)
+    assert not refused.metadata["lastActionSuccess"]
+    assert refused.metadata["errorCode"] == "LookDownCantExceedMin"
+    assert refused.metadata["agent"]["cameraHorizon"] == 60
+
+
+def test_unknown_scene_is_one_clear_error(launch):
+    with pytest.raises(RuntimeError, match="FloorPlan1 needs recorded data"):
+        launch("FloorPlan1")
+
+
+def test_the_quality_of_the_controller_decides_on_smooth_edges(launch, kitchen):
+    smooth = kitchen.reset("kitchen-1")
+    jagged = launch("kitchen-1", quality="Low").last_event
+    assert np.array_equal(smooth.depth_frame, jagged.depth_frame)
+    assert np.array_equal(smooth.instance_segmentation_frame, jagged.instance_segmentation_frame)
+    assert not np.array_equal(smooth.frame, jagged.frame), "the Controller's own default is Ultra"
+
+
+def test_same_seed_same_bytes(kitchen):
+    first = kitchen.reset("kitchen-5")
+    again = kitchen.reset("kitchen-5")
+    assert np.array_equal(first.frame, again.frame)
+    assert first.metadata["objects"] == again.metadata["objects"]

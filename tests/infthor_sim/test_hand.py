@@ -1,0 +1,104 @@
+"""Moving, turning and letting go of what the agent holds."""
+
+import numpy as np
+import pytest
+
+from .harness import Bench
+
+
+@pytest.fixture
+def bench() -> Bench:
+    new = Bench(size=40)
+    new.reset("kitchen-1")
+    new.ok("RotateLook", rotation={"y": 180})
+    new.ok("PickupObject", objectId=new.first("SoapBottle"), forceAction=True)
+    return new
+
+
+def change(bench: Bench, before: dict, pose: str) -> list[float]:
+    now = bench.metadata["heldObjectPose"][pose]
+    return [now[axis] - before[pose][axis] for axis in "xyz"]
+
+
+def test_the_pose_is_there_with_and_without_an_object(bench):
+    held = bench.metadata["heldObjectPose"]
+    assert bench.metadata["hand"] == held
+    assert held["localRotation"] == {"x": 0, "y": 0, "z": 0}
+    assert held["localPosition"]["z"] > 0.2
+    bench.ok("DropHeldObject")
+    nothing = {"x": 0, "y": 0, "z": 0}
+    assert bench.metadata["heldObjectPose"] == dict.fromkeys(held, nothing)
+
+
+@pytest.mark.parametrize(
+    ("action", "arguments", "step"),
+    [
+        ("MoveHeldObject", {"ahead": 0.1}, [0, 0, 0.1]),
+        ("MoveHeldObject", {"ahead": 0.1, "right": 0.05, "up": 0.1}, [0.05, 0.1, 0.1]),
+        ("MoveHeldObjectUp", {"moveMagnitude": 0.1}, [0, 0.1, 0]),
+        ("MoveHeldObjectLeft", {"moveMagnitude": 0.05}, [-0.05, 0, 0]),
+        ("MoveHandAhead", {"moveMagnitude": 0.05}, [0, 0, 0.05]),
+    ],
+)
+def test_moves_in_the_camera_s_frame(bench, action, arguments, step):
+    before = bench.metadata["heldObjectPose"]
+    bench.ok(action, **arguments)
+    assert change(bench, before, "localPosition") == pytest.approx(step, abs=1e-5)
+    assert change(bench, before, "rotation") == [0, 0, 0]
+
+
+def test_out_of_reach_and_view_are_refused(bench):
+    assert "out of range" in bench.refused("MoveHeldObject", ahead=5)
+    assert "Viewport" in bench.refused("MoveHeldObject", right=0.8)
+    bench.ok("MoveHeldObject", right=0.8, forceVisible=True)
+
+
+def test_walls_stop_the_hand(bench):
+    low, _ = bench.sim.world.scene_bounds()
+    bench.sim.world.agent.position[2] = low[2] + 0.45
+    bench.ok("Pass")
+    bench.sim.world.carry()
+    assert "Wall is blocking" in bench.refused("MoveHeldObject", ahead=0.3, forceVisible=True)
+
+
+@pytest.mark.parametrize(
+    ("turn", "difference"),
+    [({"pitch": 90}, [90, 0, 0]), ({"yaw": 90}, [0, 90, 0]), ({"roll": 90}, [0, 0, 270])],
+)
+def test_turns_about_its_own_axes(bench, turn, difference):
+    before = bench.metadata["heldObjectPose"]
+    bench.ok("RotateHeldObject", **turn)
+    assert change(bench, before, "rotation") == difference
+    assert change(bench, before, "position") == pytest.approx([0, 0, 0], abs=1e-6)
+
+
+def test_three_turns_at_once_are_reported_as_by_unity(bench):
+    bench.ok("RotateHeldObject", pitch=90, yaw=90, roll=90)
+    assert bench.metadata["hand"]["rotation"] == {"x": 90, "y": 0, "z": 0}
+
+
+def test_turns_to_a_rotation_in_the_hand(bench):
+    bench.ok("RotateHeldObject", rotation={"x": 90, "y": 180, "z": 0})
+    assert bench.metadata["hand"]["localRotation"] == {"x": 90, "y": 180, "z": 0}
+
+
+def test_the_hand_returns_unless_the_agent_keeps_its_grip(bench):
+    usual = bench.metadata["heldObjectPose"]
+    bench.ok("MoveHeldObject", ahead=0.1)
+    bench.ok("RotateHeldObject", pitch=40)
+    moved = bench.metadata["heldObjectPose"]
+    bench.ok("RotateRight", manualInteract=True)
+    for pose in ("localPosition", "localRotation"):
+        assert bench.metadata["heldObjectPose"][pose] == pytest.approx(moved[pose], abs=1e-4)
+    bench.ok("RotateLeft")
+    assert bench.metadata["heldObjectPose"]["localPosition"] != moved["localPosition"]
+    assert np.allclose(change(bench, usual, "localPosition")[2], 0, atol=0.1)
+
+
+@pytest.mark.parametrize(
+    "action", ["DropHeldObject", "DropHandObject", "ThrowObject", "MoveHeldObject"]
+)
+def test_an_empty_hand(bench, action):
+    bench.ok("DropHandObject")
+    bench.refused(action)
+    assert bench.metadata["errorCode"] == "ObjectNotInInventory"

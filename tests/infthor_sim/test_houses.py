@@ -1,0 +1,134 @@
+"""ProcTHOR houses: through CreateHouse, as the Controller sends them."""
+
+import copy
+import gzip
+import json
+from typing import Any
+
+import pytest
+
+from infthor_eval.errors import DataError
+from infthor_sim.scenes.catalogue import Catalogue
+
+from .harness import Bench
+from .schema import check
+
+
+def point(x: float, z: float, y: float = 0.0) -> dict[str, float]:
+    return {"x": x, "y": y, "z": z}
+
+
+def wall(room: str, x0: float, z0: float, x1: float, z1: float) -> dict[str, Any]:
+    polygon = [point(x0, z0), point(x1, z1), point(x1, z1, 2.7), point(x0, z0, 2.7)]
+    return {
+        "id": f"wall|{room}|{x0}|{z0}|{x1}|{z1}",
+        "roomId": room,
+        "polygon": polygon,
+        "material": {"name": "A"},
+    }
+
+
+def room(name: str, room_type: str, *corners: tuple[float, float]) -> dict[str, Any]:
+    return {
+        "id": name,
+        "roomType": room_type,
+        "floorPolygon": [point(*c) for c in corners],
+        "ceilings": [],
+    }
+
+
+def thing(
+    name: str, asset: str, x: float, y: float, z: float, yaw: float = 0, children: Any = ()
+) -> dict[str, Any]:
+    return {"id": name, "assetId": asset, "position": point(x, z, y), "rotation": {"x": 0, "y": yaw, "z": 0},
+            "kinematic": True, "children": list(children)}  # fmt: skip
+
+
+def house() -> dict[str, Any]:
+    """A kitchen of L shape and a bedroom, joined by a doorway."""
+    kitchen = room("room|2", "Kitchen", (0, 0), (0, 6), (3, 6), (3, 4), (5, 4), (5, 0))
+    bedroom = room("room|3", "Bedroom", (5, 0), (5, 4), (9, 4), (9, 0))
+    walls = [
+        wall("room|2", 0, 0, 0, 6), wall("room|2", 0, 6, 3, 6), wall("room|2", 3, 6, 3, 4), wall("room|2", 3, 4, 5, 4),
+        wall("room|2", 5, 0, 5, 4), wall("room|2", 5, 0, 0, 0), wall("room|3", 5, 0, 5, 4), wall("room|3", 5, 4, 9, 4),
+        wall("room|3", 9, 4, 9, 0), wall("room|3", 9, 0, 5, 0), wall("exterior", 0, 0, 0, 6),
+    ]  # fmt: skip
+    door = {"id": "door|2|3", "assetId": "Doorway_1", "room0": "room|2", "room1": "room|3", "wall0": walls[4]["id"],
+            "wall1": walls[6]["id"], "holePolygon": [point(1.0, 0), point(2.0, 0, 2.1)]}  # fmt: skip
+    apple = thing("Apple|surface|2|4", "Apple_11", 1.0, 0.86, 2.0)
+    objects = [
+        thing("Fridge|2|1", "Fridge_11", 0.5, 0.93, 5.4, 180),
+        thing("DiningTable|2|2", "Dining_Table_21_2", 1.0, 0.4, 2.0, 0, [apple]),
+        thing("Bed|3|1", "Bed_1", 7.5, 0.45, 2.9, 180),
+    ]
+    agent = {
+        "position": point(2.5, 2.5, 0.95),
+        "rotation": {"x": 0, "y": 270, "z": 0},
+        "horizon": 30,
+        "standing": True,
+    }
+    return {"rooms": [kitchen, bedroom], "walls": walls, "doors": [door], "windows": [], "objects": objects,
+            "metadata": {"agent": agent, "schema": "1.0.0"}, "proceduralParameters": {}}  # fmt: skip
+
+
+def test_a_house_through_the_controller(launch):
+    controller = launch(house())
+    event = controller.last_event
+    check(event.metadata)
+    objects = {o["objectId"]: o for o in event.metadata["objects"]}
+    assert set(objects) >= {
+        "Fridge|2|1",
+        "DiningTable|2|2",
+        "Bed|3|1",
+        "Apple|surface|2|4",
+        "room|2",
+        "room|3",
+    }
+    assert objects["Apple|surface|2|4"]["parentReceptacles"] == ["DiningTable|2|2"]
+    assert event.metadata["agent"]["position"]["x"] == pytest.approx(2.5, abs=0.13)
+    assert event.metadata["agent"]["cameraHorizon"] == 30
+    cells = {
+        (p["x"], p["z"]) for p in controller.step("GetReachablePositions").metadata["actionReturn"]
+    }
+    assert (6.0, 1.5) in cells, "the doorway joins the rooms"
+    assert (4.0, 5.0) not in cells, "outside the L"
+    assert controller.step("OpenObject", objectId="Fridge|2|1", forceAction=True).metadata[
+        "lastActionSuccess"
+    ]
+
+
+def test_without_its_doorway_the_rooms_are_apart():
+    closed = house() | {"doors": []}
+    world = Catalogue().house(closed)
+    reached = world.nav.reachable_cells(world.agent.position[0], world.agent.position[2])
+    assert all(x < 5 for x, _ in reached)
+
+
+def test_assets_have_their_sizes_where_the_folder_has_them(tmp_path):
+    (tmp_path / "procthor").mkdir()
+    with gzip.open(
+        tmp_path / "procthor" / "asset-database.json.gz", "wt", encoding="utf-8"
+    ) as file:
+        json.dump(
+            {"Fridge": [{"assetId": "Fridge_11", "boundingBox": {"x": 0.8, "y": 1.7, "z": 0.7}}]},
+            file,
+        )
+    world = Catalogue(tmp_path).house(house())
+    assert world.objects["Fridge|2|1"].box_size.tolist() == [0.8, 1.7, 0.7]
+    with gzip.open(
+        tmp_path / "procthor" / "asset-database.json.gz", "wt", encoding="utf-8"
+    ) as file:
+        file.write("[1]")
+    with pytest.raises(DataError, match="asset-database"):
+        Catalogue(tmp_path).house(house())
+
+
+@pytest.mark.parametrize("broken", ["rooms", "walls"])
+def test_malformed_houses_are_refused(broken):
+    bench = Bench(size=20)
+    bench.ok("Reset", sceneName="Procedural")
+    bench.ok("Initialize", fastActionEmit=False)
+    bad = copy.deepcopy(house())
+    del bad[broken]
+    assert "ProcTHOR" in bench.refused("CreateHouse", house=bad)
+    bench.ok("CreateHouse", house=house())

@@ -1,0 +1,125 @@
+"""Every reply's metadata has the form of AI2-THOR 5.x."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from infthor_sim.actions import action_names
+from infthor_sim.scenes.catalogue import Catalogue
+from infthor_sim.settings import AGENT_MODES
+
+from .conftest import need_data
+from .harness import Bench
+from .schema import check
+
+_ID = re.compile(r"[A-Za-z]+(\|[+-]?\d\d\.\d\d){3}(\|[A-Za-z]+(_\d+)?)?")
+
+
+def test_through_the_controller(kitchen):
+    event = kitchen.reset("kitchen-3")
+    for action in ("Pass", "MoveAhead", "RotateRight", "LookDown", "MoveBack"):
+        event = kitchen.step(action)
+        check(event.metadata)
+        assert event.metadata["lastAction"] == action
+
+
+@pytest.mark.parametrize(
+    "scene", ["kitchen-2", "living-room-2", "bedroom-2", "bathroom-2", "house-2"]
+)
+def test_every_kind_of_scene(scene):
+    bench = Bench()
+    metadata = bench.reset(scene)
+    check(metadata)
+    ids = [o["objectId"] for o in metadata["objects"]]
+    assert len(ids) == len(set(ids))
+    assert all(_ID.fullmatch(i) for i in ids)
+
+
+def test_nulls_where_not_applicable():
+    bench = Bench()
+    bench.reset("kitchen-1")
+    apple, fridge = bench.object(bench.first("Apple")), bench.object(bench.first("Fridge"))
+    assert apple["receptacleObjectIds"] is None
+    assert apple["objectOrientedBoundingBox"] is not None
+    assert isinstance(fridge["receptacleObjectIds"], list)
+    assert fridge["parentReceptacles"] is None
+
+
+def test_boxes_contain_the_position_of_upright_things():
+    bench = Bench()
+    for item in bench.reset("bedroom-4")["objects"]:
+        box = item["axisAlignedBoundingBox"]
+        corners = box["cornerPoints"]
+        for index, axis in enumerate("xyz"):
+            low, high = min(c[index] for c in corners), max(c[index] for c in corners)
+            assert low == pytest.approx(box["center"][axis] - box["size"][axis] / 2, abs=2e-4)
+            assert high == pytest.approx(box["center"][axis] + box["size"][axis] / 2, abs=2e-4)
+
+
+def test_ids_are_printed_as_unity_prints_them():
+    from infthor_sim.geometry import object_id
+
+    assert object_id("AlarmClock", (2.6857, 1.2324, 1.3974)) == "AlarmClock|+02.69|+01.23|+01.40"
+    assert (
+        object_id("CellPhone", (-1.96499991, 0.593926966, 0.9192637))
+        == "CellPhone|-01.97|+00.59|+00.92"
+    )
+    assert object_id("Cloth", (0.705, -0.00154149532, -2.75)) == "Cloth|+00.71|00.00|-02.75"
+    assert object_id("Floor", (0.0, 0.0, 0.0)) == "Floor|+00.00|+00.00|+00.00"
+
+
+def test_the_scene_has_the_name_of_its_physics_scene():
+    bench = Bench(Catalogue(need_data()), size=20)
+    for name in ("FloorPlan28", "FloorPlan28_physics"):
+        assert bench.reset(name)["sceneName"] == "FloorPlan28_physics"
+    assert bench.reset("kitchen-1")["sceneName"] == "kitchen-1"
+    assert bench.ok("Reset", sceneName="Procedural")["sceneName"] == "Procedural"
+
+
+@pytest.mark.parametrize("object_type", ["Fridge", "Drawer", "Cabinet", "Microwave"])
+def test_a_box_holds_the_open_door(object_type):
+    bench = Bench(size=20)
+    bench.reset("kitchen-1")
+    name = bench.first(object_type)
+    closed = bench.object(name)["axisAlignedBoundingBox"]
+    bench.ok("OpenObject", objectId=name, openness=0.5, forceAction=True)
+    half = bench.object(name)["axisAlignedBoundingBox"]
+    bench.ok("OpenObject", objectId=name, forceAction=True)
+    wide = bench.object(name)["axisAlignedBoundingBox"]
+    assert closed["size"] != half["size"] != wide["size"]
+    low = [min(c[i] for c in wide["cornerPoints"]) for i in range(3)]
+    assert all(low[i] <= min(c[i] for c in closed["cornerPoints"]) for i in range(3))
+    bench.ok("CloseObject", objectId=name, forceAction=True)
+    assert bench.object(name)["axisAlignedBoundingBox"] == closed
+
+
+def test_open_object_takes_the_old_name_of_openness():
+    bench = Bench(size=20)
+    bench.reset("kitchen-1")
+    fridge = bench.first("Fridge")
+    for magnitude, openness in ((0.65, 0.65), (0, 1.0)):
+        bench.ok("OpenObject", objectId=fridge, moveMagnitude=magnitude, forceAction=True)
+        assert bench.object(fridge)["openness"] == openness
+    for wrong in (-0.5, 1.5):
+        assert "must be in" in bench.refused(
+            "OpenObject", objectId=fridge, openness=wrong, forceAction=True
+        )
+
+
+def test_old_keys_are_there_and_empty(kitchen):
+    metadata = kitchen.reset("kitchen-1").metadata
+    assert metadata["actionIntReturn"] == metadata["actionFloatReturn"] == 0
+    assert metadata["visibleRange"] is metadata["colorBounds"] is None
+    for key in ("distances", "normals", "flatSurfacesOnGrid", "isOpenableGrid", "segmentedObjectIds",
+                "objectIdsInBox", "actionFloatsReturn", "actionStringsReturn", "actionVector3sReturn"):  # fmt: skip
+        assert metadata[key] == []
+
+
+def test_every_action_is_described():
+    text = (Path(__file__).resolve().parents[2] / "docs" / "simulator.md").read_text(
+        encoding="utf-8"
+    )
+    assert [
+        name for mode in AGENT_MODES for name in action_names(mode) if f"`{name}`" not in text
+    ] == []

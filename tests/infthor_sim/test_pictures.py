@@ -1,0 +1,287 @@
+"""The renderer: exact depth and ids, the same picture from both implementations, lights, the held object."""
+
+import numpy as np
+import pytest
+
+from infthor_sim.default_objects import default_object
+from infthor_sim.geometry import euler_matrix
+from infthor_sim.object_types import OBJECT_TYPES, type_named
+from infthor_sim.pictures.instances import class_color, instance_color
+from infthor_sim.player.fifo import FieldType
+from infthor_sim.render.camera import PinholeCamera, project
+from infthor_sim.render.hand import HAND
+from infthor_sim.render.lighting import Lights
+from infthor_sim.render.picture import cast_picture, choose_rasterizer, colour_picture
+from infthor_sim.render.primitives import Form, Material, ShapePart, rows
+from infthor_sim.render.shapes import shape
+
+from .harness import Bench
+
+RASTERIZERS = pytest.mark.parametrize("name", ["numba", "numpy"])
+STRAIGHT = np.eye(3)
+
+
+def camera(size: int = 101, **more: float) -> PinholeCamera:
+    return PinholeCamera(np.zeros(3), STRAIGHT, 60.0, size, size, **more)
+
+
+def one(form: Form, distance: float, half: float = 0.5, **more: float) -> np.ndarray:
+    part = ShapePart(form, (0, 0, 0), (half,) * 3, (0.5, 0.5, 0.5), **more)
+    return rows([part], np.array([0.0, 0.0, distance]), STRAIGHT, 0)
+
+
+@RASTERIZERS
+@pytest.mark.parametrize(
+    ("form", "depth"),
+    [(Form.BOX, 2.5), (Form.ELLIPSOID, 2.5), (Form.CYLINDER, 2.5), (Form.CUP, 2.5)],
+)
+def test_depth_is_that_of_geometry(name, form, depth):
+    picture = cast_picture(one(form, 3.0), ("a",), camera(), choose_rasterizer(name))
+    assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
+    assert picture.instances[50, 50] == 0
+    assert picture.instances[0, 0] == -1
+    wide = np.nonzero((picture.instances == 0).any(axis=0))[0]
+    focal = 50.5 / np.tan(np.radians(30))
+    expected = 2 * focal * (0.5 / 2.5 if form == Form.BOX else 0.5 / np.sqrt(9 - 0.25))
+    assert len(wide) == pytest.approx(expected, abs=1.5)
+
+
+@RASTERIZERS
+def test_a_cup_shows_its_inside_from_above(name):
+    above = PinholeCamera(np.array([0.0, 2.0, 0.0]), euler_matrix((90, 0, 0)), 60.0, 101, 101)
+    for form, depth in ((Form.CYLINDER, 1.5), (Form.CUP, 2.5), (Form.BOWL, 2.5)):
+        drawn = rows([ShapePart(form, (0, 0, 0), (0.5,) * 3, (1, 1, 1))], np.zeros(3), STRAIGHT, 0)
+        picture = cast_picture(drawn, ("a",), above, choose_rasterizer(name))
+        assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
+
+
+def test_both_renderers_draw_the_same_picture():
+    random = np.random.default_rng(3)
+    parts = [
+        rows(
+            [ShapePart(Form(i % len(Form)), (0, 0, 0), random.uniform(0.03, 0.3, 3), tuple(random.uniform(0.2, 1, 3)),
+                  Material(i % len(Material)), bottom=0.6, emission=0.5 * (i % 7 == 0))],
+            random.uniform((-1.5, -1.5, 0.5), (1.5, 1.5, 3.5)), euler_matrix(random.uniform(0, 360, 3)), i,
+        ) for i in range(120)
+    ]  # fmt: skip
+    prims, names = np.concatenate(parts), tuple(map(str, range(120)))
+    lights = Lights(np.array([[0.3, 1.0, 1.0, 0.9]]), 0.7)
+    pictures = []
+    for name in ("numba", "numpy"):
+        rasterizer = choose_rasterizer(name)
+        picture = cast_picture(prims, names, camera(120), rasterizer)
+        pictures.append(
+            (picture.depth, picture.instances, colour_picture(picture, lights, rasterizer))
+        )
+    for first, second in zip(*pictures, strict=True):
+        assert np.array_equal(first, second)
+
+
+def test_near_plane_and_things_behind_are_cut():
+    assert not len(project(one(Form.BOX, -3.0), camera()).index)
+    assert (
+        cast_picture(
+            one(Form.BOX, 0.0, 0.05), ("a",), camera(), choose_rasterizer("numba")
+        ).instances.max()
+        == -1
+    )
+
+
+FLAT = {
+    "Laptop",
+    "Shelf",
+    "ShowerGlass",
+}  # closed; the space above a board; one of the panes that its box is around
+
+
+@pytest.mark.parametrize("object_type", sorted(OBJECT_TYPES))
+def test_shapes_fill_their_boxes_and_no_more(object_type):
+    item = default_object(object_type, np.zeros(3))
+    parts = shape(item)
+    assert parts
+    points = np.concatenate([_corners(part) for part in parts]) - item.box_center
+    span = np.ptp(points, axis=0)
+    loose = 0.035 + 0.25 * item.box_size
+    assert np.all(np.abs(points) <= item.box_size / 2 + loose), "the shape sticks out of its box"
+    if object_type not in FLAT:
+        assert np.all(span >= 0.3 * item.box_size - 0.02), "the shape leaves most of its box empty"
+
+
+def _corners(part: ShapePart) -> np.ndarray:
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    matrix = STRAIGHT if part.matrix is None else part.matrix
+    return np.asarray(part.center) + (signs * np.asarray(part.half)) @ matrix.T
+
+
+@pytest.mark.parametrize(
+    ("object_type", "change"),
+    [
+        ("Fridge", {"openness": 1.0}), ("DeskLamp", {"toggled": True}), ("Mug", {"fill_liquid": "coffee"}),
+        ("Plate", {"dirty": True}), ("Potato", {"cooked": True}), ("Drawer", {"openness": 0.5}),
+        ("Television", {"toggled": True}), ("Microwave", {"toggled": True}), ("StoveBurner", {"toggled": True}),
+        ("Vase", {"broken": True}),
+    ],
+)  # fmt: skip
+def test_a_state_can_be_seen(object_type, change):
+    item = default_object(object_type, np.zeros(3))
+    before = repr(shape(item))
+    for name, value in change.items():
+        setattr(item.state, name, value)
+    assert repr(shape(item)) != before
+
+
+def test_ids_frame_names_every_object_by_its_colour():
+    bench = Bench(size=120)
+    bench.reset("kitchen-1", renderInstanceSegmentation=True, renderSemanticSegmentation=True)
+    bench.ok("RotateRight")
+    pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(-1, 4)
+    assert (pixels[:, 3] == 255).all()
+    known = {tuple(c["color"]) for c in bench.metadata["colors"]}
+    assert {tuple(int(v) for v in p[:3]) for p in np.unique(pixels, axis=0)} <= known
+    assert len(known) == len(bench.metadata["colors"]), "two names share a colour"
+    assert instance_color("Mug|1") == instance_color("Mug|1")
+    assert len(bench.frames[FieldType.CLASSES]) == 120 * 120 * 4
+
+
+def test_smoothing_changes_colours_only():
+    bench = Bench(size=100)
+    bench.reset("living-room-1", renderInstanceSegmentation=True, renderDepthImage=True)
+    fine = bench.frames
+    bench.ok("ChangeQuality", quality="Low")
+    plain = bench.frames
+    assert plain[FieldType.IDS] == fine[FieldType.IDS]
+    assert plain[FieldType.DEPTH] == fine[FieldType.DEPTH]
+    a, b = (np.frombuffer(f[FieldType.RGB], dtype=np.uint8).astype(int) for f in (plain, fine))
+    assert 0 < np.abs(a - b).mean() < 12
+    bench.reset("living-room-1", renderInstanceSegmentation=True)
+    assert bench.frames[FieldType.RGB] == plain[FieldType.RGB], (
+        "the quality stays over a Reset, as Unity's does"
+    )
+    bench.ok("ChangeQuality", quality="Ultra")
+    assert bench.frames[FieldType.RGB] == fine[FieldType.RGB]
+
+
+@RASTERIZERS
+def test_a_smooth_edge_is_between_what_it_divides(name):
+    rasterizer = choose_rasterizer(name)
+    tilted = [
+        ShapePart(
+            Form.BOX, (0, 0, 0), (0.5, 0.5, 0.1), (0.9, 0.1, 0.1), matrix=euler_matrix((0, 0, 20))
+        )
+    ]
+    behind = [ShapePart(Form.BOX, (0, 0, 1), (9, 9, 0.1), (0.1, 0.1, 0.9))]
+    straight = np.array([0.0, 0.0, 2.0])
+    prims = np.concatenate(
+        [rows(tilted, straight, STRAIGHT, 0), rows(behind, straight, STRAIGHT, 1)]
+    )
+    picture = cast_picture(prims, ("a", "b"), camera(), rasterizer)
+    smooth = colour_picture(picture, Lights.none(), rasterizer)[:, :, 0].astype(int)
+    sharp = colour_picture(picture, Lights.none(), rasterizer, antialias=False)[:, :, 0].astype(int)
+    changed = smooth != sharp
+    assert 40 < changed.sum() < 500
+    assert smooth.min() >= sharp.min()
+    assert smooth.max() <= sharp.max()
+    assert len(np.unique(smooth[changed])) > 3
+
+
+def test_a_held_object_floats_in_the_lower_middle():
+    bench = Bench(size=200)
+    bench.reset("kitchen-1", renderInstanceSegmentation=True)
+    mug = bench.first("Mug")
+    bench.ok("PickupObject", objectId=mug, forceAction=True)
+    pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(200, 200, 4)[
+        ::-1, :, :3
+    ]
+    rows_, columns = np.nonzero((pixels == instance_color(mug)).all(axis=2))
+    assert 70 < columns.mean() < 130
+    assert rows_.mean() > 120
+    assert len(rows_) > 300
+
+
+@pytest.mark.parametrize(
+    ("scene", "object_type"),
+    [("kitchen-1", "Mug"), ("kitchen-1", "Knife"), ("bedroom-1", "Pillow")],
+)
+def test_a_gripper_at_the_lower_edge_holds_what_is_held(scene, object_type):
+    bench = Bench(size=150)
+    bench.reset(scene, renderInstanceSegmentation=True)
+
+    def shown(name: str) -> np.ndarray:
+        pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(150, 150, 4)[
+            ::-1, :, :3
+        ]
+        color = instance_color(name) if "|" in name else class_color(name)
+        return (pixels == color).all(axis=2)
+
+    assert not shown(HAND).any()
+    held = bench.first(object_type)
+    bench.ok("PickupObject", objectId=held, forceAction=True)
+    hand, thing = shown(HAND), shown(held)
+    assert 0.001 < hand.mean() < 0.02
+    assert hand[-1].any(), "it comes from the lower edge"
+    columns, held_columns = np.nonzero(hand)[1], np.nonzero(thing)[1]
+    assert columns.min() - 3 <= held_columns.mean() <= columns.max() + 3
+    assert np.nonzero(thing)[0].min() < np.nonzero(hand)[0].min(), (
+        "what is held stands out above it"
+    )
+    assert HAND in {entry["name"] for entry in bench.metadata["colors"]}
+
+
+@pytest.mark.parametrize(
+    ("scene", "object_type"), [("living-room-1", "Box"), ("bedroom-1", "Pillow")]
+)
+def test_what_the_hand_holds_hides_little_of_the_room(scene, object_type):
+    bench = Bench(size=150)
+    bench.reset(scene, renderInstanceSegmentation=True)
+    held = bench.first(object_type)
+    bench.ok("PickupObject", objectId=held, forceAction=True)
+    before = bench.object(held)["position"]
+    for horizon in (0.0, 30.0, 60.0):
+        bench.ok("TeleportFull", position=bench.metadata["agent"]["position"], rotation={"y": 90.0}, horizon=horizon,
+                 standing=True)  # fmt: skip
+        pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(150, 150, 4)[
+            ::-1, :, :3
+        ]
+        shown = (pixels == instance_color(held)).all(axis=2)
+        assert 0.005 < shown.mean() < 0.1
+        assert not shown[:75].any(), "it stays in the lower half"
+    assert bench.object(held)["position"] != before, (
+        "the metadata tells where the hand is, not where it is drawn"
+    )
+
+
+def test_lamps_and_switches_light_the_room():
+    bench = Bench(size=80)
+    bench.reset("bedroom-1")
+
+    def brightness() -> float:
+        return float(np.frombuffer(bench.frames[FieldType.RGB], dtype=np.uint8).mean())
+
+    lamp, switch = bench.first("DeskLamp"), bench.first("LightSwitch")
+    bench.stand_before(lamp)
+    dark = brightness()
+    bench.ok("ToggleObjectOn", objectId=lamp, forceAction=True)
+    assert brightness() > dark + 0.5
+    bench.ok("ToggleObjectOff", objectId=lamp, forceAction=True)
+    bench.ok("ToggleObjectOff", objectId=switch, forceAction=True)
+    assert brightness() < dark - 5
+
+
+def test_unknown_types_are_plain_boxes():
+    item = default_object("Mug", np.zeros(3))
+    item.type = type_named("Gizmo")
+    assert len(shape(item)) == 1
+
+
+def test_kernels_are_recompiled_when_a_source_changes(tmp_path):
+    from infthor_sim.render import kernel_cache
+
+    for name in kernel_cache._SOURCES:
+        (tmp_path / name).write_text("a = 1", encoding="ascii")
+    kernel_cache.drop_stale_kernels(tmp_path)
+    compiled = tmp_path / "__pycache__" / "shading_numba._shade-1.py311.1.nbc"
+    compiled.write_text("", encoding="ascii")
+    assert not kernel_cache.drop_stale_kernels(tmp_path)
+    (tmp_path / "patterns.py").write_text("a = 2", encoding="ascii")
+    assert kernel_cache.drop_stale_kernels(tmp_path)
+    assert not compiled.exists()

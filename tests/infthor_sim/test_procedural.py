@@ -1,0 +1,173 @@
+"""Procedural rooms are furnished as their type needs, connected, and different from seed to seed."""
+
+import numpy as np
+import pytest
+
+from infthor_sim.errors import ActionError
+from infthor_sim.physics.solids import part_boxes
+from infthor_sim.scenes.catalogue import Catalogue
+from infthor_sim.scenes.procedural import SCENE_TYPES
+
+from .harness import Bench
+
+NEEDED = {
+    "kitchen": "Fridge Microwave CounterTop SinkBasin Faucet Cabinet Drawer DiningTable StoveBurner CoffeeMachine Knife"
+    " Mug Plate Apple Tomato Potato Egg Pan Pot GarbageCan",
+    "living-room": "Sofa CoffeeTable TVStand Television FloorLamp Drawer ArmChair GarbageCan",
+    "bedroom": "Bed Desk DeskLamp Dresser Drawer SideTable Chair",
+    "bathroom": "Toilet Bathtub BathtubBasin SinkBasin Faucet CounterTop Cabinet SoapBar Cloth TowelHolder",
+}
+
+
+@pytest.mark.parametrize("room_type", sorted(NEEDED))
+@pytest.mark.parametrize("seed", range(5))
+def test_furniture_of_the_room_type(room_type, seed):
+    world = Catalogue().load(f"{room_type}-{seed}")
+    missing = set(NEEDED[room_type].split()) - {o.object_type for o in world.objects.values()}
+    assert not missing
+    assert 35 <= len(world.objects) <= 80
+    assert len(world.nav.reachable_cells(world.agent.position[0], world.agent.position[2])) == len(
+        world.nav
+    )
+
+
+STANDING = {
+    "DeskLamp",
+    "Television",
+    "Microwave",
+    "CoffeeMachine",
+    "Toaster",
+    "Faucet",
+    "StoveBurner",
+}
+
+
+@pytest.mark.parametrize(
+    "scene", ["living-room-2", "bedroom-2", "kitchen-1", "kitchen-2", "bathroom-1"]
+)
+def test_nothing_stands_in_another_thing(scene):
+    world = Catalogue().load(scene)
+    loose = [o for o in world.objects.values() if o.type.pickupable and not world.is_hidden(o)]
+    for item in loose:
+        for other in world.objects.values():
+            apart = (
+                other is item or other.object_id == item.parent or item.object_id == other.parent
+            )
+            if apart or not (other.type.pickupable or other.object_type in STANDING):
+                continue
+            boxes = [other.bounds()] if other.type.pickupable else part_boxes(other)
+            for low, high in boxes:
+                overlap = np.minimum(item.bounds()[1], high) - np.maximum(item.bounds()[0], low)
+                assert overlap.min() < 0.004, f"{item.object_id} stands in {other.object_id}"
+
+
+@pytest.mark.parametrize("scene_type", SCENE_TYPES)
+def test_names_are_reproducible_and_seeds_differ(scene_type):
+    first, again, other = (Catalogue().load(f"{scene_type}-{seed}") for seed in (3, 3, 4))
+    assert list(first.objects) == list(again.objects)
+    assert list(first.objects) != list(other.objects)
+
+
+@pytest.mark.parametrize("seed", [2, 5])
+def test_a_house_is_connected(seed):
+    world = Catalogue().load(f"house-{seed}")
+    assert len(world.rooms) == 4
+    for room in world.rooms:
+        assert any(
+            room.x_min < x < room.x_max and room.z_min < z < room.z_max for x, z in world.nav
+        )
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        "pick Apple put CounterTop", "pick Mug heat Microwave put DiningTable", "pick Apple cool Fridge put CounterTop",
+        "pick Plate clean SinkBasin put CounterTop", "pick Knife slice Tomato put CounterTop",
+    ],
+)  # fmt: skip
+def test_tasks_can_be_done_by_an_agent_that_must_see(task):
+    bench = Bench(size=150)
+    bench.reset("kitchen-2")
+    _, what, *rest = task.split()
+    pick(bench, what)
+    for verb, target in zip(rest[::2], rest[1::2], strict=True):
+        VERBS[verb](bench, target)
+    assert bench.metadata["inventoryObjects"] == []
+
+
+def pick(bench: Bench, object_type: str) -> str:
+    """Picks up the first object of a type that the agent gets to see."""
+    for item in [
+        o["objectId"] for o in bench.metadata["objects"] if o["objectType"] == object_type
+    ]:
+        parent = bench.sim.world.objects[item].parent
+        if bench.sim.world.is_hidden(bench.sim.world.objects[item]):
+            bench.stand_before(parent)
+            bench.ok("OpenObject", objectId=parent)
+        bench.stand_before(item)
+        bench.ok("PickupObject", objectId=item)
+        return item
+    raise ActionError(f"no {object_type}")
+
+
+def put(bench: Bench, object_type: str) -> str:
+    target = bench.first(object_type)
+    bench.stand_before(target)
+    bench.ok("PutObject", objectId=target)
+    return target
+
+
+def store(bench: Bench, object_type: str) -> tuple[str, str]:
+    """Opens, puts, closes; returns what was stored and where."""
+    target, item = bench.first(object_type), bench.metadata["inventoryObjects"][0]["objectId"]
+    bench.stand_before(target)
+    bench.ok("OpenObject", objectId=target)
+    bench.ok("PutObject", objectId=target)
+    bench.ok("CloseObject", objectId=target)
+    return item, target
+
+
+def heat(bench: Bench, object_type: str) -> None:
+    item, target = store(bench, object_type)
+    bench.ok("ToggleObjectOn", objectId=target)
+    bench.ok("ToggleObjectOff", objectId=target)
+    fetch(bench, item, target, "Hot")
+
+
+def cool(bench: Bench, object_type: str) -> None:
+    item, target = store(bench, object_type)
+    fetch(bench, item, target, "Cold")
+
+
+def fetch(bench: Bench, item: str, target: str, temperature: str) -> None:
+    bench.ok("OpenObject", objectId=target)
+    bench.stand_before(item)
+    bench.ok("PickupObject", objectId=item)
+    bench.ok("CloseObject", objectId=target, forceAction=True)
+    assert bench.object(item)["temperature"] == temperature
+
+
+def clean(bench: Bench, object_type: str) -> None:
+    item = bench.metadata["inventoryObjects"][0]["objectId"]
+    bench.ok("DirtyObject", objectId=item)
+    target = put(bench, object_type)
+    faucet = bench.first("Faucet")
+    bench.stand_before(faucet)
+    bench.ok("ToggleObjectOn", objectId=faucet)
+    bench.ok("ToggleObjectOff", objectId=faucet)
+    assert not bench.object(item)["isDirty"]
+    bench.stand_before(target)
+    bench.ok("PickupObject", objectId=item)
+
+
+def cut(bench: Bench, object_type: str) -> None:
+    target = bench.first(object_type)
+    parent = bench.sim.world.objects[target].parent
+    if bench.sim.world.is_hidden(bench.sim.world.objects[target]):
+        bench.stand_before(parent)
+        bench.ok("OpenObject", objectId=parent)
+    bench.stand_before(target)
+    bench.ok("SliceObject", objectId=target)
+
+
+VERBS = {"put": put, "heat": heat, "cool": cool, "clean": clean, "slice": cut}

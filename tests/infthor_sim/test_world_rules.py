@@ -1,0 +1,294 @@
+"""What actions do to the world, and what the world refuses."""
+
+import itertools
+
+import pytest
+
+from infthor_eval.storage.limits import OBJECT_POSES
+
+from .harness import Bench
+
+
+@pytest.fixture
+def bench() -> Bench:
+    new = Bench()
+    new.reset("kitchen-1")
+    return new
+
+
+def take(bench: Bench, object_type: str) -> str:
+    found = bench.first(object_type)
+    bench.ok("PickupObject", objectId=found, forceAction=True)
+    return found
+
+
+def test_pick_up_carry_and_put(bench):
+    mug = take(bench, "Mug")
+    assert bench.metadata["inventoryObjects"] == [{"objectId": mug, "objectType": "Mug"}]
+    held = bench.object(mug)
+    assert held["isPickedUp"]
+    assert held["parentReceptacles"] is None
+    where = held["position"]
+    bench.ok("RotateRight")
+    assert bench.object(mug)["position"] != where
+    assert "already" in bench.refused(
+        "PickupObject", objectId=bench.first("Apple"), forceAction=True
+    )
+    counter = bench.first("CounterTop")
+    bench.ok("PutObject", objectId=counter, forceAction=True)
+    assert bench.metadata["inventoryObjects"] == []
+    assert bench.object(mug)["parentReceptacles"] == [counter]
+    assert mug in bench.object(counter)["receptacleObjectIds"]
+    assert mug == bench.object(mug)["objectId"], "an id stays when the object moves"
+
+
+def test_a_put_needs_a_fitting_open_receptacle(bench):
+    fridge = bench.first("Fridge")
+    take(bench, "Apple")
+    assert "CLOSED" in bench.refused("PutObject", objectId=fridge, forceAction=True)
+    assert bench.metadata["errorCode"] == "ReceptacleNotOpen"
+    bench.ok("OpenObject", objectId=fridge, forceAction=True)
+    assert "cannot be placed" in bench.refused(
+        "PutObject", objectId=bench.first("Toaster"), forceAction=True
+    )
+    bench.ok("PutObject", objectId=fridge, forceAction=True)
+    assert "isn't holding" in bench.refused("PutObject", objectId=fridge, forceAction=True)
+
+
+def test_a_receptacle_fills_up(bench):
+    world = bench.sim.world
+    burner = bench.first("StoveBurner")
+    for _ in range(3):
+        for object_type in ("Pan", "Pot"):
+            pans = [
+                o.object_id
+                for o in world.objects.values()
+                if o.object_type == object_type and o.parent != burner
+            ]
+            if not pans:
+                continue
+            bench.ok("PickupObject", objectId=pans[0], forceAction=True)
+            if not bench.step("PutObject", objectId=burner, forceAction=True)["lastActionSuccess"]:
+                assert bench.metadata["errorMessage"] == "No valid positions to place object found"
+                return
+    pytest.fail("a burner took several pans")
+
+
+def test_far_and_hidden_things_are_out_of_reach(bench):
+    inside = next(o for o in bench.sim.world.objects.values() if bench.sim.world.is_hidden(o))
+    bench.stand_before(inside.parent)
+    message = "Target object not found within the specified visibility."
+    assert bench.refused("PickupObject", objectId=inside.object_id) == message
+    bench.ok("OpenObject", objectId=inside.parent)
+    bench.ok("CloseObject", objectId=inside.parent)
+    assert not bench.object(inside.object_id)["visible"]
+    assert "is not the objectId" in bench.refused(
+        "PickupObject", objectId="Mug|+09.00|+09.00|+09.00"
+    )
+    assert "CanPickup" in bench.refused("PickupObject", objectId=inside.parent)
+
+
+def test_contents_come_along_with_a_drawer_and_a_plate(bench):
+    world = bench.sim.world
+    drawer = next(o for o in world.objects.values() if o.object_type == "Drawer" and o.contents)
+    inside = world.objects[drawer.contents[0]]
+    before = inside.position.copy()
+    bench.ok("OpenObject", objectId=drawer.object_id, forceAction=True, openness=0.5)
+    halfway = inside.position.copy()
+    bench.ok("OpenObject", objectId=drawer.object_id, forceAction=True)
+    assert (inside.position - before) == pytest.approx((halfway - before) * 2)
+    assert abs(halfway - before).sum() > 0.1
+    bench.ok("CloseObject", objectId=drawer.object_id, forceAction=True)
+    assert inside.position == pytest.approx(before)
+    plate, apple = bench.first("Plate"), bench.first("Apple")
+    bench.ok("PickupObject", objectId=apple, forceAction=True)
+    bench.ok("PutObject", objectId=plate, forceAction=True)
+    offset = world.objects[apple].center - world.objects[plate].center
+    bench.ok("PickupObject", objectId=plate, forceAction=True)
+    assert (world.objects[apple].center - world.objects[plate].center)[1] == pytest.approx(
+        offset[1]
+    )
+    bench.ok("PutObject", objectId=bench.first("DiningTable"), forceAction=True)
+    assert bench.object(apple)["parentReceptacles"] == [plate]
+
+
+def test_slices_are_new_objects(bench):
+    apple = bench.first("Apple")
+    home = bench.object(apple)["parentReceptacles"]
+    bench.ok("SliceObject", objectId=apple, forceAction=True)
+    slices = [o for o in bench.metadata["objects"] if o["objectType"] == "AppleSliced"]
+    assert len(slices) >= 2
+    assert all(s["objectId"].startswith(f"{apple}|AppleSliced_") and s["isSliced"] for s in slices)
+    assert all(s["parentReceptacles"] == home for s in slices)
+    assert apple not in {o["objectId"] for o in bench.metadata["objects"]}
+    assert "CanBeSliced" in bench.refused(
+        "SliceObject", objectId=bench.first("Mug"), forceAction=True
+    )
+
+
+def test_microwave_heats_and_fridge_cools(bench):
+    microwave, fridge = bench.first("Microwave"), bench.first("Fridge")
+    potato = take(bench, "Potato")
+    bench.ok("OpenObject", objectId=microwave, forceAction=True)
+    bench.ok("PutObject", objectId=microwave, forceAction=True)
+    assert "closed" in bench.refused("ToggleObjectOn", objectId=microwave, forceAction=True)
+    bench.ok("CloseObject", objectId=microwave, forceAction=True)
+    bench.ok("ToggleObjectOn", objectId=microwave, forceAction=True)
+    assert bench.object(potato)["temperature"] == "Hot"
+    assert bench.object(potato)["isCooked"]
+    bench.refused("OpenObject", objectId=microwave, forceAction=True)
+    bench.ok("ToggleObjectOff", objectId=microwave, forceAction=True)
+    bench.ok("OpenObject", objectId=microwave, forceAction=True)
+    bench.ok("PickupObject", objectId=potato, forceAction=True)
+    bench.ok("OpenObject", objectId=fridge, forceAction=True)
+    bench.ok("PutObject", objectId=fridge, forceAction=True)
+    bench.ok("CloseObject", objectId=fridge, forceAction=True)
+    assert bench.object(potato)["temperature"] == "Cold"
+
+
+def test_tap_cleans_and_fills_and_coffee_machine_fills(bench):
+    faucet, basin, machine = (
+        bench.first("Faucet"),
+        bench.first("SinkBasin"),
+        bench.first("CoffeeMachine"),
+    )
+    mug = bench.first("Mug")
+    bench.ok("DirtyObject", objectId=mug, forceAction=True)
+    bench.ok("PickupObject", objectId=mug, forceAction=True)
+    bench.ok("PutObject", objectId=basin, forceAction=True)
+    assert bench.object(mug)["isDirty"]
+    bench.ok("ToggleObjectOn", objectId=faucet, forceAction=True)
+    assert not bench.object(mug)["isDirty"]
+    assert bench.object(mug)["fillLiquid"] == "water"
+    bench.ok("ToggleObjectOff", objectId=faucet, forceAction=True)
+    bench.ok("EmptyLiquidFromObject", objectId=mug, forceAction=True)
+    bench.ok("PickupObject", objectId=mug, forceAction=True)
+    bench.ok("PutObject", objectId=machine, forceAction=True)
+    bench.ok("ToggleObjectOn", objectId=machine, forceAction=True)
+    assert bench.object(mug)["fillLiquid"] == "coffee"
+
+
+def test_knobs_light_burners_that_cook(bench):
+    knob = bench.first("StoveKnob")
+    burner = bench.object(knob)["controlledObjects"][0]
+    pan, potato = bench.first("Pan"), bench.first("Potato")
+    bench.ok("PickupObject", objectId=potato, forceAction=True)
+    bench.ok("PutObject", objectId=pan, forceAction=True)
+    if bench.object(pan)["parentReceptacles"] != [burner]:
+        bench.ok("PickupObject", objectId=pan, forceAction=True)
+        bench.ok("PutObject", objectId=burner, forceAction=True)
+    assert "StoveKnob" in bench.refused("ToggleObjectOn", objectId=burner, forceAction=True)
+    bench.ok("ToggleObjectOn", objectId=knob, forceAction=True)
+    assert bench.object(burner)["isToggled"]
+    assert bench.object(potato)["isCooked"]
+    assert "already" in bench.refused("ToggleObjectOn", objectId=knob, forceAction=True)
+
+
+@pytest.mark.parametrize(
+    ("action", "object_type", "flag"),
+    [("DirtyObject", "Plate", "isDirty"), ("BreakObject", "Cup", "isBroken"), ("UseUpObject", "SoapBottle", "isUsedUp"),
+     ("CookObject", "Potato", "isCooked")],
+)  # fmt: skip
+def test_direct_changes_of_state(bench, action, object_type, flag):
+    target = bench.first(object_type)
+    bench.ok(action, objectId=target, forceAction=True)
+    assert bench.object(target)[flag]
+    bench.refused(action, objectId=target, forceAction=True)
+    bench.refused(action, objectId=bench.first("Fridge"), forceAction=True)
+
+
+def test_a_dropped_cup_breaks_and_lies_on_something(bench):
+    cup = take(bench, "Cup")
+    bench.ok("DropHandObject")
+    item = bench.object(cup)
+    assert not item["isPickedUp"]
+    low = min(c[1] for c in item["axisAlignedBoundingBox"]["cornerPoints"])
+    assert low == pytest.approx(0.0, abs=0.01) or item["parentReceptacles"]
+    assert item["isBroken"] == (low < 0.3)
+
+
+def test_an_open_fridge_stands_in_the_way():
+    bench = Bench()
+    bench.reset("kitchen-1")
+    fridge = bench.first("Fridge")
+    bench.ok("OpenObject", objectId=fridge, forceAction=True)
+    world = bench.sim.world
+    from infthor_sim.physics.obstacles import blocking_object, door_leaf
+
+    low, high = door_leaf(world.objects[fridge])
+    middle = (low + high) / 2
+    middle[1] = world.agent.position[1]
+    assert blocking_object(world, middle) == world.objects[fridge].name
+    bench.ok("CloseObject", objectId=fridge, forceAction=True)
+    assert blocking_object(world, middle) is None
+
+
+def test_agent_modes_and_bad_settings_are_refused(bench):
+    assert "agentMode" in bench.refused("Initialize", agentMode="drone")
+    assert "gridSize" in bench.refused("Initialize", gridSize=0)
+    assert bench.metadata["errorCode"] == "InvalidArgument"
+
+
+@pytest.mark.parametrize("position", [{"x": 50, "y": 0.9, "z": 0}, {"x": -1.5, "y": 0.9, "z": 2.0}])
+def test_teleport_refuses_what_collides(bench, position):
+    before = bench.metadata["agent"]["position"]
+    bench.refused("Teleport", position=position)
+    assert bench.metadata["agent"]["position"] == before
+
+
+def test_shortest_path_leads_to_the_fridge(bench):
+    fridge = bench.first("Fridge")
+    corners = bench.ok("GetShortestPath", objectId=fridge)["actionReturn"]["corners"]
+    steps = itertools.pairwise(corners)
+    assert all(
+        abs(a["x"] - b["x"]) + abs(a["z"] - b["z"]) == pytest.approx(0.25, abs=1e-6)
+        for a, b in steps
+    )
+    end, goal = corners[-1], bench.object(fridge)["position"]
+    assert abs(end["x"] - goal["x"]) + abs(end["z"] - goal["z"]) < 1.5
+
+
+def test_random_placement_follows_its_seed(bench):
+    def places() -> list[tuple[str, object]]:
+        return [
+            (o["objectId"], o["parentReceptacles"])
+            for o in bench.metadata["objects"]
+            if o["pickupable"]
+        ]
+
+    start = places()
+    bench.ok("InitialRandomSpawn", randomSeed=3)
+    third = places()
+    bench.ok("InitialRandomSpawn", randomSeed=4)
+    assert len({repr(p) for p in (start, third, places())}) == 3
+    bench.reset("kitchen-1")
+    bench.ok("InitialRandomSpawn", randomSeed=3)
+    assert places() == third
+    drawn = []
+    for _ in range(2):
+        bench.reset("kitchen-1")
+        bench.ok("SetRandomSeed", seed=9)
+        bench.ok("InitialRandomSpawn")
+        drawn.append(places())
+    assert drawn[0] == drawn[1]
+    assert drawn[0] != third
+
+
+def test_a_pile_of_plates_is_carried_however_high_it_is(bench):
+    world = bench.sim.world
+    pile = [world.objects[bench.first("Plate")]]
+    for number in range(2000):
+        plate = pile[-1].duplicate(f"Plate|{number}")
+        world.add(plate)
+        world.attach(plate, pile[-1])
+        pile.append(plate)
+    assert list(world.descendants(pile[0])) == pile[1:]
+
+
+def test_more_poses_than_a_scene_has_are_refused(bench, monkeypatch):
+    monkeypatch.setenv(OBJECT_POSES.name, "1")
+    pose = {"objectName": "Mug_1", "position": {"x": 0, "y": 1, "z": 0}}
+    bench.ok("SetObjectPoses", objectPoses=[pose])
+    assert "2 entries, too many for a scene" in bench.refused(
+        "SetObjectPoses", objectPoses=[pose, pose]
+    )

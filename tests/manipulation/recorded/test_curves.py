@@ -1,0 +1,164 @@
+"""Curves of arms, with numbers made by hand."""
+
+import pytest
+
+from infthor_eval.episodes.curves import AT_MOST
+from infthor_eval.errors import DataError, UsageError
+from infthor_eval.manipulation.recorded.curves import ALL, arm_curves
+from infthor_eval.manipulation.recorded.runs import label_by_radius
+
+from ..made_runs import episode, made_run, planner_run
+
+T = 12.7062  # quantile of the t interval over two trajectories
+# Two trajectories: of a pick-up and a put, and of a pick-up.
+EPISODES = (
+    episode("a", 10),
+    episode("a", 20, "put"),
+    episode("b", 30),
+)
+FAILED_PUT = (EPISODES[0], episode("a", 20, "put", done=False), EPISODES[2])
+
+
+def curve_of(curves, label, facet=ALL):
+    (run,) = [run for run in curves.runs if run.label == label]
+    return run.curves[facet]
+
+
+def means(curve):
+    return [estimate.mean for estimate in curve.means]
+
+
+def test_reward_adds_up_over_the_experts_steps_and_the_expert_takes_over_what_failed():
+    curves = arm_curves(
+        [made_run("m", [episode("a", 5, done=False), episode("a", 10), episode("a", 20, "put")])]
+    )
+    curve = curve_of(curves, "m")
+    assert (curve.places, means(curve)) == ((0, 5, 10, 20), [0, 0, 2, 4])
+    assert means(curve_of(curves, AT_MOST)) == [0, 2, 4, 6]
+
+
+def test_both_kinds_are_drawn_together_and_each_by_itself_over_the_same_trajectories():
+    curves = arm_curves([made_run("m", EPISODES)])
+    assert list(curves.facets) == [ALL, "pickup", "put"]
+    assert [facet.title for facet in curves.facets.values()] == [
+        "Pick-up and put",
+        "Pick-up",
+        "Put",
+    ]
+    both, pickups, puts = (curve_of(curves, "m", facet) for facet in curves.facets)
+    assert (both.places, means(both)) == ((0, 10, 20, 30), [0, 1, 2, 3])
+    assert (pickups.places, means(pickups)) == ((0, 10, 30), [0, 1, 2])
+    # Of the second trajectory, which has no put, there is nothing: the kinds add up to both.
+    assert (puts.places, means(puts)) == ((0, 20), [0, 1])
+    assert both.end.high - both.end.mean == pytest.approx(1.0 * T, rel=1e-4)
+    assert curves.n_trajectories == 2
+
+
+def test_of_one_kind_there_is_one_curve():
+    curves = arm_curves([made_run("m", [EPISODES[0], EPISODES[2]])])
+    assert list(curves.facets) == ["pickup"]
+    assert curves.task == "arm_pickup"
+    assert means(curve_of(curves, "m", "pickup")) == [0, 1, 2]
+
+
+def test_tasks_can_be_chosen():
+    runs = [made_run("m", EPISODES)]
+    assert list(arm_curves(runs, "arm_put").facets) == ["put"]
+    assert list(arm_curves(runs, "arm_put, arm_pickup").facets) == [ALL, "pickup", "put"]
+    with pytest.raises(UsageError, match="unknown task of all these runs 'arm'"):
+        arm_curves(runs, "arm")
+
+
+def test_two_tasks_of_one_kind_are_not_drawn_together():
+    run = made_run("m", [*EPISODES, episode("a", 10, task="other_pickup")])
+    with pytest.raises(
+        UsageError, match="arm_pickup and other_pickup are both of pickup; give one of each kind"
+    ):
+        arm_curves([run])
+    assert arm_curves([run], "arm_pickup,arm_put").task == "arm_pickup and arm_put"
+
+
+def test_an_excluded_episode_is_left_out_of_all_runs_and_a_failed_one_earns_nothing():
+    refused = (*EPISODES[:1], episode("a", 20, "put", excluded="refused"), EPISODES[2])
+    failed = (episode("a", 10, failure="out of memory"), *EPISODES[1:])
+    curves = arm_curves([made_run("m", refused), made_run("n", failed)])
+    assert means(curve_of(curves, "m")) == [0, 1, 2]
+    assert means(curve_of(curves, "n")) == [0, 0, 1]
+    assert means(curve_of(curves, AT_MOST)) == [0, 1, 2]
+    assert [run.counts for run in curves.runs] == [
+        {"episodes": 2, "failed": 0},
+        {"episodes": 2, "failed": 1},
+        {"episodes": 2, "failed": 0},
+    ]
+    assert any(note.endswith("cannot restore their start: 1") for note in curves.notes)
+
+
+def test_a_run_that_was_stopped_amid_a_trajectory_does_not_draw_it():
+    curves = arm_curves(
+        [made_run("m", EPISODES), made_run("n", [EPISODES[0], EPISODES[2], episode("c", 3, "put")])]
+    )
+    assert curves.n_trajectories == 1
+    assert means(curve_of(curves, "m")) == [0, 2]
+    assert curves.notes[0].startswith("1 of 3 trajectories are drawn")
+
+
+def test_the_planner_is_the_bound_and_comes_last():
+    curves = arm_curves([planner_run(FAILED_PUT), made_run("m", EPISODES)])
+    assert [(run.label, run.is_bound) for run in curves.runs] == [
+        ("m", False),
+        ("planner-arm", True),
+    ]
+
+
+def test_of_several_planners_none_is_the_bound():
+    planners = [planner_run(EPISODES, "p", radius=0.5), planner_run(FAILED_PUT, "p", radius=0.06)]
+    curves = arm_curves(label_by_radius(planners))
+    assert [(run.label, run.is_bound) for run in curves.runs] == [
+        ("p, 0.5 m", False),
+        ("p, 0.06 m", False),
+        (AT_MOST, True),
+    ]
+    assert "the runs differ in the radius of the hand's sphere: 0.06, 0.5 m" in curves.notes
+    assert [run.label for run in label_by_radius(planners[:1])] == ["p"]
+
+
+def test_runs_differ_in_simulator_and_settings_in_a_note():
+    other = made_run("n", EPISODES, simulator="unity", settings={"max_steps": 9})
+    notes = "\n".join(arm_curves([made_run("m", EPISODES), other]).notes)
+    assert "simulator: embedded (m), unity (n)" in notes
+    assert "max_steps of arm_put: the default (m), 9 (n)" in notes
+
+
+def other_digest():
+    run = made_run("n", EPISODES)
+    for about in run.header.config["tasks"].values():
+        about["trajectories"] = dict.fromkeys(about["trajectories"], "other")
+    return run
+
+
+REFUSED = {
+    "another task": (made_run("n", [episode("a", 10, task="other")]), "m and n share no task"),
+    "another trajectory": (
+        made_run("n", [episode("z", 10), episode("z", 20, "put")]),
+        "share no trajectory of arm",
+    ),
+    "another file": (other_digest(), "share no trajectory of arm"),
+    "other rewards": (
+        made_run("n", [episode("a", 10, most=5.0), *EPISODES[1:]]),
+        "earn different rewards in arm_pick",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_drawn_together_is_refused(case):
+    other, said = REFUSED[case]
+    with pytest.raises((DataError, UsageError), match=said):
+        arm_curves([made_run("m", EPISODES), other])
+
+
+def test_an_identity_of_another_form_is_refused():
+    run = made_run("m", EPISODES)
+    run.header.config["tasks"] = []
+    with pytest.raises(DataError, match="m: not the config of a run of manipulation"):
+        arm_curves([run])

@@ -1,0 +1,156 @@
+"""Several continuations of one prefix, answered together, against the same asked one by one."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Part, check_adapter, load
+from model_adapters.hf.prompting.prompt import n_common
+
+from ...asking import up_to
+
+CONTINUATION = st.lists(
+    st.one_of(
+        st.sampled_from(["\nWhat", " is it?", "mug ", "\nQuestion: where was the apple?"]),
+        st.integers(0, 5),
+    ),
+    max_size=4,
+)
+
+
+@pytest.fixture(scope="module")
+def batching() -> Any:
+    return load("qwen2.5-vl-tiny", {"batch_size": "3", "chunk_tokens": "30"}, seed=0)
+
+
+def _parts(continuation: list[Any], frames: list[FrameRef]) -> list[Part]:
+    return [frames[part] if isinstance(part, int) else part for part in continuation]
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    start=CONTINUATION.filter(len),
+    continuations=st.lists(CONTINUATION, min_size=1, max_size=7),
+    stop=st.sampled_from([(), ("e", "o")]),
+)
+def test_replies_are_those_of_asking_one_by_one(
+    batching: Any,
+    tiny: Any,
+    frames: list[FrameRef],
+    start: list[Any],
+    continuations: list[Any],
+    stop: tuple[str, ...],
+) -> None:
+    talk = batching.conversation()
+    talk.append(*_parts(start, frames))
+    together = talk.replies(
+        [_parts(continuation, frames) for continuation in continuations], up_to(5, stop=stop)
+    )
+    for continuation, reply in zip(continuations, together, strict=True):
+        alone = tiny.conversation()
+        alone.append(*_parts(start, frames), *_parts(continuation, frames))
+        expected = alone.reply(up_to(5, stop=stop))
+        assert (reply.text, reply.token_ids) == (expected.text, expected.token_ids)
+        assert reply.n_context_tokens == expected.n_context_tokens
+
+
+@pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral"])
+def test_every_family_answers_in_batches(family: str, frames: list[FrameRef]) -> None:
+    model: Any = load(f"{family}-tiny", {"batch_size": "8"}, seed=0)
+    check_adapter(model, frame_size=(60, 60))
+    talk = model.conversation()
+    assert model.capabilities.batch_size == 8
+    talk.append(frames[0])
+    batched = talk.replies([["\nWhat is it?"], ["\nWhere was the mug before?"]], up_to(4))
+    talk.append("\nWhat is it?")
+    assert talk.reply(up_to(4)).token_ids == batched[0].token_ids
+
+
+def test_a_window_slides_over_the_prefix_and_each_continuation(frames: list[FrameRef]) -> None:
+    heard = []
+    for size, window in (("8", 20), ("1", 20), ("1", None)):
+        model: Any = load("pixtral-tiny", {"batch_size": size, "chunk_tokens": "30"}, seed=0)
+        model._loaded.model.get_decoder().config.sliding_window = window
+        talk = model.conversation()
+        talk.append(
+            *frames[:2], "\nWhere was the mug before it was put into the sink of the kitchen?"
+        )
+        asked = [
+            ["\nOne."],
+            ["\nOr was it the plate on the table, which is larger than the window is wide?"],
+        ]
+        heard.append([reply.token_ids for reply in talk.replies(asked, up_to(8))])
+    assert heard[0] == heard[1] != heard[2]
+
+
+def test_a_model_that_does_not_attend_by_the_interface_is_refused_or_asked_alone(
+    frames: list[FrameRef],
+) -> None:
+    model: Any = load("qwen2.5-vl-tiny", {}, seed=0)
+    talk = model.conversation()
+    talk.append(frames[0])
+    decoder = model._loaded.model.get_decoder()
+    decoder.config.num_hidden_layers += 1  # as if a layer did something else
+    with pytest.raises(
+        ModelError, match="do not all attend by transformers' interface; set batch_size=1"
+    ):
+        talk.replies([["\nWhat?"], ["\nWho?"]], up_to(2))
+    decoder.config.num_hidden_layers -= 1
+    assert len(talk.replies([["\nWhat?"], ["\nWho?"]], up_to(2))) == 2
+    assert (
+        load("qwen2.5-vl-tiny", {"attn_implementation": "eager"}, seed=0).capabilities.batch_size
+        == 1
+    )
+
+
+def test_the_prefix_is_encoded_once_for_all(batching: Any, frames: list[FrameRef]) -> None:
+    talk = batching.conversation()
+    talk.append(*frames[::-1])
+    replies = talk.replies([[f"\nIs number {number} here?"] for number in range(6)], up_to(2))
+    assert replies[0].n_cached_tokens < 50
+    assert all(reply.n_cached_tokens > 60 for reply in replies[1:])
+
+
+def test_penalties_are_each_rows_own(frames: list[FrameRef]) -> None:
+    replies = []
+    for size in ("1", "4"):
+        model: Any = load("qwen2.5-vl-tiny", {"batch_size": size}, seed=1)
+        loaded = model._loaded
+        model._loaded = replace(
+            loaded, generation=replace(loaded.generation, repetition_penalty=1.4)
+        )
+        talk = model.conversation()
+        talk.append(frames[0])
+        replies.append(
+            [
+                reply.token_ids
+                for reply in talk.replies([["mug"], ["\nWhere?"], ["\nWhy not?"]], up_to(40))
+            ]
+        )
+    assert replies[0] == replies[1]
+
+
+def test_no_ending_no_reply(batching: Any) -> None:
+    assert batching.conversation().replies([], up_to(3)) == []
+
+
+def test_one_that_does_not_fit_is_refused_before_any_is_answered(frames: list[FrameRef]) -> None:
+    model: Any = load("qwen2.5-vl-tiny", {"batch_size": "2", "max_tokens": "60"}, seed=0)
+    talk = model.conversation()
+    with pytest.raises(ModelError, match="beyond the 60 tokens"):
+        talk.replies([["short"], [*frames]], up_to(2))
+
+
+@pytest.mark.parametrize(
+    ("prompts", "common"),
+    [([[1, 2, 3], [1, 2, 4]], 2), ([[1, 2, 3], [1, 2]], 1), ([[1], [2]], 0), ([[1, 2], [1, 2]], 1)],
+)
+def test_what_prompts_have_in_common_leaves_a_piece_of_each(
+    prompts: list[list[int]], common: int
+) -> None:
+    assert n_common(prompts) == common  # type: ignore[arg-type]

@@ -1,0 +1,85 @@
+"""Nothing of transformers' progress bars and warnings reaches the terminal."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from transformers.utils import logging
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.formats.object_ids import Words
+from infthor_eval.training.export import export
+from model_adapters import load
+from model_adapters.hf.loading.checkpoint import wrap_loading_errors
+from model_adapters.hf.retrieval import Retriever
+
+from ...asking import up_to
+
+LOADED = [
+    ("qwen2.5-vl-nano", None, {}),
+    ("qwen2.5-vl", "qwen2.5-vl", {}),
+    ("llava-onevision", "llava-onevision", {}),
+    ("pixtral", "pixtral", {"prompt": "plain"}),
+    ("deepseek-vl", "deepseek-vl", {}),
+    ("hf-vlm", "llava", {}),
+    ("hf-vlm", "gemma3", {"share_prefix": "false"}),
+]
+
+
+@pytest.fixture(autouse=True)
+def verbose() -> Iterator[None]:
+    """The defaults of transformers, whatever other tests have left."""
+    verbosity, has_bars = logging.get_verbosity(), logging.is_progress_bar_enabled()
+    logging.set_verbosity_warning()
+    logging.enable_progress_bar()
+    yield
+    logging.set_verbosity(verbosity)
+    if not has_bars:
+        logging.disable_progress_bar()
+
+
+@pytest.mark.parametrize(("name", "checkpoint", "options"), LOADED)
+def test_a_model_is_loaded_asked_and_exported_in_silence(
+    name: str,
+    checkpoint: str | None,
+    options: dict[str, str],
+    checkpoints: dict[str, Path],
+    frames: list[FrameRef],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    given = {"device": "cpu", **options} | (
+        {"pretrained": str(checkpoints[checkpoint])} if checkpoint else {}
+    )
+    capfd.readouterr()
+    model: Any = load(name, given, seed=0)
+    talk = model.conversation()
+    talk.append(frames[0], "\nWhat is it?")
+    talk.reply(up_to(2))
+    export(model.loaded, tmp_path / "exported", title="a twin", words=Words.PUBLISHED)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_clip_model_is_loaded_and_asked_in_silence(
+    make_clip: Callable[[], Path], frames: list[FrameRef], capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = make_clip()
+    capfd.readouterr()
+    retriever = Retriever(str(folder))
+    retriever.frames(frames)
+    retriever.text("Is there a mug?")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_errors_are_kept_and_the_settings_of_transformers_restored() -> None:
+    with (
+        pytest.raises(ModelError, match=r"the checkpoint x cannot be loaded \(broken\)"),
+        wrap_loading_errors("x"),
+    ):
+        assert not logging.is_progress_bar_enabled()
+        assert logging.get_verbosity() == logging.ERROR
+        raise ValueError("broken")
+    assert logging.is_progress_bar_enabled()
+    assert logging.get_verbosity() == logging.WARNING

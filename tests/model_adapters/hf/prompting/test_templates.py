@@ -1,0 +1,199 @@
+"""How conversations are written: by a checkpoint's own template, or plainly, as transformers' processors take them."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from infthor_eval.errors import ModelError, UsageError
+from infthor_eval.formats.frames import FrameRef
+from model_adapters import Turn, check_adapter, load, registry
+from model_adapters.built_in import BUILT_IN
+from model_adapters.hf.families.hf_vlm import ProcessorFamily
+from model_adapters.hf.prompting.templates import plain_template
+from model_adapters.hf.uncached import UncachedModel
+from model_adapters.tiny.tokenizer import train_tokenizer
+
+from ...asking import require_same
+from ...checkpoints import FAMILIES, OTHERS
+
+NEW = 6
+# Nobody converses with these.
+POLICIES = {"openvla", "openvla@vllm", "openvla-tiny", "spatialvla", "spatialvla-tiny", "vla-http"}
+IMAGES = {
+    "qwen2.5-vl": "<|vision_start|><|image_pad|><|vision_end|>",
+    "llava-onevision": "<image>",
+    "deepseek-vl": "<image_placeholder>",
+    "pixtral": "[IMG]",
+    "llava": "<image>",
+    "idefics3": "<image>",
+    "deepseek-vl-1.3b": "<image_placeholder>",
+    "gemma3": "<start_of_image>",
+}
+BEGINS = {
+    "qwen2.5-vl": "",
+    "llava-onevision": "",
+    "deepseek-vl": "<｜begin▁of▁sentence｜>",
+    "pixtral": "<s>",
+}
+# What a plain prompt is, said again.
+TEMPLATE = """\
+{%- for message in messages -%}{%- for part in message.content -%}
+{%- if part.type == 'image' -%}IMAGE{%- else -%}{{- part.text -}}{%- endif -%}
+{%- endfor -%}{%- endfor -%}
+"""
+
+
+@pytest.fixture(scope="module")
+def conversations(frames: list[FrameRef]) -> list[tuple[Turn, ...]]:
+    return [
+        (
+            Turn(
+                "user",
+                ("<|goal|>Wash {{ it }}.  <|goal|>", *frames[:2], "\nMove", frames[2], "Ahead "),
+            ),
+        ),
+        (
+            Turn("system", ("You wash.\n",)),
+            Turn("user", (frames[0],)),
+            Turn("assistant", ("LookUp",)),
+            Turn("user", ("Now? ", frames[1])),
+        ),
+    ]
+
+
+def _load(name: str, folder: Path, **options: str) -> Any:
+    given = {
+        "pretrained": str(folder),
+        "device": "cpu",
+        "dtype": "float32",
+        "max_tokens": "0",
+        "prompt": "plain",
+    }
+    return load(name if name in FAMILIES else "hf-vlm", given | options, seed=0)
+
+
+def _without_template(checkpoint: Path, folder: Path) -> Path:
+    shutil.copytree(checkpoint, folder)
+    (folder / "chat_template.jinja").unlink()
+    return folder
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_turns_are_written_one_after_the_other(
+    family: str, conversations: list[tuple[Turn, ...]]
+) -> None:
+    model: Any = load(f"{family}-tiny", {"prompt": "plain"}, seed=0)
+    placeholder = model._loaded.family.placeholder_id
+    texts = ["<|goal|>Wash {{ it }}.  <|goal|>@@\nMove@Ahead ", "You wash.\n@LookUpNow? @"]
+    for turns, text in zip(conversations, texts, strict=True):
+        ids = [piece if isinstance(piece, int) else placeholder for piece in model.pieces(turns)]
+        assert model._loaded.tokenizer.decode(ids) == BEGINS[family] + text.replace(
+            "@", IMAGES[family]
+        )
+
+
+def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
+    checkpoints: dict[str, Path],
+    tmp_path: Path,
+    conversations: list[tuple[Turn, ...]],
+    answer_plainly: Any,
+) -> None:
+    names = (
+        *FAMILIES,
+        *OTHERS.keys() - {"gemma3-line-breaks"},
+    )  # like gemma3 but for its vocabulary
+    folders = {name: _without_template(checkpoints[name], tmp_path / name) for name in names}
+    models = {name: [_load(name, folders[name], share_prefix="false")] for name in names}
+    for name in (*FAMILIES, "llava", "idefics3", "deepseek-vl-1.3b"):
+        models[name].append(_load(name, folders[name], chunk_tokens="50"))
+    for name in names:
+        (folders[name] / "chat_template.jinja").write_text(TEMPLATE.replace("IMAGE", IMAGES[name]))
+    plainly = answer_plainly(dict.fromkeys(folders.values(), conversations), NEW)
+    for name in names:
+        for model in models[name]:
+            for turns, (ids, reply) in zip(conversations, plainly[folders[name]], strict=True):
+                require_same(model, turns, ids, reply, NEW)
+
+
+@pytest.mark.parametrize("name", ["qwen2.5-vl", "llava"])
+def test_a_checkpoint_without_a_template_is_asked_plainly_or_not_at_all(
+    name: str, checkpoints: dict[str, Path], tmp_path: Path
+) -> None:
+    folder = _without_template(checkpoints[name], tmp_path / "bare")
+    for share_prefix in ("true", "false"):
+        with pytest.raises(ModelError, match=r"has no chat template; add .*, or set prompt=plain"):
+            _load(name, folder, prompt="chat", share_prefix=share_prefix)
+        check_adapter(_load(name, folder, share_prefix=share_prefix))
+
+
+def test_the_way_of_asking_is_part_of_the_identity(checkpoints: dict[str, Path]) -> None:
+    for share_prefix in ("true", "false"):
+        identities = [
+            _load("llava", checkpoints["llava"], share_prefix=share_prefix, **asked).identity()
+            for asked in ({}, {"prompt": "chat"})
+        ]
+        assert [identity["prompt"] for identity in identities] == ["plain", "chat"]
+        assert identities[0]["chat_template"] != identities[1]["chat_template"]
+    default, chat = (
+        load("qwen2.5-vl-tiny", asked, seed=0).identity() for asked in ({}, {"prompt": "chat"})
+    )
+    assert default == chat
+
+
+def test_the_model_without_sharing_is_asked_plainly_too(
+    checkpoints: dict[str, Path], frames: list[FrameRef]
+) -> None:
+    model = _load("gemma3", checkpoints["gemma3"], share_prefix="false")
+    assert isinstance(model, UncachedModel)
+    lengths = []
+    for prompt in ("plain", "chat"):
+        talk = _load(
+            "gemma3", checkpoints["gemma3"], share_prefix="false", prompt=prompt
+        ).conversation()
+        talk.append("mug", frames[0])
+        lengths.append(talk.n_tokens)
+    assert lengths[0] < lengths[1]
+
+
+@pytest.mark.parametrize("name", sorted(BUILT_IN.keys() - POLICIES - {"human", "openai"}))
+def test_every_model_has_the_option(name: str) -> None:
+    assert "prompt=chat" in registry.options(name)
+    with pytest.raises(UsageError, match="prompt=plane is not chat or plain"):
+        registry.check_options(name, {"prompt": "plane"})
+
+
+@pytest.mark.parametrize(
+    ("config", "expanded", "written"),
+    [
+        ({}, "<image><image>", "<image>"),
+        (
+            {"vision_start_token_id": "<a>", "vision_end_token_id": "<z>"},
+            "<image><image>",
+            "<a><image><z>",
+        ),
+        ({"image_start_token_id": "<a>", "image_end_token_id": "<z>"}, "<image>", "<a><image><z>"),
+        ({"image_start_token_id": "<a>", "image_end_token_id": "<z>"}, "<a><image><z>", "<image>"),
+        ({"image_start_token_id": "<a>"}, "<image>", "<image>"),
+    ],
+)
+def test_markers_around_a_frame_are_written_unless_the_processor_does(
+    config: dict[str, str], expanded: str, written: str
+) -> None:
+    tokenizer = train_tokenizer(("</s>", "<image>", "<a>", "<z>"), end="</s>", pad="</s>", named={})
+    ids: Callable[[str], Any] = tokenizer.convert_tokens_to_ids
+    settings = SimpleNamespace(
+        image_token_id=ids("<image>"), **{name: ids(token) for name, token in config.items()}
+    )
+
+    class Processor:
+        image_token = "<image>"
+
+        def __call__(self, **_: Any) -> Any:
+            return tokenizer([expanded], return_tensors="pt")
+
+    family = ProcessorFamily(SimpleNamespace(config=settings), None, tokenizer, Processor())
+    assert f'"{written}"' in plain_template(tokenizer, family)

@@ -1,0 +1,164 @@
+import json
+from collections import Counter
+
+import pytest
+
+from infthor_eval.errors import ModelError
+from infthor_eval.formats.question import Question
+from infthor_eval.nieh.asking.baselines import (
+    BASELINES,
+    Baseline,
+    Blind,
+    BlindCount,
+    Oracle,
+    Random,
+)
+from infthor_eval.nieh.contexts import Sample
+from infthor_eval.nieh.guessing.forms import question_type
+from model_adapters import names
+
+
+def asked(
+    text: str, *answers: str, question_type: str | None = None, traj: str = "t", n_frames: int = 1
+) -> Sample:
+    return Sample(Question(traj, text, (0,), answers, question_type), tuple(range(n_frames)))
+
+
+KEY = [
+    asked("Did you see a mug?", "yes", question_type="presence"),
+    asked("Did you see a cup?", "no", question_type="presence"),
+    asked("Did you see a pan?", "no", question_type="presence"),
+    asked("What did you put on the desk?", "Mug", "Plate", question_type="put"),
+    asked("How many plates are there?", "2"),
+    asked("How many mugs are there?", "3"),
+    asked("How MANY cups are there?", "3"),
+]
+
+
+def said(baseline: Baseline, key: list[Sample]) -> list[str]:
+    predict = baseline.fit(key)
+    return [predict(sample) for sample in key]
+
+
+def test_oracle_reads_the_key() -> None:
+    assert said(Oracle(0), KEY)[:4] == ["yes", "no", "no", "Mug, Plate"]
+
+
+def test_type_is_the_files_or_the_leading_words() -> None:
+    assert [question_type(sample.question) for sample in (KEY[0], KEY[6])] == [
+        "presence",
+        "how many",
+    ]
+
+
+# -- blind
+
+
+def test_blind_guesses_from_the_words_with_the_objects_among_them() -> None:
+    key = [
+        asked(f"{stem} a {name}?", answer, traj=f"t{number}")
+        for number in range(4)
+        for stem in ("Is there", "Have you seen")
+        for name, answer in (("mug", "yes"), ("safe", "no"))
+    ] + [asked("Where is the mug?", "Shelf", traj=f"t{number}") for number in range(4)]
+    assert said(Blind(0), key) == ["yes", "no"] * 8 + ["Shelf"] * 4
+
+
+def test_blind_learns_nothing_from_the_trajectory_that_is_asked_about() -> None:
+    key = [
+        asked(f"Is number {n} here?", "no" if t else "yes", traj=f"t{t}")
+        for t in range(3)
+        for n in range(5)
+    ]
+    assert said(Blind(0), key) == ["no"] * 15
+    assert said(
+        Blind(0), [asked(f"Where is {t}?", f"place {t}", traj=f"t{t}") for t in range(3)]
+    ) == [*("place 1", "place 0", "place 0")]
+
+
+def test_blind_on_one_trajectory_learns_from_the_other_questions() -> None:
+    key = [asked(f"Is number {n} here?", "yes" if n == 1 else "no") for n in range(5)]
+    assert said(Blind(0), key) == ["no"] * 5
+    assert said(Blind(0), key[:1]) == [""]
+
+
+def test_blind_breaks_ties_by_the_alphabet() -> None:
+    key = [
+        asked("Is it?", answer, traj=traj)
+        for traj, answer in (("a", "yes"), ("b", "no"), ("c", "maybe"))
+    ]
+    assert said(Blind(0), key) == ["maybe", "maybe", "no"]
+
+
+def test_the_number_of_frames_tells_blind_count_what_it_gives_away() -> None:
+    text = "How many times did you move the mug?"
+    key = [asked(text, str(n), traj=f"t{t}", n_frames=n) for t in range(3) for n in (1, 2, 3)]
+    assert said(BlindCount(0), key) == ["1", "2", "3"] * 3
+    assert len(set(said(Blind(0), key))) == 1
+
+
+# -- random
+
+
+def test_a_type_that_was_not_read_is_an_error() -> None:
+    predict = Random(0).fit(KEY)
+    with pytest.raises(ModelError, match="why is"):
+        predict(asked("Why is it?", "so"))
+
+
+def test_random_is_the_same_for_a_seed_and_differs_between_seeds() -> None:
+    key = [asked(f"Is number {i} here?", "yes" if i % 2 else "no") for i in range(40)]
+
+    def answers(seed: int, order: list[Sample]) -> dict[str, str]:
+        predict = Random(seed).fit(order)
+        return {sample.question.id: predict(sample) for sample in order}
+
+    assert answers(1, key) == answers(1, key[::-1])
+    assert answers(1, key) != answers(2, key)
+
+
+def test_random_draws_answers_as_often_as_they_occur() -> None:
+    key = [asked(f"Is number {i} here?", "no" if i % 4 else "yes") for i in range(2000)]
+    drawn = Counter(said(Random(0), key))
+    assert set(drawn) == {"yes", "no"}
+    assert 430 < drawn["yes"] < 570
+
+
+# -- all of them
+
+
+@pytest.mark.parametrize("name", BASELINES)
+def test_baselines_keep_their_contract(name: str) -> None:
+    baseline = BASELINES[name](3)
+    assert isinstance(baseline, Baseline)
+    assert baseline.name == name
+    identity = baseline.identity()
+    assert json.loads(json.dumps(identity)) == identity == baseline.identity()
+    predict = baseline.fit(KEY)
+    there = [predict(sample) for sample in KEY]
+    back = [predict(sample) for sample in reversed(KEY)][::-1]
+    assert all(isinstance(answer, str) for answer in there)
+    assert there == back == said(baseline, KEY[::-1])[::-1]
+
+
+@pytest.mark.parametrize("name", ["blind", "blind-count", "random"])
+def test_what_is_fitted_to_one_key_knows_nothing_of_another(name: str) -> None:
+    baseline, other = (
+        BASELINES[name](0),
+        [asked(f"Is {i}?", "yes", question_type="presence") for i in range(9)],
+    )
+    before = said(baseline, KEY)
+    first, second = baseline.fit(KEY), baseline.fit(other)
+    assert [first(sample) for sample in KEY] == before
+    assert {second(sample) for sample in KEY[:3]} == {"yes"}
+
+
+def test_only_random_depends_on_the_seed() -> None:
+    assert BASELINES["random"](1).identity() != BASELINES["random"](2).identity()
+    for name in ("blind", "blind-count", "oracle"):
+        assert BASELINES[name](1).identity() == BASELINES[name](2).identity()
+
+
+def test_no_model_has_the_name_of_a_baseline() -> None:
+    assert set(BASELINES) == {"oracle", "blind", "blind-count", "random"}
+    assert not set(BASELINES) & set(names())

@@ -1,0 +1,53 @@
+"""How a judge is asked, and its verdict read."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.cli.commands import rescore
+from infthor_eval.nieh.rescoring.judge_prompts import JUDGE_PROMPTS, YES_NO
+
+CASES = json.loads((Path(__file__).parents[2] / "goldens" / "prompts.json").read_text())["judge"]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case["question"])
+def test_the_published_prompt_is_the_published_text(case):
+    text = JUDGE_PROMPTS["published"].text(case["question"], case["answers"], case["reply"])
+    assert text == case["text"]
+
+
+@pytest.mark.parametrize(
+    ("said", "score"),
+    [
+        ('{"score": 1.0}', 1.0),
+        ('{"score": 0}', 0.0),
+        ('```json\n{"score": 0.66}\n```', 0.66),
+        ('{"score": 1.5}', None),
+        ('{"score": -1}', None),
+        ('{"score": true}', None),
+        ('{"score": "1"}', None),
+        ('{"score": NaN}', None),
+        (
+            '{"correct": true}',
+            None,
+        ),  # what the published parser reads, and its prompt never asks for
+        ("{score: 1}", None),
+        ("1.0", None),
+        ("", None),
+    ],
+)
+def test_a_score_is_read_as_the_published_prompt_asks_for_it(said, score):
+    assert JUDGE_PROMPTS["published"].read(said) == score
+
+
+@pytest.mark.parametrize(
+    ("said", "score"), [("Yes.", 1.0), ("no", 0.0), ("yes and no", None), ("perhaps", None)]
+)
+def test_yes_and_no_are_scores(said, score):
+    assert JUDGE_PROMPTS["yes-no"].read(said) == score
+
+
+def test_the_command_has_all_prompts():
+    assert list(JUDGE_PROMPTS) == list(rescore._JUDGE_TOKENS)
+    assert rescore._JUDGE_PROMPT == YES_NO

@@ -1,0 +1,117 @@
+"""The table and the picture of memories."""
+
+import re
+from types import SimpleNamespace
+
+import pytest
+
+from infthor_eval.nieh.records import NiehRecall, ShownClues
+from infthor_eval.nieh.results.memory_summary import MemorySummary, MemoryTimes, subject_of
+from infthor_eval.nieh.results.memory_tables import memory_tables
+from infthor_eval.nieh.results.summary import summarise
+from infthor_eval.nieh.results.tables import overview, tables
+from infthor_eval.runs import RunHeader, RunSummary, Tokens
+
+from ..made import identity, record
+
+
+def recall(n_frames, build_s=2.0, recall_s=0.5):
+    return NiehRecall(recalled=(*range(n_frames), "a mug"), build_s=build_s, recall_s=recall_s)
+
+
+def run_of(
+    name="nano (budget=1k, memory=last)",
+    memory="last",
+    privileged=False,
+    budget="1k",
+    scores=(1, 0, 1, 0),
+):
+    config = identity(context="memory")
+    config["tasks"]["nieh_gt"]["sources"] = {
+        "memory": {"name": memory, "options": {}, "privileged": privileged}
+    }
+    if budget is not None:
+        config["budget"] = budget
+    records = [
+        record(
+            number,
+            "mug" if score else "no",
+            recall=recall(number, build_s=2.0 if number % 4 else 4.0),
+            shown_clues=ShownClues(n_shown=number % 3, n_clues=2, n_after=9),
+            tokens=Tokens(context=100 * number),
+        )
+        for number, score in enumerate(scores)
+    ]
+    return RunSummary(RunHeader(suite="nieh", name=name, config=config), summarise(config, records))
+
+
+def test_a_run_is_summed_up_with_its_memory_and_what_that_took():
+    summary = run_of().summary
+    assert summary.tasks["nieh_gt"].memory == MemorySummary(
+        name="last", privileged=False, budget=1000, n_frames=1.5, n_tokens=150.0
+    )
+    assert summary.took == {"nieh_gt": MemoryTimes(build_s=2.5, recall_s=0.5)}
+    without = summarise(identity(), [record(1, "mug")])
+    assert without.took == {}
+    assert without.tasks["nieh_gt"].memory is None
+
+
+def test_the_table_has_what_was_right_recalled_and_spent():
+    (table,) = memory_tables([run_of(), run_of("nano (memory=oracle)", "oracle", True, None)])
+    heads = [column.name for column in table.columns]
+    first, second = (dict(zip(heads, row.cells, strict=True)) for row in table.rows)
+    assert (first["model"], first["memory"], first["budget"]) == ("nano", "last", "1,000")
+    assert (second["model"], second["memory"], second["budget"]) == ("nano", "oracle*", "-")
+    assert first["accuracy"] == "50.0"
+    # shown of two clues: 0, 1, 2, 0; right: 1, 0, 1, 0
+    assert (first["all clues"], first["some"], first["none"]) == (
+        "100.0 (25 %)",
+        "0.0 (25 %)",
+        "50.0 (50 %)",
+    )
+    assert (first["frames"], first["tokens"], first["build s"], first["recall s"]) == (
+        "1.5",
+        "150",
+        "2.500",
+        "0.500",
+    )
+
+
+def test_it_is_among_all_tables_only_where_there_is_a_memory():
+    for of_runs in (overview, tables):
+        assert "Memories" in [table.title for table in of_runs([run_of()])]
+        header = RunHeader(suite="nieh", name="x", config=identity())
+        plain = RunSummary(header, summarise(identity(), [record(1, "mug")]))
+        assert "Memories" not in [table.title for table in of_runs([plain])]
+
+
+@pytest.mark.parametrize(
+    ("label", "subject"),
+    [
+        ("nano (budget=1k, memory=last)", "nano"),
+        ("nano (memory=a/b.py:C, seed=2)", "nano (seed=2)"),
+        ("nano (seed=2, memory=last)", "nano (seed=2)"),
+        ("nano", "nano"),
+        ("nano (memory_args=k=3, memory=clip), blank frames", "nano, blank frames"),
+    ],
+)
+def test_the_memory_is_not_said_twice(label, subject):
+    assert subject_of(label) == subject
+
+
+def test_the_picture_has_a_curve_for_each_memory_over_its_budgets():
+    from infthor_eval.report.suites.memory_chart import memory_charts
+
+    runs = [
+        SimpleNamespace(model="nano", summary=run_of("nano", memory, memory == "oracle", budget))
+        for memory in ("last", "oracle")
+        for budget in ("1k", "2k")
+    ]
+    (chart,) = memory_charts(runs)
+    assert chart.title == "nieh_gt: accuracy by tokens of what a memory recalls"
+    assert re.findall(
+        r"(?:^|; )(\S+) 50\.0 % at 150 tokens, 50\.0 % at 150 tokens", chart.description
+    ) == [
+        "last",
+        "oracle*",
+    ]

@@ -1,0 +1,243 @@
+from itertools import pairwise
+
+import msgspec
+import pytest
+
+from infthor_eval.distances import DISTANCES, LENGTHS
+from infthor_eval.nieh.records import Guess, ShownClues
+from infthor_eval.nieh.results.summary import NiehSummary, summarise
+from infthor_eval.runs import Tokens
+
+from ..made import identity, record
+
+
+def test_the_same_records_in_another_order_give_the_same_summary():
+    records = [
+        record(number, "mug" if number % 3 else "cup", n_clues=1 + number % 4)
+        for number in range(20)
+    ]
+    summary = summarise(identity(), records)
+    assert summary == summarise(identity(), records[::-1])
+    assert msgspec.json.decode(msgspec.json.encode(summary), type=NiehSummary) == summary
+
+
+def test_columns_are_those_of_table_4_and_both_denominators_are_told():
+    records = [
+        record(0, "mug"),
+        record(1, "cup"),
+        record(2, "mug", n_clues=2),
+        record(3, "mug", n_clues=7),
+    ]
+    records.append(record(4, "no", answers=("no",), n_clues=0))
+    result = summarise(identity(skipped=("no clue frame", "no clue frame")), records).tasks[
+        "nieh_gt"
+    ]
+    by_clues = {
+        name: (cell.n, cell.scores["strict"].mean) for name, cell in result.by_clues.items()
+    }
+    assert by_clues == {
+        "1": (2, 0.5),
+        "2": (1, 1.0),
+        ">=3": (1, 1.0),
+        "total": (5, 0.8),
+        "absence": (1, 1.0),
+        "open-ended": (4, 0.75),
+    }
+    assert (result.n, result.context, result.metrics) == (5, "clues", ["reference", "strict"])
+    assert (result.skipped.n, result.skipped.by_reason) == (2, {"no clue frame": 2})
+    assert result.skipped.mean_counting_them_wrong["strict"] == 4 / 7
+    assert result.below_full_marks["strict"] == ["q1"]
+
+
+def test_open_ended_is_what_begins_with_a_text_that_is_neither_yes_nor_no():
+    golds = [("mug",), ("Mug", "yes"), ("3",), ("yes",), ("No",), (3,), (2, "mug")]
+    records = [record(number, "?", answers=answers) for number, answers in enumerate(golds)]
+    assert summarise(identity(), records).tasks["nieh_gt"].by_clues["open-ended"].n == 3
+
+
+def test_a_column_without_a_question_has_no_score():
+    result = summarise(identity(), [record(0, "mug")]).tasks["nieh_gt"]
+    assert (result.by_clues["2"].n, result.by_clues["2"].scores) == (0, {})
+    alone = result.by_clues["total"].scores["strict"]
+    assert (alone.mean, alone.n_trajectories) == (1.0, 1)
+    assert (alone.stderr, alone.low, alone.high, alone.bootstrap) == (None, None, None, None)
+
+
+def test_a_failed_question_counts_as_wrong_and_is_named():
+    result = summarise(identity(), [record(0, "mug"), record(1, None, failure="too long")]).tasks[
+        "nieh_gt"
+    ]
+    assert result.by_clues["total"].scores["strict"].mean == 0.5
+    assert result.by_clues["total"].n_failed == 1
+    assert [(failure.question, failure.reason) for failure in result.failures] == [
+        ("q1", "too long")
+    ]
+
+
+def test_an_interval_is_not_zero_wide_where_all_are_right():
+    records = [record(number, "mug") for number in range(40)]
+    strict = summarise(identity(), records).tasks["nieh_gt"].by_clues["total"].scores["strict"]
+    assert (strict.mean, strict.stderr, strict.high) == (1.0, 0.0, 1.0)
+    assert strict.low < 0.9
+
+
+def test_scores_are_those_of_the_tasks_own_metrics():
+    records = [record(0, "mug", scores={"length": 3.0}), record(1, "cups", scores={"length": 4.0})]
+    result = summarise(identity(metrics=("length",)), records).tasks["nieh_gt"]
+    assert {name: score.mean for name, score in result.by_clues["total"].scores.items()} == {
+        "length": 3.5
+    }
+    assert result.below_full_marks == {"length": []}
+
+
+def test_types_and_variants_are_apart():
+    records = [
+        record(0, "mug", question_type="", variant="depth=0"),
+        record(1, "cup", variant="depth=0.2"),
+    ]
+    result = summarise(identity(), records).tasks["nieh_gt"]
+    assert {name: cell.n for name, cell in result.by_question_type.items()} == {
+        "put_action": 1,
+        "untyped": 1,
+    }
+    assert {name: cell.scores["strict"].mean for name, cell in result.by_variant.items()} == {
+        "depth=0": 1.0,
+        "depth=0.2": 0.0,
+    }
+    assert result.below_full_marks["strict"] == ["q1 depth=0.2"]
+
+
+def test_a_leaning_to_yes_and_a_reply_that_is_neither_show():
+    replies = ["yes", "Yes.", "yes", "maybe"]
+    records = [
+        record(i, reply, answers=("yes",) if i < 1 else ("no",)) for i, reply in enumerate(replies)
+    ]
+    found = summarise(identity(), [*records, record(9, "mug")]).tasks["nieh_gt"].yes_no
+    assert msgspec.to_builtins(found) == {
+        "n": 4,
+        "share_gold_yes": 0.25,
+        "share_said_yes": 0.75,
+        "n_neither": 1,
+    }
+
+
+@pytest.mark.parametrize("shuffled", [1, -1])
+def test_replies_that_are_not_of_the_form_asked_for_are_counted_by_reason(shuffled):
+    records = [
+        record(0, "yes", answers=("yes",)),
+        record(1, "perhaps", answers=("no",)),
+        record(2, "four", answers=("4",)),
+        record(3, "many", answers=("4",)),
+        record(4, "some text\n", answers=("mug", "plate"), n_reply_tokens=50),
+        record(5, " \n", answers=("no",)),
+        record(6, None, answers=("no",), failure="too long"),
+    ]
+    assert summarise(identity(), records[::shuffled]).tasks["nieh_gt"].format_failures == {
+        "cut off at the token limit": 1,
+        "empty": 1,
+        "neither yes nor no": 1,
+        "no number": 1,
+    }
+
+
+# -- by file, evidence and length
+
+
+def task_of(records):
+    return summarise(identity(), records).tasks["nieh_gt"]
+
+
+def shown(n_shown, n_clues=2, n_after=None):
+    return ShownClues(n_shown=n_shown, n_clues=n_clues, n_after=n_after)
+
+
+def means(cells):
+    return {name: (cell.n, cell.scores["strict"].mean) for name, cell in cells.items()}
+
+
+def test_files_are_apart_in_a_set_of_several():
+    records = [record(0, "mug", file="b"), record(1, "cup", file="b"), record(2, "mug", file="a")]
+    assert list(means(task_of(records).by_file).items()) == [("a", (1, 1.0)), ("b", (2, 0.5))]
+    alone = task_of([record(0, "mug")])
+    assert (alone.by_file, list(alone.evidence)) == ({}, ["total"])
+
+
+def test_samples_are_apart_by_the_share_of_their_clues_that_was_shown():
+    states = ((0, "a"), (2, "a"), (1, "b"), (0, "b"), (1, "a"))
+    records = [
+        record(i, "mug" if i else "cup", file=file, shown_clues=shown(n))
+        for i, (n, file) in enumerate(states)
+    ]
+    evidence = task_of(
+        [*records, record(9, "mug", file="a")]
+    ).evidence  # of the last it is not known
+    assert {
+        name: list(means(cells.by_shown_clues).items()) for name, cells in evidence.items()
+    } == {
+        "total": [("all", (1, 1.0)), ("some", (2, 1.0)), ("none", (2, 0.5))],
+        "a": [("all", (1, 1.0)), ("some", (1, 1.0)), ("none", (1, 0.0))],
+        "b": [("some", (1, 1.0)), ("none", (1, 1.0))],
+    }
+    assert all(cells.by_distance == {} for cells in evidence.values())
+
+
+@pytest.mark.parametrize(
+    ("n_after", "name"),
+    [
+        (0, "0-49"),
+        (49, "0-49"),
+        (50, "50-99"),
+        (1599, "800-1599"),
+        (1600, "1600-3199"),
+        (3200, ">=3200"),
+    ],
+)
+def test_samples_are_apart_by_the_distance_of_their_last_clue(n_after, name):
+    evidence = task_of(
+        [record(0, "mug", shown_clues=shown(2, n_after=n_after)), record(1, "cup")]
+    ).evidence["total"]
+    assert means(evidence.by_distance) == {name: (1, 1.0)}
+
+
+@pytest.mark.parametrize(
+    ("tokens", "name"),
+    [
+        (0, "0-1"),
+        (999, "0-1"),
+        (1000, "1-2"),
+        (32_768, "32-64"),
+        (1_023_999, "512-1024"),
+        (1_024_000, ">=1024"),
+    ],
+)
+def test_samples_are_apart_by_the_length_of_their_context(tokens, name):
+    found = task_of([record(0, "mug", tokens=Tokens(context=tokens)), record(1, "cup")]).by_length
+    assert means({length: at.cell for length, at in found.items()}) == {name: (1, 1.0)}
+
+
+def test_lengths_have_their_own_scores_above_guessing():
+    guess = Guess(form="f", scores={"strict": 0.5}, form_scores={"strict": 0.5})
+    lengths = (("mug", 500), ("cup", 500), ("mug", 70_000), ("mug", 3000))
+    records = [
+        record(i, reply, tokens=Tokens(context=n), guess=guess)
+        for i, (reply, n) in enumerate(lengths[:3])
+    ]
+    found = task_of([*records, record(3, "mug", tokens=Tokens(context=3000))])
+    assert {name: at.above_guessing["strict"] for name, at in found.by_length.items()} == {
+        "0-1": 0.0,
+        "2-4": None,  # its guess is not known
+        "64-128": 1.0,
+    }
+    assert list(found.by_length) == ["0-1", "2-4", "64-128"]
+    assert found.above_guessing["strict"].mean == pytest.approx(1 / 3)
+    assert found.above_guessing["strict"].n_unknown == 1
+
+
+@pytest.mark.parametrize("names", [DISTANCES, LENGTHS])
+def test_bins_follow_each_other_without_a_gap(names):
+    ends = [tuple(map(int, name.split("-"))) for name in names[:-1]]
+    step = (
+        1 if names is DISTANCES else 0
+    )  # the last frame of a bin is in its name, the last token is not
+    assert all(before[1] + step == after[0] for before, after in pairwise(ends))
+    assert (ends[0][0], names[-1]) == (0, f">={ends[-1][1] + step}")

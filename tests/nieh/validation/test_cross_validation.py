@@ -1,0 +1,43 @@
+"""The filter of cross-validation, against the scores in the published question files."""
+
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.formats.qa_csv import read_questions
+from infthor_eval.nieh.validation.cross_validation import JudgedQuestion, Verdicts, judge_scores
+
+SETS = Path(__file__).parents[4] / "shared" / "data" / "published_sets"
+
+
+def filtered(file: str, *, partial_credit: bool) -> Verdicts:
+    path = SETS / file
+    if not path.exists():
+        pytest.skip("the published question files are not at ../shared/data/published_sets")
+    verdicts = Verdicts()
+    for question in read_questions(path):
+        right = judge_scores(dict(question.published.matches), partial_credit=partial_credit)
+        verdicts.add(JudgedQuestion(question, {}, right))
+    return verdicts
+
+
+@pytest.mark.parametrize(("partial_credit", "kept"), [(True, 829), (False, 809)])
+def test_the_published_filter_keeps_every_published_question_with_one_clue(partial_credit, kept):
+    verdicts = filtered("qa_set_nieh_single_clue.csv", partial_credit=partial_credit)
+    assert len(verdicts.kept) == kept
+
+
+def test_of_those_with_several_clues_people_kept_four_that_no_model_answers():
+    verdicts = filtered("qa_set_nsieh_multi_clue.csv", partial_credit=True)
+    assert (len(verdicts.kept), len(verdicts.to_inspect), len(verdicts.rejected)) == (470, 4, 0)
+    kept = Verdicts()
+    for item in (*verdicts.kept, *verdicts.to_inspect):
+        kept.add(JudgedQuestion(item.question, {}, item.right, "keep"))
+    assert len(kept.kept) == 474
+    assert len(filtered("qa_set_nsieh_multi_clue.csv", partial_credit=False).kept) == 465
+
+
+def test_by_hand_a_part_of_the_marks_is_an_answer_where_that_is_asked_for():
+    scores = {"all": 1.0, "half": 0.5, "none": 0.0}
+    assert judge_scores(scores, partial_credit=False) == ("all",)
+    assert judge_scores(scores, partial_credit=True) == ("all", "half")

@@ -1,0 +1,98 @@
+"""Plans as the published chat scripts ask for them, against what their functions gave."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from infthor_eval.formats.frames import FrameRef
+from infthor_eval.plans.history.forms import history_named
+from infthor_eval.plans.history.past import Past
+from infthor_eval.plans.history.recalled import MemoryChoice
+from infthor_eval.plans.history.segments import PlanSegment
+from infthor_eval.plans.published.chat_forms import chat_form
+from infthor_eval.plans.published.final_protocol import present_parts
+from infthor_eval.runs import execute
+
+from ..cut import FORK, cut, write
+from ..scripting import ScriptedModel
+
+GOLDEN = json.loads((Path(__file__).parents[2] / "goldens" / "chat_prompts.json").read_text())
+OF_PLANS = [item for item in GOLDEN if "plans" in item]
+
+
+def frame(name):
+    return FrameRef(Path(f"{name}.png"))
+
+
+def text_of(parts):
+    return "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
+
+
+def frames_of(parts):
+    return [part.path.stem for part in parts if isinstance(part, FrameRef)]
+
+
+def form_named(name):
+    return chat_form(history_named(name, MemoryChoice()))
+
+
+@pytest.mark.parametrize("item", OF_PLANS, ids=lambda item: str(len(item["plans"])))
+def test_the_plans_before_are_told_as_published(item):
+    *before, present = [
+        PlanSegment(plan, None, frame("first"), (("Act", frame("mid")),)) for plan in item["plans"]
+    ]
+    outside = PlanSegment(
+        "put what is held away", None, frame("first"), (("Act", frame("mid")),), in_task=False
+    )
+    form = form_named("plans")
+    past = Past([*before, outside], present)
+    parts = [*form.history.recall(past, lambda _: None), *present_parts(frame("last"))]
+    assert [["system", form.system], ["user", text_of(parts)]] == item["messages"]
+    assert frames_of(parts) == item["frames"][-1:]
+
+
+def test_goals_and_actions_are_told_as_published():
+    (item,) = [item for item in GOLDEN if item["script"] == "run_interactive_eval_qwen.py"]
+    go = [(action, frame(action)) for action in ("MoveAhead", "RotateLeft")]
+    pick = [(action, frame(action)) for action in ("PickupObject Fork",)]
+    goal, next_goal = "put a fork in the drawer", "put a mug in the sink"
+    segments = [
+        PlanSegment("go", goal, frame("scene"), tuple(go)),
+        PlanSegment("pick", None, frame("x"), tuple(pick)),
+    ]
+    form = form_named("goals")
+    given = form.history.recall(
+        Past(segments, PlanSegment("go", next_goal, frame("y"))), lambda _: None
+    )
+    parts = [*given, "<|act|>"]  # where an agent that is not asked anew goes on
+    assert [["system", form.system], ["user", text_of(parts)]] == item["messages"]
+    assert frames_of(parts) == item["frames"]
+
+
+def test_other_histories_are_no_chat():
+    assert form_named("full") is None
+
+
+@pytest.mark.usefixtures("shared_simulator")
+def test_every_plan_is_asked_from_the_true_state(prepared, monkeypatch, tmp_path):
+    model = ScriptedModel(lambda *_: "fly")
+    monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
+    data = write(tmp_path / "trajectories", cut(FORK))
+    outcome = execute(
+        prepared("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="plans")
+    )
+    assert [record.payload.ended for record in outcome.records] == ["no action"] * 4
+    told = [text_of(parts) for parts, _ in model.asked]
+    plans = [record.payload.plan for record in outcome.records]
+    expected = ["No history is available.", *("; ".join(plans[:n]) + ";" for n in (1, 2, 3))]
+    assert told == [
+        f"Action history: {said}\nCurrent state: <image> Next action: " for said in expected
+    ]
+    assert {(decoding.max_new_tokens, decoding.stop) for _, decoding in model.asked} == {(32, ())}
+    outcome = execute(
+        prepared("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="goals")
+    )
+    assert text_of(model.asked[-1][0]).endswith("<image><|act|>")
+    assert (model.asked[-1][1].max_new_tokens, model.asked[-1][1].stop) == (32, ("<|act|>",))
+    assert "<|plan|>" not in text_of(model.asked[-1][0])

@@ -1,0 +1,452 @@
+"""The driver, by the smallest suite: whatever it can do, it can do for every suite."""
+
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from queue import SimpleQueue
+
+import msgspec
+import pytest
+
+from infthor_eval.errors import DataError, ModelError, UsageError
+from infthor_eval.runs import (
+    Group,
+    RunRequest,
+    Unit,
+    UnitKey,
+    execute,
+    prepare,
+    read_header,
+    read_run,
+)
+from infthor_eval.runs.journals.tracebacks import StoredTracebacks
+from infthor_eval.runs.work.scheduling import run_groups
+from infthor_eval.workers import WorkerSettings
+from model_adapters import Capabilities
+from tests.runs.toy import Adder, Sum, Sums, ToySuite, is_broken, suite_of
+from tests.runs.toy_command import request
+
+from ...waiting import PATIENCE_S, wait_until
+
+TOY = Path(__file__).with_name("toy_command.py")
+
+
+class Watching:
+    def __init__(self):
+        self.begun, self.seen = None, []
+
+    def begin(self, work, n_recovered):
+        self.begun = (work.n_units, len(work.skipped), n_recovered)
+
+    def done(self, record, resumed):
+        self.seen.append((record.id, record.failure, resumed))
+
+    def note(self, text):
+        raise AssertionError(text)
+
+
+def run(asked: RunRequest, suite=None):
+    watching = Watching()
+    return execute(prepare(asked, suite or ToySuite()), watching), watching
+
+
+def start(output, *arguments):
+    return subprocess.Popen(
+        [sys.executable, TOY, output, *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
+    )
+
+
+def test_a_group_that_fails_takes_no_other_with_it_and_its_units_are_named(tmp_path):
+    closed = []
+
+    class Closing(Sums):
+        def close(self):
+            closed.append(self)
+
+    outcome, watching = run(request(tmp_path), suite_of(Closing))
+    assert watching.begun == (4, 1, 0)
+    broken = "the abacus is broken"
+    assert watching.seen == [
+        ("1+3", None, False),
+        ("1+4", None, False),
+        ("2+3", broken, False),
+        ("2+4", broken, False),
+    ]
+    assert outcome.summary.summary.numbers == (2, 2)
+    assert [record.payload.answer for record in outcome.records] == [4, 5, None, None]
+    assert read_run(outcome.folder, ToySuite.records) == (outcome.summary.header, outcome.records)
+    assert len(closed) == 1
+    assert [sample.reply for sample in outcome.samples] == ["4", "5", "None", "None"]
+    assert [sample.number for sample in outcome.samples] == [
+        13,
+        14,
+        23,
+        24,
+    ]  # they can be read again
+
+
+def broken_by(error, answered=0):
+    """A suite whose second group raises when it has answered so many units."""
+
+    class Broken(Sums):
+        def run(self, group, session):
+            if not is_broken(group):
+                yield from super().run(group, session)
+                return
+            for unit in group.units[:answered]:
+                yield unit.record("f", Sum(unit.payload.numbers, sum(unit.payload.numbers)))
+            if error is not None:
+                raise error
+
+    return suite_of(Broken)
+
+
+FAULTS = {
+    "a value": (
+        ValueError("no such\nsum"),
+        "ValueError in test_driver.py:",
+        ": no such sum; fix the suite",
+    ),
+    "a key": (KeyError("sum"), "KeyError in test_driver.py:", ": no 'sum'; fix the suite"),
+    "a bug": (RuntimeError(), "RuntimeError in test_driver.py:", ": RuntimeError; fix the suite"),
+    "of the system": (
+        OSError(5, "Input/output error"),
+        "OSError in test_driver.py:",
+        ": Input/output error; fix",
+    ),
+    "an assertion": (
+        AssertionError("odd"),
+        "AssertionError in test_driver.py:",
+        "(run): odd; fix the suite",
+    ),
+    "no record": (None, "the suite gives no record of it", "; fix the suite"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("answered", [0, 1])
+def test_a_programming_error_in_a_group_fails_its_units_alone_with_type_place_and_message(
+    tmp_path, name, answered
+):
+    error, said, why = FAULTS[name]
+    outcome, watching = run(request(tmp_path), broken_by(error, answered))
+    assert outcome.summary.summary.numbers == (2 + answered, 2 - answered)
+    assert len(watching.seen) == 4
+    for failure in (record.failure for record in outcome.records[2 + answered :]):
+        assert said in failure
+        assert why in failure
+        assert "\n" not in failure
+    assert [resumed for _, _, resumed in run(request(tmp_path))[1].seen[:2]] == [True, True]
+
+
+def test_tracebacks_are_kept_beside_the_shards_by_unit_and_attempt(tmp_path):
+    first = run(request(tmp_path), broken_by(ZeroDivisionError("of its own")))[0]
+    failures = [record.failure for record in first.records[2:]]
+    assert [failure.endswith("; traceback in journal/tracebacks.txt") for failure in failures] == [
+        True,
+        True,
+    ]
+    file = first.folder / "journal" / "tracebacks.txt"
+    once, again = file.read_text().split("== sums: ")[1:]
+    assert once.startswith("2+3, attempt 1\nTraceback (most recent call last):\n")
+    assert f'File "{__file__}", line ' in once
+    assert "ZeroDivisionError: of its own" in once
+    assert again == "2+4, attempt 1\nas for sums: 2+3, attempt 1\n\n"
+    run(request(tmp_path), broken_by(ZeroDivisionError("of its own")))
+    assert file.read_text().count("== sums: 2+3, attempt ") == 2
+    assert "== sums: 2+4, attempt 2\nas for sums: 2+3, attempt 2\n" in file.read_text()
+    stored = StoredTracebacks(first.folder / "journal")
+    told = [
+        stored.find(UnitKey("sums", name), attempt) for name in ("2+3", "2+4") for attempt in (1, 2)
+    ]
+    assert all(text.endswith("ZeroDivisionError: of its own") for text in told)
+    assert told[:2] == told[2:]
+    assert stored.find(UnitKey("sums", "1+3"), 1) == ""
+    assert StoredTracebacks(tmp_path).find(UnitKey("sums", "2+3"), 1) == ""
+
+
+def test_what_a_suite_says_itself_needs_no_traceback(tmp_path):
+    outcome, _ = run(request(tmp_path))
+    assert {record.failure for record in outcome.records[2:]} == {"the abacus is broken"}
+    assert not (outcome.folder / "journal" / "tracebacks.txt").exists()
+
+
+def test_a_record_that_cannot_be_written_fails_alone(tmp_path):
+    class Odd(Sums):
+        def run(self, group, session):
+            for unit in group.units:
+                yield unit.record("f", Sum((object(), 0)) if is_broken(group) else unit.payload)
+
+    outcome, _ = run(request(tmp_path), suite_of(Odd))
+    assert outcome.summary.summary.numbers == (2, 2)
+    assert outcome.records[3].failure.startswith("TypeError in ")
+    assert "Encoding objects of type object is unsupported" in outcome.records[3].failure
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit, MemoryError])
+def test_what_is_no_fault_of_the_suite_ends_the_run_and_keeps_what_is_done(tmp_path, error):
+    with pytest.raises(error):
+        run(request(tmp_path), broken_by(error()))
+    # Who stops it has the results of what is there; a machine without memory is asked for nothing more.
+    (folder,) = (tmp_path / "adder").iterdir()
+    results = folder / "results.json"
+    assert (json.loads(results.read_text())["n_missing"] if results.exists() else None) == (
+        None if error is MemoryError else 2
+    )
+    assert [resumed for _, _, resumed in run(request(tmp_path))[1].seen[:2]] == [True, True]
+
+
+def test_a_programming_error_is_counted_and_told_at_the_end(tmp_path, capfd):
+    from infthor_eval.cli.commands.run import evaluate
+    from infthor_eval.cli.options.show import ShowOptions
+
+    assert (
+        evaluate([(request(tmp_path), broken_by(ZeroDivisionError("of its own")))], ShowOptions())
+        == 1
+    )
+    shown, said = capfd.readouterr()
+    assert ["adder", "2"] in [line.split() for line in shown.splitlines()]
+    assert (
+        "sums: 2 sample(s) failed, counted as wrong: ZeroDivisionError in test_driver.py:" in said
+    )
+    assert "Traceback" not in said
+
+
+def test_what_is_known_is_not_done_again_and_what_failed_is_tried_again(tmp_path):
+    run(request(tmp_path))
+    outcome, watching = run(request(tmp_path))
+    assert [resumed for _, _, resumed in watching.seen] == [True, True, False, False]
+    assert [record.attempt for record in outcome.records] == [1, 1, 2, 2]
+
+
+def test_the_folder_has_the_command_and_the_results(tmp_path):
+    outcome, _ = run(request(tmp_path))
+    assert {"run.yaml", "results.json", "scores.jsonl", "usage.json"} <= {
+        path.name for path in outcome.folder.iterdir()
+    }
+
+
+@pytest.mark.timeout(600)
+def test_two_workers_have_the_results_of_one_process(tmp_path):
+    alone, _ = run(request(tmp_path / "alone"))
+    shared = execute(
+        prepare(request(tmp_path / "shared", worker_settings=WorkerSettings(2)), ToySuite())
+    )
+    assert (shared.folder / "results.json").read_bytes() == (
+        alone.folder / "results.json"
+    ).read_bytes()
+    shards = {
+        path.stem: path.read_bytes() for path in (shared.folder / "journal").glob("worker-*.jsonl")
+    }
+    # One worker may be so quick that there is nothing left for the other; the driver (0) does no unit itself.
+    assert {"worker-0"} < shards.keys() <= {"worker-0", "worker-1", "worker-2"}
+    assert b'"type":"unit"' not in shards["worker-0"]
+
+
+def test_a_shard_that_is_deleted_after_the_last_unit_gives_no_results(tmp_path, monkeypatch):
+    class Deleting(Watching):
+        def done(self, record, resumed):
+            super().done(record, resumed)
+            if len(self.seen) == self.begun[0]:
+                next((tmp_path / "adder").glob("*/journal/*.jsonl")).unlink()
+
+    with pytest.raises(DataError, match="was deleted or replaced"):
+        execute(prepare(request(tmp_path), ToySuite()), Deleting())
+    assert not list((tmp_path / "adder").glob("*/results.json"))
+
+
+def test_a_clock_that_goes_back_changes_nothing(tmp_path, monkeypatch):
+    back = itertools.count(2_000_000_000, -3600)
+    monkeypatch.setattr(time, "time", lambda: float(next(back)))
+    monkeypatch.setattr(time, "time_ns", lambda: next(back) * 10**9)
+    first, again = run(request(tmp_path))[0], run(request(tmp_path))[0]
+    assert [record.attempt for record in again.records] == [1, 1, 2, 2]
+    assert first.records[:2] == again.records[:2]
+    assert all(record.seconds >= 0 for record in again.records)
+
+
+def test_fresh_starts_anew_and_keeps_the_earlier_journal_aside(tmp_path):
+    first, _ = run(request(tmp_path))
+    _, watching = run(request(tmp_path, fresh=True))
+    assert not any(resumed for _, _, resumed in watching.seen)
+    assert (first.folder / "journal.1" / "worker-0.jsonl").is_file()
+
+
+def test_bad_lines_are_set_aside_and_only_their_units_are_tried_again(tmp_path):
+    outcome, _ = run(request(tmp_path))
+    shard = outcome.folder / "journal" / "worker-0.jsonl"
+    lines = shard.read_bytes().splitlines()
+    lines[1] = lines[1][:30] + b"\x00" + lines[1][31:]
+    shard.write_bytes(b"\n".join(lines) + b"\n")
+    with pytest.raises(
+        Exception, match=r"worker-0.jsonl, line 2: not a line of a journal .* --recover"
+    ):
+        run(request(tmp_path))
+    _, watching = run(request(tmp_path, recover=True))
+    assert watching.begun == (4, 1, 1)
+    assert [resumed for _, _, resumed in watching.seen] == [False, True, False, False]
+    assert (shard.parent / "bad_lines.txt").read_bytes() == lines[1] + b"\n"
+
+
+def test_the_name_is_the_runs_own_and_changes_no_identity(tmp_path):
+    plain, named = run(request(tmp_path))[0], run(request(tmp_path, name="my adder"))[0]
+    assert (plain.folder.parent.name, named.folder.parent.name) == ("adder", "my adder")
+    assert plain.folder.name == named.folder.name
+    assert read_header(named.folder).name == "my adder"
+
+
+def test_records_of_units_that_the_run_does_not_ask_are_not_counted(tmp_path):
+    outcome, _ = run(request(tmp_path))
+    shard = outcome.folder / "journal" / "worker-0.jsonl"
+    stray = msgspec.structs.replace(outcome.records[0], id="9+9")
+    shard.write_bytes(shard.read_bytes() + msgspec.json.encode(stray) + b"\n")
+    assert run(request(tmp_path))[0].summary.summary.numbers == (2, 2)
+
+
+def test_a_killed_command_goes_on_and_shows_progress_table_results_and_export(tmp_path):
+    gate = tmp_path / "gate"
+    gate.mkdir()
+    (gate / "open-0").touch()
+    killed = start(tmp_path, gate)
+    wait_until((gate / "waiting-1").exists, killed)
+    os.kill(killed.pid, signal.SIGKILL)
+    killed.communicate()
+    again = start(tmp_path)
+    shown, said = again.communicate(timeout=PATIENCE_S)
+    assert again.returncode == 1, said  # a group failed
+    assert "adder: 3 evaluated now, 1 resumed from the journal" in said
+    assert "sums: 1 sample(s) skipped: nothing to add" in said
+    assert "sums: 2 sample(s) failed, counted as wrong: the abacus is broken" in said
+    assert ["adder", "2"] in [line.split() for line in shown.splitlines()]
+    (folder,) = (tmp_path / "adder").iterdir()
+    results = json.loads((folder / "results.json").read_text())
+    assert (results["suite"], results["summary"]["numbers"]) == ("toy", [2, 2])
+    (samples,) = folder.glob("lm_eval/adder/samples_sums_*.jsonl")
+    rows = [json.loads(line) for line in samples.read_text().splitlines()]
+    assert [(row["target"], row["right"]) for row in rows] == [
+        ("4", 1.0),
+        ("5", 1.0),
+        ("5", 0.0),
+        ("6", 0.0),
+    ]
+
+
+def test_a_subject_that_cannot_do_what_the_suite_needs_is_refused(tmp_path, monkeypatch):
+    class Policy(Adder):
+        def act(self, frame, instruction):
+            raise AssertionError
+
+        def reset(self):
+            raise AssertionError
+
+    monkeypatch.setattr("infthor_eval.runs.request.is_known", lambda name: name == "arm")
+    monkeypatch.setattr("infthor_eval.runs.request.check_options", lambda *_: None)
+    monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: Policy())
+    with pytest.raises(
+        UsageError,
+        match="arm cannot be evaluated on toy, which needs a model that answers in words",
+    ):
+        run(request(tmp_path, model="arm"))
+
+
+def test_unknown_names_and_options_are_refused_before_anything_is_done(tmp_path):
+    with pytest.raises(UsageError, match="did you mean 'adder'"):
+        prepare(request(tmp_path, model="ader"), ToySuite())
+    with pytest.raises(UsageError, match="adder has no option a"):
+        prepare(request(tmp_path, model_options={"a": "1"}), ToySuite())
+
+
+# -- several at a time
+
+
+def groups(n):
+    return [
+        Group([Unit(UnitKey("t", f"{g}.{u}"), "c", Sum((g, u))) for u in range(3)])
+        for g in range(n)
+    ]
+
+
+def test_groups_in_flight_are_done_at_the_same_time_and_each_in_its_order():
+    running, most = [], []
+
+    def do(group):
+        running.append(group)
+        most.append(len(running))
+        for unit in group.units:
+            time.sleep(0.02)
+            yield unit.record("f", unit.payload)
+        running.remove(group)
+
+    records = list(run_groups(groups(6), do, 3))
+    assert 1 < max(most) <= 3
+    assert sorted(record.id for record in records) == sorted(
+        u.key.id for g in groups(6) for u in g.units
+    )
+    for number in range(6):
+        assert [r.id for r in records if r.id.startswith(f"{number}.")] == [
+            f"{number}.{u}" for u in range(3)
+        ]
+
+
+def test_a_thread_that_finds_the_last_group_taken_ends(monkeypatch):
+    class Slow(SimpleQueue):
+        def empty(self):
+            found = super().empty()
+            time.sleep(0.02)
+            return found
+
+    monkeypatch.setattr("infthor_eval.runs.work.scheduling.SimpleQueue", Slow)
+    records = list(
+        run_groups(
+            groups(3), lambda group: (unit.record("f", unit.payload) for unit in group.units), 2
+        )
+    )
+    assert len(records) == 9
+
+
+def test_an_error_in_a_thread_ends_the_run_with_that_error():
+    def do(group):
+        yield group.units[0].record("f", group.units[0].payload)
+        raise ZeroDivisionError("a bug")
+
+    with pytest.raises(ZeroDivisionError, match="a bug"):
+        list(run_groups(groups(5), do, 2))
+
+
+def test_a_subject_with_several_in_flight_gives_the_same_records(tmp_path):
+    class Wide(Adder):
+        capabilities = Capabilities(counts_tokens=False, token_ids=False, max_in_flight=2)
+
+    class WideSuite(ToySuite):
+        baselines = {"adder": Wide}  # noqa: RUF012
+
+    one, two = run(request(tmp_path / "1"))[0], run(request(tmp_path / "2"), WideSuite())[0]
+    assert one.records == two.records
+
+
+def test_a_suite_that_refuses_its_work_ends_before_a_journal_is_begun(tmp_path):
+    def refuse():
+        raise ModelError("no")
+
+    closed = []
+
+    class Held(Adder):
+        def __init__(self, seed):
+            super().__init__(seed)
+            self.close = lambda: closed.append(self)
+
+    suite = suite_of(refuse)
+    suite.baselines = {"adder": Held}
+    with pytest.raises(ModelError, match="no"):
+        run(request(tmp_path), suite)
+    assert len(closed) == 1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,73 @@
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+
+import pytest
+
+from infthor_eval.storage import scratch
+from infthor_eval.storage.scratch import ScratchFolder
+
+_HOLD = "import time\nfrom infthor_eval.storage.scratch import ScratchFolder\nfolder = ScratchFolder()\n{}\n"
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    scratch._remove_abandoned.cache_clear()
+    return tmp_path
+
+
+def _other_process(place):
+    code = _HOLD.format("print(folder.path, flush=True); time.sleep(60)")
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=os.environ | {"TMPDIR": str(place)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith(str(place))
+    return process
+
+
+def test_it_is_empty_and_goes_with_the_context(place):
+    with ScratchFolder() as folder:
+        assert list(folder.iterdir()) == []
+        (folder / "a").write_text("a")
+    assert list(place.iterdir()) == []
+
+
+def test_cleaning_up_twice_is_safe(place):
+    folder = ScratchFolder()
+    folder.cleanup()
+    folder.cleanup()
+    assert list(place.iterdir()) == []
+
+
+def test_what_a_killed_process_left_is_removed(place):
+    process = _other_process(place)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert len(list(place.iterdir())) == 1
+    with ScratchFolder():
+        assert len(list(place.iterdir())) == 1
+    assert list(place.iterdir()) == []
+
+
+def test_what_a_living_process_uses_stays(place):
+    process = _other_process(place)
+    try:
+        with ScratchFolder():
+            assert len(list(place.iterdir())) == 2
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_folders_of_others_stay(place):
+    (place / "infthor-results").mkdir()
+    with ScratchFolder():
+        pass
+    assert [path.name for path in place.iterdir()] == ["infthor-results"]
