@@ -1,9 +1,12 @@
-"""Check that our plans are optimal: compare their length with the cost that Fast Downward finds for our PDDL.
+"""Check that our plans are optimal: compare their length with the cost that Fast Downward finds for
+our PDDL.
 
-python benchmarks/against_fast_downward.py --fast-downward PATH/fast-downward.py [--problems 60] [--seed 0]
+python benchmarks/against_fast_downward.py --fast-downward PATH/fast-downward.py [--problems 60]
+[--seed 0]
 
-Fast Downward is not a dependency: `pip install up-fast-downward` in a separate environment has the script
-(`up_fast_downward/downward/fast-downward.py`). It searches with A* and the LM-cut heuristic, which is optimal.
+Fast Downward is not a dependency: `pip install up-fast-downward` in a separate environment has the
+script (`up_fast_downward/downward/fast-downward.py`). It searches with A* and the LM-cut heuristic,
+which is optimal.
 """
 
 import argparse

@@ -1,8 +1,10 @@
-"""Compare our runner with lm-eval's `hf-multimodal` on the same task, checkpoint, frames and questions.
+"""Compare our runner with lm-eval's `hf-multimodal` on the same task, checkpoint, frames and
+questions.
 
-The task is `nieh_full` on one trajectory, with a tiny Qwen2.5-VL checkpoint. Both are timed as whole processes, from
-start to results. Both also run on a single frame and question, which measures the start-up; the second factor is
-without it. lm-eval's model needs torchvision's Python half, so run `make test` once before.
+The task is `nieh_full` on one trajectory, with a tiny Qwen2.5-VL checkpoint. Both are timed as
+whole processes, from start to results. Both also run on a single frame and question, which measures
+the start-up; the second factor is without it. lm-eval's model needs torchvision's Python half, so
+run `make test` once before.
 
     python benchmarks/against_lm_eval.py [--frames 120] [--questions 24]
 """
@@ -33,7 +35,8 @@ def main() -> None:
     options = parser.parse_args()
     if not PEERS.is_dir():
         sys.exit(
-            f"{PEERS}: no torchvision, which lm-eval's model needs; run `make test` once, which puts it there"
+            f"{PEERS}: no torchvision, which lm-eval's model needs; run `make test` once, which "
+            "puts it there"
         )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -1,16 +1,18 @@
 """Measure the cost of an action of a model agent, and its growth with the history.
 
-The agent's conversation (goals, plans, actions and frames, as in training) gets a history of a given length. Then the
-agent acts: it replies with some tokens, the true action and the frame after it are appended, and so on. All ways use
-the same checkpoint (qwen2.5-vl-tiny, prompt=plain), the same frames (all different) and greedy decoding:
+The agent's conversation (goals, plans, actions and frames, as in training) gets a history of a
+given length. Then the agent acts: it replies with some tokens, the true action and the frame after
+it are appended, and so on. All ways use the same checkpoint (qwen2.5-vl-tiny, prompt=plain), the
+same frames (all different) and greedy decoding:
   ours        one conversation, in which each frame and action is encoded once;
   per action  share_prefix=false: the whole history is encoded again for each action;
-  per token   the whole history is encoded again for each token of an action, as in the published loop.
+  per token   the whole history is encoded again for each token of an action, as in the
+              published loop.
 
     python benchmarks/agent_actions.py [--steps 10 50 100 200] [--tokens 6]
 
-The first table has the median seconds per action, in wall time and (in brackets) in processor time, which other work on
-the machine changes less. The second table has the parts of our processor time.
+The first table has the median seconds per action, in wall time and (in brackets) in processor time,
+which other work on the machine changes less. The second table has the parts of our processor time.
 """
 
 import argparse
@@ -64,7 +66,8 @@ class ActionTimes:
 
 
 class OurTimes(NamedTuple):
-    """Times of our way, their parts (processor seconds per action), and the length of the first request."""
+    """Times of our way, their parts (processor seconds per action), and the length of the first
+    request."""
 
     times: ActionTimes
     shares: dict[str, float]
@@ -85,7 +88,8 @@ def main() -> None:
     )  # imports, threads and kernels
     print(f"{options.tokens} tokens an action; seconds, in brackets processor time")
     print(
-        f"{'steps':>6} {'tokens':>8}   {'ours':15} {'per action':17} {'per token':17} {'ratios':>15}   replies equal"
+        f"{'steps':>6} {'tokens':>8}   {'ours':15} {'per action':17} {'per token':17} "
+        f"{'ratios':>15}   replies equal"
     )
     counts = {"per action": options.per_action, "per token": options.per_token}
     rows = []
@@ -114,7 +118,8 @@ def _arguments() -> argparse.Namespace:
 
 
 def read_bundled_steps(n_steps: int) -> tuple[list[Part], list[Step]]:
-    """Return what precedes the first action, and this many steps, of the bundled trajectories in sequence."""
+    """Return what precedes the first action, and this many steps, of the bundled trajectories in
+    sequence."""
     opening: list[Part] = []
     steps: list[Step] = []
     data = NiehSet(packaged_folder("sets/nieh_mini"))
@@ -141,7 +146,8 @@ def start_conversation(
 
 
 def act_in_turn(talk: Any, steps: Sequence[Step], act: Act) -> ActionTimes:
-    """Measure one action after the other; the time of each includes encoding what was appended since the last one."""
+    """Measure one action after the other; the time of each includes encoding what was appended
+    since the last one."""
     times = ActionTimes()
     for action, seen in steps:
         wall, process = time.perf_counter(), time.process_time()
@@ -209,7 +215,8 @@ def measure_slow_ways(
     n_tokens: int,
     counts: Mapping[str, int],
 ) -> dict[str, ActionTimes]:
-    """Measure the first of the same actions, with everything encoded again per action or per token."""
+    """Measure the first of the same actions, with everything encoded again per action or per
+    token."""
     plain = TransformersModel("plain", model._loaded, replace(model._options, share_prefix=False))
     ways: dict[str, Act] = {
         "per action": partial(reply, n_tokens=n_tokens),
@@ -224,7 +231,8 @@ def measure_slow_ways(
 
 @contextmanager
 def measure_parts(model: TransformersModel) -> Iterator[dict[str, float]]:
-    """Measure the processor seconds of the parts of a model's replies, by `_SHARES`, within the context."""
+    """Measure the processor seconds of the parts of a model's replies, by `_SHARES`, within the
+    context."""
     spent: dict[str, float] = defaultdict(float)
     places = {
         "frames": (model._prefix, "_embed"),
@@ -284,7 +292,8 @@ def show_shares(rows: Sequence[tuple[int, OurTimes]]) -> None:
         print(f"  {name}: {about}")
     growth = [last / first for first, last in zip(beside[0], beside[-1], strict=True)]
     print(
-        f"from {rows[0][0]} to {rows[-1][0]} steps: {growth[0]:.2f} times; without the model {growth[1]:.2f} times"
+        f"from {rows[0][0]} to {rows[-1][0]} steps: {growth[0]:.2f} times; without the model "
+        f"{growth[1]:.2f} times"
     )
 
 

@@ -1,9 +1,10 @@
-"""Measure the speed of an arm through the real Controller, of several simulators together, and of tiny policies.
+"""Measure the speed of an arm through the real Controller, of several simulators together, and of
+tiny policies.
 
     python benchmarks/arm_speed.py [--steps 200] [--simulators 4]
 
-An arm moves to and fro in a kitchen, with and without frames. Then several simulators do so at the same time, each in a
-thread. Each tiny policy acts on such a frame.
+An arm moves to and fro in a kitchen, with and without frames. Then several simulators do so at the
+same time, each in a thread. Each tiny policy acts on such a frame.
 """
 
 import argparse
@@ -35,7 +36,8 @@ def main() -> None:
             print(f"arm, {'frames' if image else 'no frames'}: {rate:.0f} steps/s", flush=True)
     together = steps_per_second_together(options.simulators, options.steps)
     print(
-        f"arm, frames, {options.simulators} simulators: {together:.0f} steps/s, {together / single:.2f} times one"
+        f"arm, frames, {options.simulators} simulators: {together:.0f} steps/s, "
+        f"{together / single:.2f} times one"
     )
     with tempfile.TemporaryDirectory() as folder, _simulator(True) as simulator:
         frame = FrameFolder(Path(folder)).keep(simulator.view)
@@ -67,7 +69,8 @@ def _simulator(image: bool) -> Simulator:
 
 
 def steps_per_second(simulator: Simulator, n_steps: int) -> float:
-    """Return the rate of steps of 5 cm to and fro, each with a translation and a wrist rotation like a policy's."""
+    """Return the rate of steps of 5 cm to and fro, each with a translation and a wrist rotation
+    like a policy's."""
     conversion = Conversion()
 
     def step(number: int) -> None:

@@ -1,7 +1,7 @@
 """Draw `docs/contact_sheet.png`: rooms, close-ups of shapes, and held objects.
 
-It has three procedural rooms of each type, each from the view that shows most; then close-ups of shapes that are easily
-confused; then frames in which the agent holds an object.
+It has three procedural rooms of each type, each from the view that shows most; then close-ups of
+shapes that are easily confused; then frames in which the agent holds an object.
 
 python benchmarks/contact_sheet.py [OUT.png]
 """
@@ -30,10 +30,14 @@ _SEEDS = (1, 2, 3)
 _SIZE, _LINE = 300, 16
 _NEAR = 150  # size of a close-up
 _OPEN = {"Box", "Fridge", "Drawer", "Cabinet", "Microwave", "Safe"}
-_SHAPES = ("Bowl", "AppleSliced", "BreadSliced", "TomatoSliced", "PotatoSliced", "LettuceSliced", "BaseballBat",
-           "ButterKnife", "Knife", "Pencil", "Pen", "KeyChain", "Cloth", "Potato", "Pillow", "Bread", "Box", "Fridge",
-           "Drawer", "Cabinet", "SinkBasin", "DiningTable", "SideTable", "CoffeeTable", "Desk", "Apple", "Tomato",
-           "TennisRacket", "AlarmClock", "Watch", "Ladle", "Statue", "CreditCard", "CellPhone", "SaltShaker",
+_SHAPES = ("Bowl", "AppleSliced", "BreadSliced", "TomatoSliced", "PotatoSliced", "LettuceSliced",
+           "BaseballBat",
+           "ButterKnife", "Knife", "Pencil", "Pen", "KeyChain", "Cloth", "Potato", "Pillow",
+           "Bread", "Box", "Fridge",
+           "Drawer", "Cabinet", "SinkBasin", "DiningTable", "SideTable", "CoffeeTable", "Desk",
+           "Apple", "Tomato",
+           "TennisRacket", "AlarmClock", "Watch", "Ladle", "Statue", "CreditCard", "CellPhone",
+           "SaltShaker",
            "PepperShaker", "Microwave", "Safe", "DogBed", "Lettuce")  # fmt: skip
 _HELD = (
     ("kitchen-1", "Pan"),
@@ -55,7 +59,8 @@ def picture(sim: Simulation) -> Image.Image:
 
 
 def interest(sim: Simulation) -> float:
-    """Return how much a view shows: the sum of log pixels, by which several medium objects beat a large one."""
+    """Return how much a view shows: the sum of log pixels, by which several medium objects beat a
+    large one."""
     seen = sim.views.agent_view()
     counts = np.bincount(seen.instances.ravel() + 1, minlength=len(seen.names) + 1)[1:]
     shown = [c for c, name in zip(counts, seen.names, strict=True) if "|" in name and c > 40]
@@ -78,7 +83,8 @@ def best_view(sim: Simulation, name: str) -> Image.Image:
 
 
 def close_up(object_type: str) -> Image.Image:
-    """Return a picture of an object of the usual size on stone, from above and from its front side."""
+    """Return a picture of an object of the usual size on stone, from above and from its front
+    side."""
     item: SimObject = default_object(object_type, np.zeros(3))
     item.state.openness = float(object_type in _OPEN)
     item.hinge = -1

@@ -1,10 +1,11 @@
 """Measure the memory of each process when a sequence is split over 1, 2 and 4 processes.
 
-The work is one training step on a sequence of frames and text: forward and backward pass of a tiny Qwen2.5-VL with more
-and wider layers, with vision tower and embeddings frozen and the loss on all text. "Kept" is the memory between the two
-passes that the gradient needs, without the weights. With recomputed layers it is little more than the input of each
-layer. "Peak" is the maximum growth of the process with recomputed layers (Linux only, VmHWM). Of several processes the
-largest number is printed.
+The work is one training step on a sequence of frames and text: forward and backward pass of a tiny
+Qwen2.5-VL with more and wider layers, with vision tower and embeddings frozen and the loss on all
+text. "Kept" is the memory between the two passes that the gradient needs, without the weights. With
+recomputed layers it is little more than the input of each layer. "Peak" is the maximum growth of
+the process with recomputed layers (Linux only, VmHWM). Of several processes the largest number is
+printed.
 
     python benchmarks/context_parallel.py [--tokens 4096]
 """
@@ -52,7 +53,8 @@ def _wider(ids: Mapping[str, int], vocabulary: int) -> Any:
 
 
 class Wider(Qwen25VLTiny):
-    """A Qwen2.5-VL with 6 layers of width 256, in which keys and values are a small part, as in real models."""
+    """A Qwen2.5-VL with 6 layers of width 256, in which keys and values are a small part, as in
+    real models."""
 
     twin = replace(Qwen25VLTiny.twin, config=_wider)
 
@@ -63,7 +65,8 @@ def main() -> None:
     parser.add_argument("--tokens", type=int, default=4096)
     options = parser.parse_args()
     print(
-        f"{'processes':>9} {'kept MB':>9} {'recomputed':>11} {'peak MB':>9} {'seconds':>8} {'loss':>9}"
+        f"{'processes':>9} {'kept MB':>9} {'recomputed':>11} {'peak MB':>9} {'seconds':>8} "
+        f"{'loss':>9}"
     )
     for n_ranks in (1, 2, 4):
         with tempfile.TemporaryDirectory() as name:
@@ -102,7 +105,8 @@ def measure(rank: int, n_ranks: int, n_tokens: int, folder: Path) -> None:
 
 
 def step(model: SequenceModel, batch: Batch, group: Any) -> tuple[float, float]:
-    """Run a forward and backward pass; returns the MB kept in between, and this process's share of the loss."""
+    """Run a forward and backward pass; returns the MB kept in between, and this process's share of
+    the loss."""
     weights = {one.untyped_storage().data_ptr() for one in model.parameters()}
     kept: dict[int, int] = {}
 

@@ -1,10 +1,11 @@
 """Measure the memory of a run beside its model, for a trajectory of thousands of frames.
 
-It is a whole run in one process: an NIEH set of noise frames, `nieh_full`, the journal, and the back end with a
-Qwen2.5-VL that has a vision tower but no language layer. Every frame is decoded, cut into patches and embedded, and
-every prompt is tokenised, as for a real model. Attention, keys and values, which depend on the model, cost nothing. A
-run on three frames comes first. The memory after it, with everything imported and a model loaded and used, is
-subtracted from the peak of the second run. Linux only (VmHWM).
+It is a whole run in one process: an NIEH set of noise frames, `nieh_full`, the journal, and the
+back end with a Qwen2.5-VL that has a vision tower but no language layer. Every frame is decoded,
+cut into patches and embedded, and every prompt is tokenised, as for a real model. Attention, keys
+and values, which depend on the model, cost nothing. A run on three frames comes first. The memory
+after it, with everything imported and a model loaded and used, is subtracted from the peak of the
+second run. Linux only (VmHWM).
 
     python benchmarks/data_path_memory.py [--frames 2300] [--questions 24]
 """
@@ -50,7 +51,8 @@ def main() -> None:
         seconds = time.perf_counter() - start
         peak = megabytes("VmHWM")
     print(
-        f"{options.frames} frames, {options.questions} questions of {records[0].tokens.context:,} tokens, nieh_full"
+        f"{options.frames} frames, {options.questions} questions of {records[0].tokens.context:,} "
+        "tokens, nieh_full"
     )
     print(f"run             {seconds:8.1f} s")
     print(f"process before  {before:8.0f} MB")

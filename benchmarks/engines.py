@@ -1,8 +1,10 @@
-"""Race of the engines: the same questions on the same checkpoint, in transformers (ours) and vLLM, and in lm-eval.
+"""Race of the engines: the same questions on the same checkpoint, in transformers (ours) and vLLM,
+and in lm-eval.
 
-The checkpoint is a Qwen2.5-VL of 107 million random weights. The sets are `nieh_mini_full` (147 questions on 6
-trajectories) and a long trajectory of noise. Every way is run as a whole process on one question, and on more; their
-difference, by question, is what a further question takes. Processor time includes a server's and all threads'.
+The checkpoint is a Qwen2.5-VL of 107 million random weights. The sets are `nieh_mini_full` (147
+questions on 6 trajectories) and a long trajectory of noise. Every way is run as a whole process on
+one question, and on more; their difference, by question, is what a further question takes.
+Processor time includes a server's and all threads'.
 
     make test-vllm                                  # once: the environment with vLLM
     .venv-vllm/bin/python benchmarks/engines.py --sets mini long --dtypes float32 --threads 1
@@ -68,7 +70,8 @@ class Race:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a process took: seconds by the clock, processor seconds, and each question's reply and tokens."""
+    """What a process took: seconds by the clock, processor seconds, and each question's reply and
+    tokens."""
 
     wall: float
     processor: float
@@ -130,9 +133,13 @@ def _config(ids: Mapping[str, int], vocab_size: int) -> Any:
 def run_race(race: Race, folder: Path, options: argparse.Namespace) -> None:
     """Run every way on one question and on more, and print what they took."""
     print(
-        f"\n{race.task}, {race.dtype}, {race.threads} thread(s); processor seconds (seconds by the clock)"
+        f"\n{race.task}, {race.dtype}, {race.threads} thread(s); processor seconds (seconds by the "
+        "clock)"
     )
-    heads = f"{'one question':>18}{'whole run':>20}{'asked':>6}{'each further':>18}{'encoded':>9}{'cached':>8}"
+    heads = (
+        f"{'one question':>18}{'whole run':>20}{'asked':>6}{'each further':>18}"
+        f"{'encoded':>9}{'cached':>8}"
+    )
     print(f"{'':22}{heads}  equal")
     expected: Mapping[str, str] = {}
     for way in sorted(options.ways, key=lambda way: way != REFERENCE):
@@ -157,7 +164,8 @@ def _row(way: str, one: Cost, whole: Cost, expected: Mapping[str, str]) -> str:
         tokens = f"{whole.n_read - whole.n_cached:>9,}{whole.n_cached / whole.n_read:>8.1%}"
     return (
         f"{way:22}{one.processor:9.1f} ({one.wall:6.1f}){whole.processor:11.1f} ({whole.wall:6.1f})"
-        f"{len(whole.replies):6}{each[0]:9.2f} ({each[1]:6.2f}){tokens}  {equal} of {len(whole.replies)}"
+        f"{len(whole.replies):6}{each[0]:9.2f} ({each[1]:6.2f}){tokens}  {equal} of "
+        f"{len(whole.replies)}"
     )
 
 

@@ -1,7 +1,7 @@
 """Seconds, memory and GPUs that requests to a model take.
 
-`published_evaluation.py` sums them up; docs/cost.md has the formulae. Units are tokens, seconds, bytes and FLOP. The
-numbers of a machine are per GPU.
+`published_evaluation.py` sums them up; docs/cost.md has the formulae. Units are tokens, seconds,
+bytes and FLOP. The numbers of a machine are per GPU.
 """
 
 import heapq
@@ -57,9 +57,10 @@ class Shape:
         return 4 * self.layers * self.heads * self.head_size
 
 
-# Tokens per frame are measured with the processors (Qwen2.5-VL: 121 and 2 markers). Limits and shapes are those of the
-# checkpoints' configs, parameters those of Table 4. Vision takes 2 FLOP per parameter of the tower and patch of a frame
-# of 300x300. Reading and scaling a frame is measured on one CPU core, with the processors at the checkpoints' sizes.
+# Tokens per frame are measured with the processors (Qwen2.5-VL: 121 and 2 markers). Limits and
+# shapes are those of the checkpoints' configs, parameters those of Table 4. Vision takes 2 FLOP per
+# parameter of the tower and patch of a frame of 300x300. Reading and scaling a frame is measured on
+# one CPU core, with the processors at the checkpoints' sizes.
 MODELS = (
     Shape(
         name="llava-onevision",
@@ -126,7 +127,8 @@ class Machine:
         gpus_per_node: maximum number of GPUs of one worker.
         attention: sdpa or flash_attention_2, which differ in memory.
         chunk_tokens: tokens encoded in one pass.
-        parallel: layers (device_map: one GPU of a worker computes at a time) or tensor (all compute).
+        parallel: layers (device_map: one GPU of a worker computes at a time) or tensor (all
+            compute).
         tensor_efficiency: share of the speed of several GPUs that tensor parallelism achieves.
         load_seconds: seconds until a worker has loaded its model.
     """
@@ -182,7 +184,8 @@ class Request:
 
 
 def estimate_rates(shape: Shape, machine: Machine) -> Rates:
-    """Estimate rates from what a model computes and reads, if the GPU waits while frames are read."""
+    """Estimate rates from what a model computes and reads, if the GPU waits while frames are
+    read."""
     frame = shape.vision_flop / (machine.tflops * 1e12) + shape.frame_seconds
     return Rates(
         token=2 * shape.parameters / (machine.tflops * 1e12) + frame / shape.frame_tokens,
@@ -193,7 +196,8 @@ def estimate_rates(shape: Shape, machine: Machine) -> Rates:
 
 
 def rates_from_prefill(rates: Rates, short: tuple[int, float], long: tuple[int, float]) -> Rates:
-    """Return rates with encoding rates from two measurements: tokens of a context, and tokens/s on it.
+    """Return rates with encoding rates from two measurements: tokens of a context, and tokens/s on
+    it.
 
     Encoding n tokens takes token * n + pair * n^2 / 2.
 
@@ -209,13 +213,15 @@ def rates_from_prefill(rates: Rates, short: tuple[int, float], long: tuple[int, 
     token = slow_short - pair * n_short / 2
     if token <= 0:
         raise UsageError(
-            f"{short} and {long} leave no time for anything but attention; measure a shorter context"
+            f"{short} and {long} leave no time for anything but attention; measure a shorter "
+            "context"
         )
     return Rates(token, pair, rates.step, rates.cached_token)
 
 
 def seconds(request: Request, rates: Rates, reuse: bool = True) -> float:
-    """Return the seconds of a request on one GPU, encoding only what is not cached, or everything."""
+    """Return the seconds of a request on one GPU, encoding only what is not cached, or
+    everything."""
     cached = request.cached if reuse else 0
     new = request.context - cached
     decoding = request.reply * (rates.step + rates.cached_token * request.context)
@@ -223,22 +229,26 @@ def seconds(request: Request, rates: Rates, reuse: bool = True) -> float:
 
 
 def context_bytes(shape: Shape, machine: Machine) -> float:
-    """Return the bytes per token of context: keys, values, and the temporary memory of attention."""
+    """Return the bytes per token of context: keys, values, and the temporary memory of
+    attention."""
     if machine.attention != "sdpa":
         return shape.kv_bytes
-    # With a mask, SDPA repeats keys and values for every head; the mask itself has 1 byte, and 2 in the kernel.
+    # With a mask, SDPA repeats keys and values for every head; the mask itself has 1 byte, and 2 in
+    # the kernel.
     repeated = 2 * shape.heads * shape.head_size * _BYTES if shape.heads > shape.kv_heads else 0
     return shape.kv_bytes + repeated + 3 * max(machine.chunk_tokens, shape.frame_tokens)
 
 
 def largest_context(shape: Shape, machine: Machine, n_gpus: int) -> int:
-    """Return the maximum context for which this number of GPUs has the memory beside the weights, tokens."""
+    """Return the maximum context for which this number of GPUs has the memory beside the weights,
+    tokens."""
     room = n_gpus * machine.memory * machine.usable - shape.weights
     return max(0, int(room / context_bytes(shape, machine)))
 
 
 def gpus_for(shape: Shape, machine: Machine, context: int) -> int | None:
-    """Return the number of GPUs, a power of two, that a context requires, or None if a node has too few."""
+    """Return the number of GPUs, a power of two, that a context requires, or None if a node has too
+    few."""
     n_gpus = 1
     while n_gpus <= machine.gpus_per_node:
         if context <= largest_context(shape, machine, n_gpus):
@@ -248,7 +258,8 @@ def gpus_for(shape: Shape, machine: Machine, context: int) -> int | None:
 
 
 def makespan(jobs: Sequence[float], n_workers: int) -> float:
-    """Return the seconds until all jobs are done, the longest first, each by the first free worker."""
+    """Return the seconds until all jobs are done, the longest first, each by the first free
+    worker."""
     free = [0.0] * n_workers
     for job in sorted(jobs, reverse=True):
         heapq.heapreplace(free, free[0] + job)

@@ -1,7 +1,8 @@
-"""Measure whether generation is linear: time per step and memory of a short and a long trajectory in one scene.
+"""Measure whether generation is linear: time per step and memory of a short and a long trajectory
+in one scene.
 
-The ratio is that of processor time, of this process and the simulator's together, because other work on the machine
-changes wall time much more.
+The ratio is that of processor time, of this process and the simulator's together, because other
+work on the machine changes wall time much more.
 
 python benchmarks/generation_growth.py [--scene kitchen-1] [--steps 1000 10000] [--seed 1]
 """
@@ -27,8 +28,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     print(
-        f"{'steps':>7} {'sub-goals':>9} {'seconds':>8} {'ms/step':>8} {'CPU ms/step':>12} {'peak MB':>8} "
-        f"{'peak MB, simulator':>19}"
+        f"{'steps':>7} {'sub-goals':>9} {'seconds':>8} {'ms/step':>8} {'CPU ms/step':>12} "
+        f"{'peak MB':>8} {'peak MB, simulator':>19}"
     )
     per_step = []
     for steps in options.steps:
@@ -39,12 +40,13 @@ def main() -> None:
         per_step.append(1000 * (processor_seconds() - before) / n_steps)
         own_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(
-            f"{n_steps:7} {subgoals:9} {seconds:8.1f} {1000 * seconds / n_steps:8.2f} {per_step[-1]:12.2f} "
-            f"{own_mb:8.0f} {simulator_mb:19.0f}",
+            f"{n_steps:7} {subgoals:9} {seconds:8.1f} {1000 * seconds / n_steps:8.2f} "
+            f"{per_step[-1]:12.2f} {own_mb:8.0f} {simulator_mb:19.0f}",
             flush=True,
         )
     print(
-        f"processor time per step, longest over shortest: {per_step[-1] / per_step[0]:.2f} (aim <= 1.3)"
+        f"processor time per step, longest over shortest: {per_step[-1] / per_step[0]:.2f} (aim <= "
+        "1.3)"
     )
 
 
@@ -55,7 +57,8 @@ def processor_seconds() -> float:
 
 
 def generate_one(settings: TrajectorySettings) -> tuple[float, int, int, float]:
-    """Generate a trajectory; returns seconds, low-level actions, sub-goals and the simulator's peak memory (MB)."""
+    """Generate a trajectory; returns seconds, low-level actions, sub-goals and the simulator's peak
+    memory (MB)."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
         with Simulator(embedded_launch()) as simulator:

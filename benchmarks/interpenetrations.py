@@ -1,14 +1,18 @@
-"""Count the things of procedural rooms whose drawings go through one another, as a careful eye sees them.
+"""Count the things of procedural rooms whose drawings go through one another, as a careful eye sees
+them.
 
-    python benchmarks/interpenetrations.py [--rooms 200] [--puts 10] [--against CHECKOUT] [--examples]
+    python benchmarks/interpenetrations.py [--rooms 200] [--puts 10] [--against CHECKOUT]
+    [--examples]
 
-For each room it looks at the drawn solids, and not at the boxes of the metadata, by points within each: at rest, with
-each door, drawer and lid opened in turn, which shows what is inside and moves what opens, and where an agent put
-things. Two objects interpenetrate if a point of one lies deeper than a centimetre (for thin boards: beyond their
-middle) in a solid of the other, or if a solid crosses the wall of a vessel. Counted are pairs of which at least one
-is loose, or has just been opened, or which are not built into one another, and things that go through a wall of the
-room. It prints one JSON object: rooms, pairs by where they are seen, the most frequent pairs of types, and objects
-per room."""
+For each room it looks at the drawn solids, and not at the boxes of the metadata, by points within
+each: at rest, with each door, drawer and lid opened in turn, which shows what is inside and moves
+what opens, and where an agent put things. Two objects interpenetrate if a point of one lies deeper
+than a centimetre (for thin boards: beyond their middle) in a solid of the other, or if a solid
+crosses the wall of a vessel. Counted are pairs of which at least one is loose, or has just been
+opened, or which are not built into one another, and things that go through a wall of the room. It
+prints one JSON object: rooms, pairs by where they are seen, the most frequent pairs of types, and
+objects per room.
+"""
 
 import argparse
 import json
@@ -29,7 +33,8 @@ _EDGE = 0.98  # of a solid's half extents: points on its very surface touch what
 
 
 def unit_points(form: int, bottom: float, top: float) -> np.ndarray:
-    """Return points (n, 3) of a primitive in its own frame, scaled by its half extents; see `render.primitives`."""
+    """Return points (n, 3) of a primitive in its own frame, scaled by its half extents; see
+    `render.primitives`."""
     from infthor_sim.render.primitives import Form
 
     steps = np.linspace(-_EDGE, _EDGE, 7)
@@ -64,7 +69,8 @@ def unit_points(form: int, bottom: float, top: float) -> np.ndarray:
 
 
 class Solid:
-    """One drawn primitive of an object: its points in the world, and how deep points of others lie in it."""
+    """One drawn primitive of an object: its points in the world, and how deep points of others lie
+    in it."""
 
     def __init__(self, row: np.ndarray) -> None:
         from infthor_sim.render.primitives import AXES, BOTTOM, CENTER, FORM, HALF, TOP
@@ -85,9 +91,11 @@ class Solid:
         return self.bottom + (self.top - self.bottom) * (y + 1) / 2
 
     def depth(self, points: np.ndarray) -> float:
-        """Return how many metres deep the deepest of points (n, 3) lies in this solid; at most 0 for none.
+        """Return how many metres deep the deepest of points (n, 3) lies in this solid; at most 0
+        for none.
 
-        For a vessel: how far points lie outside of its wall while others of the same solid are inside.
+        For a vessel: how far points lie outside of its wall while others of the same solid are
+        inside.
         """
         from infthor_sim.render.primitives import Form
 
@@ -137,6 +145,12 @@ def interpenetrate(mine: list[Solid], theirs: list[Solid]) -> float:
     return worst
 
 
+def _type_of(name: str) -> str:
+    """Return the type in an object id; that of a basin stands last, behind its sink's id."""
+    parts = name.split("|")
+    return parts[-1] if name.endswith("Basin") else parts[0]
+
+
 class Room:
     """One world, its objects' drawings kept by the objects' versions."""
 
@@ -152,7 +166,8 @@ class Room:
         return kept[1]
 
     def pairs(self, seen_by: set[str] | None = None) -> Iterator[tuple[str, str, float]]:
-        """Yield pairs of ids that go into each other and how deep; only with one of `seen_by`, if given."""
+        """Yield pairs of ids that go into each other and how deep; only with one of `seen_by`, if
+        given."""
         shown = [
             o
             for o in self.world.objects.values()
@@ -181,7 +196,8 @@ class Room:
 
     @staticmethod
     def _counts(a: Any, b: Any, opened: set[str]) -> bool:
-        """Return whether a pair can be a fault: parts of furniture that are built into each other are none."""
+        """Return whether a pair can be a fault: parts of furniture that are built into each other
+        are none."""
         if any(x.parent == y.object_id and y.type.overhang for x, y in ((a, b), (b, a))):
             return (
                 False  # what hangs over a rail goes around it, and dishes may have things stick out
@@ -218,8 +234,14 @@ class Room:
                 np.max([p.high for p in parts], axis=0),
             )
             middle = (low + high) / 2
-            room = next((r for r in self.world.rooms
-                         if r.x_min <= middle[0] <= r.x_max and r.z_min <= middle[2] <= r.z_max), None)  # fmt: skip
+            room = next(
+                (
+                    r
+                    for r in self.world.rooms
+                    if r.x_min <= middle[0] <= r.x_max and r.z_min <= middle[2] <= r.z_max
+                ),
+                None,
+            )
             if room is None:
                 yield item.object_id, "Wall", 1.0
                 continue
@@ -243,10 +265,12 @@ def open_one(world: Any, item: Any, openness: float) -> None:
 
 
 def faults(world: Any) -> dict[str, set[tuple[str, str]]]:
-    """Return the pairs of objects that go through each other in one room, by where they are seen."""
+    """Return the pairs of objects that go through each other in one room, by where they are
+    seen."""
     room = Room(world)
     found: dict[str, set[tuple[str, str]]] = {
-        "at rest": {(a, b) for a, b, _ in room.pairs()}, "wall": {(a, b) for a, b, _ in room.through_walls()},
+        "at rest": {(a, b) for a, b, _ in room.pairs()},
+        "wall": {(a, b) for a, b, _ in room.through_walls()},
     }  # fmt: skip
     opened: set[tuple[str, str]] = set()
     for item in list(world.objects.values()):
@@ -264,7 +288,8 @@ def faults(world: Any) -> dict[str, set[tuple[str, str]]]:
 
 
 def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[tuple[str, str]]:
-    """Return the pairs that arise when an agent puts loose things into or onto what takes them, one after the other."""
+    """Return the pairs that arise when an agent puts loose things into or onto what takes them, one
+    after the other."""
     from infthor_sim.object_types import allowed_in
     from infthor_sim.player.server import SimulatorServer
     from infthor_sim.scenes.catalogue import Catalogue
@@ -278,7 +303,8 @@ def faults_of_puts(scene: str, n_puts: int, random: np.random.Generator) -> set[
     for _ in range(n_puts):
         loose = [o for o in world.objects.values() if o.type.pickupable]
         item = loose[int(random.integers(len(loose)))]
-        homes = [o for o in world.objects.values() if allowed_in(item.object_type, o.object_type) and o is not item
+        homes = [o for o in world.objects.values() if allowed_in(item.object_type,
+                                                                 o.object_type) and o is not item
                  and o not in world.descendants(item)]  # fmt: skip
         if not homes:
             continue
@@ -319,13 +345,14 @@ def count(n_rooms: int, n_puts: int) -> dict[str, Any]:
         for where, listed in found.items():
             pairs[where] += len(listed)
             for a, b in listed:
-                key = f"{where}: " + " / ".join(sorted(i.split("|")[-1] if i.endswith("Basin") else i.split("|")[0]
-                                                       for i in (a, b)))  # fmt: skip
+                key = f"{where}: " + " / ".join(sorted(_type_of(name) for name in (a, b)))
                 types[key] += 1
                 examples.setdefault(key, f"{kind}-{seed}: {a} and {b}")
     return {
-        "rooms": n_rooms, "objects": n_objects, "pairs": sum(pairs.values()), "by_place": dict(pairs),
-        "rooms_with_a_fault": with_fault, "most_frequent": dict(types.most_common()), "examples": examples,
+        "rooms": n_rooms, "objects": n_objects, "pairs": sum(pairs.values()),
+        "by_place": dict(pairs),
+        "rooms_with_a_fault": with_fault, "most_frequent": dict(types.most_common()),
+        "examples": examples,
     }  # fmt: skip
 
 

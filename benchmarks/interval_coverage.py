@@ -1,10 +1,11 @@
 """Measure how often the clustered 95 % interval covers the true accuracy of simulated data sets.
 
-Each data set has trajectories of different sizes. The accuracy of a trajectory is sampled from a beta distribution, so
-that questions on one trajectory are correlated, and each question is right with this probability.
+Each data set has trajectories of different sizes. The accuracy of a trajectory is sampled from a
+beta distribution, so that questions on one trajectory are correlated, and each question is right
+with this probability.
 
     python benchmarks/interval_coverage.py [--sets 2000] [--trajectories 60] [--accuracy 0.7]
-    python benchmarks/interval_coverage.py --ends      # few trajectories, nearly all questions right
+    python benchmarks/interval_coverage.py --ends     # few trajectories, nearly all questions right
 """
 
 import argparse
@@ -17,7 +18,8 @@ from infthor_eval.statistics import clustered_mean
 def coverage(
     n_sets: int, n_trajectories: int, accuracy: float, spread: float = 6.0, seed: int = 0
 ) -> tuple[float, float]:
-    """Return the shares of data sets whose interval covers the true accuracy: clustered, and as if independent."""
+    """Return the shares of data sets whose interval covers the true accuracy: clustered, and as if
+    independent."""
     random = np.random.default_rng(seed)
     clustered = independent = 0
     for _ in range(n_sets):
@@ -50,7 +52,8 @@ if __name__ == "__main__":
             ]
             shown = ", ".join(f"{100 * share:.1f}" for share in row)
             print(
-                f"{trajectories} trajectories, accuracy 0.9, 0.97, 0.99: {shown} % (aim 93 % at least)"
+                f"{trajectories} trajectories, accuracy 0.9, 0.97, 0.99: {shown} % (aim 93 % at "
+                "least)"
             )
         raise SystemExit
     by_trajectory, by_question = coverage(options.sets, options.trajectories, options.accuracy)

@@ -1,9 +1,11 @@
-"""Are long trajectories made? Generate many, and print how many were made, what was tried, and what a step costs.
+"""Are long trajectories made? Generate many, and print how many were made, what was tried, and what
+a step costs.
 
-python benchmarks/long_trajectories.py [GROUP ...] [--data FOLDER] [--workers 2] [--out FOLDER] [--json]
+python benchmarks/long_trajectories.py [GROUP ...] [--data FOLDER] [--workers 2] [--out FOLDER]
+[--json]
 
-The groups are those of the table in benchmarks/README.md; without any, all are run (two hours of one core). The same
-command with the same --out resumes. Exit code 1 if a trajectory was not made.
+The groups are those of the table in benchmarks/README.md; without any, all are run (two hours of
+one core). The same command with the same --out resumes. Exit code 1 if a trajectory was not made.
 """
 
 import argparse
@@ -108,7 +110,8 @@ def main() -> int:
 
 
 class Row(NamedTuple):
-    """The numbers of one group: trajectories, their steps, what became of the tasks, and the cost of a step."""
+    """The numbers of one group: trajectories, their steps, what became of the tasks, and the cost
+    of a step."""
 
     made: int
     tries: int

@@ -1,12 +1,14 @@
-"""Measure baselines of arms on the pick-ups and puts of long trajectories, by the sphere's radius and by the protocol.
+"""Measure baselines of arms on the pick-ups and puts of long trajectories, by the sphere's radius
+and by the protocol.
 
-    python benchmarks/manipulation.py --trajectories DIR [--data FOLDER] [--episodes 300] [--radii 0.06,0.5]
+    python benchmarks/manipulation.py --trajectories DIR [--data FOLDER] [--episodes 300] [--radii
+    0.06,0.5]
         [--protocols default,stand=before,hand=low] [--out DIR]
 
-It takes trajectories evenly spaced in DIR until they have enough pick-ups and puts. It runs planner-arm, still and
-random-arm on them with the command line, for each radius and each protocol: options of `infthor-eval` with their
-values, joined by +. It prints what stopped planner-arm in episodes without success. The same command with the same
---out resumes.
+It takes trajectories evenly spaced in DIR until they have enough pick-ups and puts. It runs
+planner-arm, still and random-arm on them with the command line, for each radius and each protocol:
+options of `infthor-eval` with their values, joined by +. It prints what stopped planner-arm in
+episodes without success. The same command with the same --out resumes.
 """
 
 import argparse
@@ -47,7 +49,8 @@ def main() -> None:
             )
             data.write_bytes(b"".join(lines))
         for radius, protocol in product(options.radii.split(","), options.protocols.split(",")):
-            # Baselines but random-arm close their hand themselves, so that --closing would change nothing.
+            # Baselines but random-arm close their hand themselves, so that --closing would change
+            # nothing.
             for name in ("random-arm",) if protocol.startswith("closing=") else _BASELINES:
                 show(name, radius, protocol, run(name, radius, protocol, data, out, options))
 
@@ -72,7 +75,8 @@ def _arguments() -> argparse.Namespace:
 
 
 def choose_trajectories(options: argparse.Namespace) -> Iterator[TrajectorySource]:
-    """Yield trajectories, evenly spaced among all, until they have enough episodes of both kinds."""
+    """Yield trajectories, evenly spaced among all, until they have enough episodes of both
+    kinds."""
     every = list(iter_sources(options.trajectories))
     counts: Counter[ManipulationKind] = Counter()
     step = max(1, round(len(every) * 0.618))  # the golden ratio spreads them over the scenes
@@ -126,7 +130,8 @@ def show(name: str, radius: str, protocol: str, folder: Path) -> None:
         steps = sum(len(record.payload.steps) for record in same)
         print(
             f"{name:12} radius {radius:5} {protocol:14} {kind:7} {len(same):4} episodes,"
-            f" success {format_percent(about.success):24} in the sphere at the start {format_percent(about.inside):24}"
+            f" success {format_percent(about.success):24} in the sphere at the start "
+            f"{format_percent(about.inside):24}"
             f" {steps} steps, {seconds / max(1, len(same)):.2f} s"
             f" an episode, {sum(about.excluded.values())} excluded, {about.n_failed} failed",
             flush=True,

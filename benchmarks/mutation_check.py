@@ -1,14 +1,18 @@
-"""Whether the tests of six core modules notice small faults: mutants of each module, and those that survive.
+"""Whether the tests of six core modules notice small faults: mutants of each module, and those that
+survive.
 
-    python benchmarks/mutation_check.py [TREE] [--per-module 21] [--seed 0] [--only NAME,...] [--processes 2]
+    python benchmarks/mutation_check.py [TREE] [--per-module 21] [--seed 0] [--only NAME,...]
+    [--processes 2]
         [--moved NEW=OLD] [--shared FOLDER]
 
-A mutant is the module with one small change: another comparison or operator, a constant off by one, a condition
-negated, a statement removed, None returned. A seeded sample is tried in copies of TREE against the module's own tests.
-A mutant survives if these tests pass: either it means the same as the original, or an assertion is missing.
+A mutant is the module with one small change: another comparison or operator, a constant off by one,
+a condition negated, a statement removed, None returned. A seeded sample is tried in copies of TREE
+against the module's own tests. A mutant survives if these tests pass: either it means the same as
+the original, or an assertion is missing.
 
-The sample depends on what a statement looks like without its names, so it stays the same when things are renamed or
-moved. For an earlier version of the tree, --moved gives the part of a path that was different then.
+The sample depends on what a statement looks like without its names, so it stays the same when
+things are renamed or moved. For an earlier version of the tree, --moved gives the part of a path
+that was different then.
 """
 
 import argparse
@@ -50,12 +54,15 @@ _NO_VERDICT = (3, 4, 5)  # exit codes of pytest: internal error, wrong usage, no
 _MIN_TIMEOUT_S = 120.0
 
 _COMPARISONS: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
-    ast.Lt: (ast.LtE, ast.Gt), ast.LtE: (ast.Lt, ast.Gt), ast.Gt: (ast.GtE, ast.Lt), ast.GtE: (ast.Gt, ast.Lt),
-    ast.Eq: (ast.NotEq,), ast.NotEq: (ast.Eq,), ast.In: (ast.NotIn,), ast.NotIn: (ast.In,), ast.Is: (ast.IsNot,),
+    ast.Lt: (ast.LtE, ast.Gt), ast.LtE: (ast.Lt, ast.Gt), ast.Gt: (ast.GtE, ast.Lt),
+    ast.GtE: (ast.Gt, ast.Lt),
+    ast.Eq: (ast.NotEq,), ast.NotEq: (ast.Eq,), ast.In: (ast.NotIn,), ast.NotIn: (ast.In,),
+    ast.Is: (ast.IsNot,),
     ast.IsNot: (ast.Is,),
 }  # fmt: skip
 _OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.FloorDiv: ast.Mult,
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
+    ast.FloorDiv: ast.Mult,
     ast.Mod: ast.Mult, ast.Pow: ast.Mult, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd,
 }  # fmt: skip
 _FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
@@ -68,7 +75,8 @@ _NOT_RUN = (
 
 
 class Mutant(NamedTuple):
-    """A module's source with one small change: its line, the old and the new text, and the whole source."""
+    """A module's source with one small change: its line, the old and the new text, and the whole
+    source."""
 
     line: int
     change: str
@@ -122,7 +130,8 @@ def _arguments() -> argparse.Namespace:
 
 
 def sample(source: str, count: int, seed: int) -> list[Mutant]:
-    """Draw at most `count` mutants of a module's source, in the order of its lines; another seed draws others."""
+    """Draw at most `count` mutants of a module's source, in the order of its lines; another seed
+    draws others."""
     tree = ast.parse(source)
     ranked: list[tuple[str, Any, Any]] = []
     seen: dict[str, int] = {}
@@ -181,7 +190,8 @@ def _expressions(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _nameless(value: Any) -> str:
-    """What a statement or expression looks like without names and texts, and without the statements within."""
+    """What a statement or expression looks like without names and texts, and without the statements
+    within."""
     if isinstance(value, ast.AST):
         fields = ", ".join(_nameless(item) for _, item in ast.iter_fields(value))
         return f"{type(value).__name__}({fields})"
@@ -236,7 +246,8 @@ def _changed_flow(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _copied(tree: Path, shared: Path, scratch: Path) -> Path:
-    """Copy a checkout, with what numba has compiled; the recorded data are linked beside the copy."""
+    """Copy a checkout, with what numba has compiled; the recorded data are linked beside the
+    copy."""
     shutil.copytree(
         tree, scratch / "tree", ignore=shutil.ignore_patterns(".git", ".venv", "build", ".*_cache")
     )
@@ -282,7 +293,8 @@ def _passes(tree: Path, module: str, source: str, tests: Sequence[str], timeout_
         "stderr": subprocess.DEVNULL,
         "start_new_session": True,
     }
-    # No bytecode is written, as Python would take that of the mutant before: it tells sources apart by second and size.
+    # No bytecode is written, as Python would take that of the mutant before: it tells sources apart
+    # by second and size.
     environment = {
         **os.environ,
         "PYTHONPATH": str(tree),

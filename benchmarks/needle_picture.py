@@ -1,8 +1,10 @@
-"""Draw docs/needle.png, the picture of the README: frames of a bundled trajectory, a question on them, two replies.
+"""Draw docs/needle.png, the picture of the README: frames of a bundled trajectory, a question on
+them, two replies.
 
     python benchmarks/needle_picture.py
 
-The replies are those of `infthor-eval --model qwen2.5-vl-nano,blind --tasks nieh_mini_gt`, strict scorer.
+The replies are those of `infthor-eval --model qwen2.5-vl-nano,blind --tasks nieh_mini_gt`, strict
+scorer.
 """
 
 from pathlib import Path

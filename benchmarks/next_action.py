@@ -1,10 +1,13 @@
-"""Measure how often a model predicts the expert's next action on held-out trajectories, and baselines without frames.
+"""Measure how often a model predicts the expert's next action on held-out trajectories, and
+baselines without frames.
 
-    python benchmarks/next_action.py --data SET [--model qwen2.5-vl-nano] [--model-args k=v,...] [--frames shown,blank]
+    python benchmarks/next_action.py --data SET [--model qwen2.5-vl-nano] [--model-args k=v,...]
+    [--frames shown,blank]
 
-SET is a replayed set (`infthor-eval replay`). At every action the model gets the true history up to it (teacher
-forcing) and replies greedily. `history` predicts what experts did next in other scenes after the same action in a plan
-of the same words (infthor_eval/plans/actors/habits.py). `most frequent` always predicts the most frequent action.
+SET is a replayed set (`infthor-eval replay`). At every action the model gets the true history up to
+it (teacher forcing) and replies greedily. `history` predicts what experts did next in other scenes
+after the same action in a plan of the same words (infthor_eval/plans/actors/habits.py). `most
+frequent` always predicts the most frequent action.
 """
 
 import argparse
@@ -53,12 +56,14 @@ def main() -> None:
             for hit in model_hits(model, segments, _SHOWN[way])
         ]
     print(
-        f"{len(clusters)} actions of {len(histories)} trajectories; accuracy of the next action, %, with 95 % interval"
+        f"{len(clusters)} actions of {len(histories)} trajectories; accuracy of the next action, "
+        "%, with 95 % interval"
     )
     for name, hits in rows.items():
         print(f"{name:40} {_interval(clustered_mean(hits, clusters))}", end="")
         print(
-            f"   over history {_interval(paired_difference(rows['history'], hits, clusters).estimate)}"
+            "   over history "
+            f"{_interval(paired_difference(rows['history'], hits, clusters).estimate)}"
         )
 
 

@@ -1,4 +1,5 @@
-"""Measure the speed-up of `nieh_mini` by sharing the frames' prefix between questions, and compare the replies.
+"""Measure the speed-up of `nieh_mini` by sharing the frames' prefix between questions, and compare
+the replies.
 
 Both runs use the whole runner (suite, journal) in one process; the times are those of answering.
 
@@ -42,7 +43,8 @@ def main() -> None:
     for task, times in sorted(seconds.items()):
         n = sum(key.task == task for key in replies[True])
         print(
-            f"{task:18} {n:9} {times[True]:9.2f} {times[False]:9.2f} {times[False] / times[True]:7.2f}"
+            f"{task:18} {n:9} {times[True]:9.2f} {times[False]:9.2f} "
+            f"{times[False] / times[True]:7.2f}"
         )
     print("replies equal:", "yes" if replies[True] == replies[False] else "NO")
 

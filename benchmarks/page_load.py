@@ -1,12 +1,14 @@
 """Measure the report's page of many records: how long it takes to make, to open, and to filter.
 
-    python benchmarks/page_load.py [--records 20000] [--words 40] [--against CHECKOUT] [--keep FOLDER]
+    python benchmarks/page_load.py [--records 20000] [--words 40] [--against CHECKOUT] [--keep
+    FOLDER]
 
-A small run of two baselines on the bundled set is made; its records are then copied, as replies to questions that
-differ in a number, until there are enough. Replies get more words, as those of a model have. Prints one JSON object per
-checkout: seconds to make the page, its size, seconds from the navigation until the list is drawn (medians of five), and
-milliseconds from a keystroke in the search or a change of a filter until the next frame is painted (the longest of five
-each). Needs Chromium and playwright.
+A small run of two baselines on the bundled set is made; its records are then copied, as replies to
+questions that differ in a number, until there are enough. Replies get more words, as those of a
+model have. Prints one JSON object per checkout: seconds to make the page, its size, seconds from
+the navigation until the list is drawn (medians of five), and milliseconds from a keystroke in the
+search or a change of a filter until the next frame is painted (the longest of five each). Needs
+Chromium and playwright.
 """
 
 import argparse
@@ -41,7 +43,10 @@ _UNTIL_PAINTED = """change => new Promise(resolve => {
   new Function(change)();
   requestAnimationFrame(() => setTimeout(() => resolve(performance.now() - start)));
 })"""
-_DRAWN = "new Promise(resolve => requestAnimationFrame(() => setTimeout(() => resolve(performance.now()))))"
+_DRAWN = (
+    "new Promise(resolve => requestAnimationFrame(() => setTimeout(() => "
+    "resolve(performance.now()))))"
+)
 _SEARCHES = ("h", "ha", "have", "bowl (copy 7", "no such words", "")
 
 
@@ -89,7 +94,8 @@ def run_command(checkout: Path, *words: Any) -> None:
 
 
 def make_runs(folder: Path, n_records: int, n_words: int) -> list[Path]:
-    """Return the folders of the runs: those on the bundled set, copied to a set with that many questions."""
+    """Return the folders of the runs: those on the bundled set, copied to a set with that many
+    questions."""
     small = packaged_folder("sets/nieh_mini")
     output = folder / "small"
     run_command(

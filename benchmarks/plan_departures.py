@@ -1,10 +1,12 @@
-"""Measure what each departure of the default rules of plans changes: the published rules with that one thing mended.
+"""Measure what each departure of the default rules of plans changes: the published rules with that
+one thing mended.
 
     python benchmarks/plan_departures.py [--only WORD] [--out FOLDER]
 
-For each departure of docs/plan-rewards.md that can change a reward it runs planner, random, scripted and history on the
-bundled set under the published rules, with the published function replaced by one that does as the default rules do.
-The table has the sums of rewards, less those under the published rules as they are.
+For each departure of docs/plan-rewards.md that can change a reward it runs planner, random,
+scripted and history on the bundled set under the published rules, with the published function
+replaced by one that does as the default rules do. The table has the sums of rewards, less those
+under the published rules as they are.
 """
 
 import argparse
@@ -61,7 +63,8 @@ def main() -> None:
 
 
 def _rewards(out: Path) -> Mapping[str, float]:
-    """Run the baselines in this process, where they are patched, and return the sums of their rewards."""
+    """Run the baselines in this process, where they are patched, and return the sums of their
+    rewards."""
     words = [
         "run",
         "--model",
@@ -222,7 +225,8 @@ def _states_that_the_action_brought() -> Patch:
 
 
 def _alfreds_treatments_and_goals() -> Patch:
-    """Track washing, heating and cooling through the whole task, and test the goals as ALFRED does."""
+    """Track washing, heating and cooling through the whole task, and test the goals as ALFRED
+    does."""
 
     def of(view: SimulatorView, last_action: str) -> PublishedState:
         state = PublishedState(last_action, pose_of(view), view.inventory, view.objects)
@@ -259,7 +263,8 @@ def _alfreds_treatments_and_goals() -> Patch:
 def _treated_with(
     treatments: Treatments, before: PublishedState, now: PublishedState
 ) -> Treatments:
-    """Return the treatments after an action: whatever was switched on or closed by it acts on what is in it."""
+    """Return the treatments after an action: whatever was switched on or closed by it acts on what
+    is in it."""
     for key, item in now.objects.items():
         was = before.objects.get(key)
         switched = was is not None and item.is_toggled and not was.is_toggled

@@ -1,17 +1,19 @@
-"""Measure whether preparing a plan late in a long trajectory takes longer than preparing an early one.
+"""Measure whether preparing a plan late in a long trajectory takes longer than preparing an early
+one.
 
     python benchmarks/plan_preparation.py [--trajectory FILE] [--plans 1 25 50 100] [--repeats 10]
 
-Unless a trajectory is given, one of 700 steps is generated in kitchen-1 (a minute or two). It is measured with frames,
-as for models, and without rendering, as for baselines:
-  in order   The environment is reset to each plan and the expert acts in it, as in an evaluation. The first reset to a
-             plan also executes the expert's actions before it. The number is the median time of a reset over the number
-             of these actions, of the plans of a kind that are nearest to number i.
-  at random  After that, the environment is reset to plans in random order. The number is the median time of resets to
-             the plan of a kind that is nearest to number i.
+Unless a trajectory is given, one of 700 steps is generated in kitchen-1 (a minute or two). It is
+measured with frames, as for models, and without rendering, as for baselines:
+  in order   The environment is reset to each plan and the expert acts in it, as in an evaluation.
+             The first reset to a plan also executes the expert's actions before it. The number is
+             the median time of a reset over the number of these actions, of the plans of a kind
+             that are nearest to number i.
+  at random  After that, the environment is reset to plans in random order. The number is
+             the median time of resets to the plan of a kind that is nearest to number i.
 
-Times are processor milliseconds of this process and the simulator together, with wall time in brackets. The last tables
-have the parts of these times.
+Times are processor milliseconds of this process and the simulator together, with wall time in
+brackets. The last tables have the parts of these times.
 """
 
 import argparse
@@ -233,7 +235,8 @@ def show(title: str, times: dict[Any, list[Spent]], numbers: Sequence[int]) -> N
 def show_places(again: dict[Any, list[Spent]], actions: list[Spent]) -> None:
     """Print the median times of the parts."""
     print(f"{'parts':45}" + "".join(f"{name:>11}" for name in _COLUMNS))
-    rows = {f"reset to {kind}": [spent for key, times in again.items() if key[0] == kind for spent in times]
+    rows = {f"reset to {kind}": [spent for key,
+                                 times in again.items() if key[0] == kind for spent in times]
             for kind in _KINDS}  # fmt: skip
     for name, times in {**rows, "an action": actions}.items():
         print(f"  {name:43}" + "".join(f"{median(times, place):11.1f}" for place in _COLUMNS))

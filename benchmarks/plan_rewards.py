@@ -1,10 +1,11 @@
-"""Measure what the baselines of plans earn under each set of reward rules, as a table for docs/plan-rewards.md.
+"""Measure what the baselines of plans earn under each set of reward rules, as a table for
+docs/plan-rewards.md.
 
     python benchmarks/plan_rewards.py [--more FILE] [--scenes FOLDER] [--out FOLDER]
 
-It runs planner, random, scripted and history on the bundled set with the command line, under both sets of rules; with
---more also on another file of trajectories, in recorded floor plans if they are given. The same command
-with the same --out resumes.
+It runs planner, random, scripted and history on the bundled set with the command line, under both
+sets of rules; with --more also on another file of trajectories, in recorded floor plans if they are
+given. The same command with the same --out resumes.
 """
 
 import argparse
@@ -27,7 +28,8 @@ def main() -> None:
     """Run the baselines and print the table, sums over trajectories."""
     options = _arguments()
     print(
-        "| | rules | plans done | reward | planner's or most | logged total_reward | logged agent_reward |"
+        "| | rules | plans done | reward | planner's or most | logged total_reward | logged "
+        "agent_reward |"
     )
     print("|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as scratch:

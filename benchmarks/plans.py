@@ -1,12 +1,13 @@
 """Measure the baselines of plans on long trajectories: planner, random, scripted and history.
 
-    python benchmarks/plans.py --trajectories DIR --data FOLDER [--count 40] [--alfred 20] [--out FOLDER]
+    python benchmarks/plans.py --trajectories DIR --data FOLDER [--count 40] [--alfred 20] [--out
+    FOLDER]
 
-It takes --count generated trajectories of at least --min-steps steps, evenly spaced in DIR, and the first ALFRED
-demonstrations (FOLDER/alfred/valid_seen.jsonl.gz) that replay without a refused action. It runs the baselines on each
-of these two sets with the command line. planner should complete every plan with the maximum reward, and random should
-have less than a tenth of it. The plans in which planner falls short are printed. The same command with the same --out
-resumes.
+It takes --count generated trajectories of at least --min-steps steps, evenly spaced in DIR, and the
+first ALFRED demonstrations (FOLDER/alfred/valid_seen.jsonl.gz) that replay without a refused
+action. It runs the baselines on each of these two sets with the command line. planner should
+complete every plan with the maximum reward, and random should have less than a tenth of it. The
+plans in which planner falls short are printed. The same command with the same --out resumes.
 """
 
 import argparse
@@ -149,7 +150,8 @@ def run(sources: Sequence[TrajectorySource], scenes: Path, out: Path) -> dict[st
         folders = list((results / name).glob(f"{_TASK}-*"))
         if len(folders) != 1:
             raise SystemExit(
-                f"{name} ended with {result.returncode}, and {results / name} has {len(folders)} runs"
+                f"{name} ended with {result.returncode}, and {results / name} has {len(folders)} "
+                "runs"
             )
         header, records = read_run(folders[0], PlansSuite.records)
         runs[name] = Run(PlansSuite().summarise(header, records).tasks[_TASK], records)
@@ -222,7 +224,8 @@ def by_kind(records: Iterable[Record]) -> Iterator[str]:
 
 
 def shortcoming(record: Record) -> str:
-    """Return the missing reward of the expert in a plan, and how it ended; empty if none is missing."""
+    """Return the missing reward of the expert in a plan, and how it ended; empty if none is
+    missing."""
     plan = record.payload
     if record.excluded is not None or (
         plan.done and abs(plan.reward - (plan.max_reward or 0.0)) < _SMALL

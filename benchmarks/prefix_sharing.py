@@ -3,16 +3,19 @@
 One run measures, with the same Qwen2.5-VL with random weights and the same frames and questions:
   shared   our conversation: frames are appended once, then append, reply and rewind per question;
   batched  the same with all questions passed at once and answered --batch-size at a time;
-  plain    as shared with share_prefix=false: everything is encoded for every question, as in a plain loop;
-  floor    transformers alone: one chunked prefill of the frames into its own cache, then per question the tokens of the
-           question and the reply. Nothing can be faster with the same model.
+  plain    as shared with share_prefix=false: everything is encoded for every question, as in a
+           plain loop;
+  floor    transformers alone: one chunked prefill of the frames into its own cache, then per
+           question the tokens of the question and the reply. Nothing can be faster with the same
+           model.
 
     python benchmarks/prefix_sharing.py --frames 120 --questions 24
 
-On a machine with a GPU it also prints tokens per second in the form of published_evaluation.py, peak memory and the
-largest context that fits, for random weights of the real shape:
+On a machine with a GPU it also prints tokens per second in the form of published_evaluation.py,
+peak memory and the largest context that fits, for random weights of the real shape:
 
-    python benchmarks/prefix_sharing.py --device cuda --model-size 7b --largest --attention flash_attention_2
+    python benchmarks/prefix_sharing.py --device cuda --model-size 7b --largest --attention
+    flash_attention_2
 """
 
 import argparse
@@ -37,8 +40,8 @@ from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 from model_adapters.tiny.twin import TinyAdapter
 
 PROMPT = (
-    "\nAnswer the question given the agent's views in time order. Do not include explanation or reasoning in the "
-    "answer. Answer with a single word or words.\nQuestion: "
+    "\nAnswer the question given the agent's views in time order. Do not include explanation or "
+    "reasoning in the answer. Answer with a single word or words.\nQuestion: "
 )
 Replies = list[tuple[int, ...]]
 Timed = tuple[float, Replies]
@@ -108,7 +111,8 @@ def _arguments() -> argparse.Namespace:
 
 
 def build(options: argparse.Namespace) -> TransformersModel:
-    """Build a Qwen2.5-VL with random weights, tiny in float32 or of the 7B model's shape in bfloat16."""
+    """Build a Qwen2.5-VL with random weights, tiny in float32 or of the 7B model's shape in
+    bfloat16."""
     twin, dtype = Qwen25VLTiny.twin, "float32"
     if options.model_size == "7b":
         twin, dtype = replace(twin, config=_real_shape), "bfloat16"
@@ -154,7 +158,8 @@ def clear_cache(model: TransformersModel) -> None:
 def machine_report(
     model: TransformersModel, frames: Sequence[FrameRef], options: argparse.Namespace
 ) -> None:
-    """Print the speed of encoding and decoding, the peak memory of a GPU, and the largest context that fits."""
+    """Print the speed of encoding and decoding, the peak memory of a GPU, and the largest context
+    that fits."""
     on_gpu = options.device.startswith("cuda")
     if on_gpu:
         torch.cuda.reset_peak_memory_stats()
@@ -174,7 +179,8 @@ def machine_report(
 def _decoding_speed(
     model: TransformersModel, frames: Sequence[FrameRef], few: int = 2, more: int = 34
 ) -> float:
-    """Return the tokens per second of a reply on a short context, from the difference of two replies."""
+    """Return the tokens per second of a reply on a short context, from the difference of two
+    replies."""
     times, lengths = [], []
     for new in (few, more):
         answer_one_by_one(model, frames, [""], new)
@@ -206,7 +212,8 @@ def report(measured: dict[str, list[Timed]], options: argparse.Namespace) -> Non
     """Print the fastest time of each way, the factors, and whether all replies are equal."""
     found = figures(measured)
     print(
-        f"{options.frames} frames, {options.questions} questions, {options.new_tokens} new tokens each"
+        f"{options.frames} frames, {options.questions} questions, {options.new_tokens} new tokens "
+        "each"
     )
     for name in measured:
         print(f"{name:8s}{found[name]:9.2f} s")
@@ -280,7 +287,8 @@ def answer_with_transformers(
     grids = torch.tensor([[1, 22, 22]] * len(frames))
     positions, _ = bare.model.get_rope_index(ids, (ids == pad).int(), image_grid_thw=grids)
     cache = DynamicCache()
-    # Chunks end after the end marker of a frame; the first chunk also has the start of the template.
+    # Chunks end after the end marker of a frame; the first chunk also has the start of the
+    # template.
     ends = [ids.shape[1] - 123 * left for left in range(len(frames) - 1, -1, -1)]
     for at in range(0, len(frames), chunk_frames):
         some = frames[at : at + chunk_frames]

@@ -1,15 +1,17 @@
-"""Simulate a full published evaluation on 1, 8 and 64 GPUs: requests, hours, cost, and savings by sharing.
+"""Simulate a full published evaluation on 1, 8 and 64 GPUs: requests, hours, cost, and savings by
+sharing.
 
-225 trajectories with questions are sampled from the seed. Four models answer them in every mode, as the harness does: a
-group is a trajectory, its contexts are sorted by their common prefixes, and a request encodes only what the one before
-did not. Workers take the longest groups first; a worker has as many GPUs as its longest context requires.
+225 trajectories with questions are sampled from the seed. Four models answer them in every mode, as
+the harness does: a group is a trajectory, its contexts are sorted by their common prefixes, and a
+request encodes only what the one before did not. Workers take the longest groups first; a worker
+has as many GPUs as its longest context requires.
 
-    python benchmarks/published_evaluation.py
-    python benchmarks/published_evaluation.py --prefill qwen2.5-vl=8000:9000,128000:5000 --decode qwen2.5-vl=35
+    python benchmarks/published_evaluation.py python benchmarks/published_evaluation.py --prefill
+    qwen2.5-vl=8000:9000,128000:5000 --decode qwen2.5-vl=35
 
-The second command uses measurements on a GPU (benchmarks/gpu.md): tokens/s of encoding at two lengths, and tokens/s of
-decoding at a short one. Rates without measurements are estimated from the machine's numbers. docs/cost.md has the
-formulae.
+The second command uses measurements on a GPU (benchmarks/gpu.md): tokens/s of encoding at two
+lengths, and tokens/s of decoding at a short one. Rates without measurements are estimated from the
+machine's numbers. docs/cost.md has the formulae.
 """
 
 import argparse
@@ -57,8 +59,8 @@ class Mode:
 
     Attributes:
         name: name of the task.
-        contexts: returns the contexts of a trajectory, as positions of frames, and the number of impossible ones; None
-            for plans.
+        contexts: returns the contexts of a trajectory, as positions of frames, and the number of
+            impossible ones; None for plans.
         step_seconds: seconds in the simulator per reply.
     """
 
@@ -75,7 +77,8 @@ class Run:
         mode: name of the mode.
         model: shape of the model.
         n_requests: number of answered requests.
-        n_skipped: numbers of requests without a context, with a too long one, and with one that exceeds the memory.
+        n_skipped: numbers of requests without a context, with a too long one, and with one that
+            exceeds the memory.
         tokens: tokens of all contexts.
         encoded: tokens that were not in the cache.
         largest: tokens of the longest context.
@@ -110,10 +113,12 @@ def main() -> None:
     n_frames = sum(trajectory.n_frames for trajectory in trajectories)
     n_questions = sum(len(trajectory.questions) for trajectory in trajectories)
     print(
-        f"{len(trajectories)} trajectories, {n_frames} frames, {n_questions} questions, seed {options.seed}"
+        f"{len(trajectories)} trajectories, {n_frames} frames, {n_questions} questions, seed "
+        f"{options.seed}"
     )
     print(
-        f"attention {machine.attention}, {machine.parallel} over a worker's GPUs, {options.price:.2f} USD a GPU-hour"
+        f"attention {machine.attention}, {machine.parallel} over a worker's GPUs, "
+        f"{options.price:.2f} USD a GPU-hour"
     )
     runs = [
         run(mode, shape, trajectories, rates_of(shape, machine, options), machine, options)
@@ -125,7 +130,8 @@ def main() -> None:
     for shape in MODELS:
         fitting = [f"{largest_context(shape, machine, n) / 1000:8,.0f}" for n in (1, 2, 4, 8)]
         print(
-            f"{shape.name:17s}{''.join(fitting)}{shape.kv_bytes / 1e9 * 1e6:10.0f} GB of keys and values a million"
+            f"{shape.name:17s}{''.join(fitting)}{shape.kv_bytes / 1e9 * 1e6:10.0f} GB of keys and "
+            "values a million"
         )
 
 
@@ -295,7 +301,8 @@ def rates_of(shape: Shape, machine: Machine, options: argparse.Namespace) -> Rat
 
 
 def draw(options: argparse.Namespace) -> list[Trajectory]:
-    """Sample trajectories of different lengths (log-normal, clipped), with the clues of their questions."""
+    """Sample trajectories of different lengths (log-normal, clipped), with the clues of their
+    questions."""
     rng = np.random.default_rng(options.seed)
     spread = np.log1p((options.frames_spread / options.frames) ** 2)
     lengths = rng.lognormal(
@@ -381,7 +388,8 @@ def _n_common(one: Sequence[int], other: Sequence[int]) -> int:
 def _plan_requests(
     trajectory: Trajectory, shape: Shape, options: argparse.Namespace
 ) -> Iterator[Request]:
-    """Yield the requests of an agent: for each step the whole history, which grows by a frame and an action."""
+    """Yield the requests of an agent: for each step the whole history, which grows by a frame and
+    an action."""
     step = shape.frame_tokens + options.step_tokens
     for number in range(1, trajectory.n_frames + 1):
         yield Request(number * step, (number - 1) * step, options.reply_tokens)
@@ -436,12 +444,12 @@ def run(
 
 _NAMES = f"{'mode':20s}{'model':17s}"
 _WORK = (
-    f"{_NAMES}{'requests':>9s}{'no window':>10s}{'too long':>9s}{'no memory':>10s}{'Mtokens':>9s}{'encoded':>9s}"
-    f"{'longest':>9s}{'RoPE':>6s}"
+    f"{_NAMES}{'requests':>9s}{'no window':>10s}{'too long':>9s}{'no memory':>10s}"
+    f"{'Mtokens':>9s}{'encoded':>9s}{'longest':>9s}{'RoPE':>6s}"
 )
 _COST = (
-    f"{_NAMES}{'GPUs':>5s}{'h on 1':>9s}{'on 8':>9s}{'on 64':>8s}{'USD 8':>9s}{'USD 64':>9s}{'h on 8, not shared':>20s}"
-    f"{'saved':>8s}"
+    f"{_NAMES}{'GPUs':>5s}{'h on 1':>9s}{'on 8':>9s}{'on 64':>8s}{'USD 8':>9s}{'USD 64':>9s}"
+    f"{'h on 8, not shared':>20s}{'saved':>8s}"
 )
 
 
@@ -460,7 +468,8 @@ def work_table(runs: Sequence[Run]) -> str:
 
 
 def cost_table(runs: Sequence[Run], load: float, price: float) -> str:
-    """Return a line for each run, one for the sum of each model, and one for the sum of all: hours and cost."""
+    """Return a line for each run, one for the sum of each model, and one for the sum of all: hours
+    and cost."""
     lines = [_COST]
     for one in runs:
         lines.append(
@@ -474,7 +483,8 @@ def cost_table(runs: Sequence[Run], load: float, price: float) -> str:
 
 
 def _times(runs: Sequence[Run], load: float, price: float) -> str:
-    """Return hours, cost and saving of successive runs, with a dash if one of them needs more GPUs."""
+    """Return hours, cost and saving of successive runs, with a dash if one of them needs more
+    GPUs."""
     hours = {n: _sum([one.hours(n, load) for one in runs]) for n in GPUS}
     without = _sum([one.hours(8, load, reuse=False) for one in runs])
     shown = f"{_number(hours[1], 9)}{_number(hours[8], 9)}{_number(hours[64], 8)}"

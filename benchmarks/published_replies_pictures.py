@@ -1,4 +1,5 @@
-"""Draw the pictures of docs/published-replies.md from the published question files and three imported runs.
+"""Draw the pictures of docs/published-replies.md from the published question files and three
+imported runs.
 
     infthor-eval import-replies LOGS/eval_qa_set_*.log --data DATA --output results
     python benchmarks/published_replies_pictures.py DATA results/Qwen2.5-VL-7B-Instruct/*
@@ -63,7 +64,8 @@ def save(draw: Callable[[], Figure], name: str) -> None:
 
 
 def draw_guessing(data: NiehSet, tasks: Mapping[str, TaskSummary]) -> Figure:
-    """Draw what guessers get on each file, above what is published of models that see the frames."""
+    """Draw what guessers get on each file, above what is published of models that see the
+    frames."""
     files = groups(audit(data), "file")
     printed = next(table for table in published_tables("nieh") if table.context == "trajectory")
     figure = Figure(figsize=(8.6, 3.6), layout="constrained")
@@ -139,7 +141,8 @@ def draw_above_guessing(tasks: Mapping[str, TaskSummary]) -> Figure:
 
 
 def draw_evidence(tasks: Mapping[str, TaskSummary]) -> Figure:
-    """Draw accuracy by the clue frames that were shown, of the runs that do not show all of them."""
+    """Draw accuracy by the clue frames that were shown, of the runs that do not show all of
+    them."""
     hiding = {name: task for name, task in tasks.items() if name != "nieh_published_full"}
     return _by_file(
         hiding,

@@ -1,9 +1,11 @@
-"""Check the questions on a set: the independent checker on all candidates, and baselines that do not see frames.
+"""Check the questions on a set: the independent checker on all candidates, and baselines that do
+not see frames.
 
 python benchmarks/question_checks.py SET [--per-trajectory 25] [--seed 0] [--further]
 
-The checker answers every candidate of the rules in another way: from the whole log, from the entries of the clue
-frames, and with each clue left out. The baselines answer the questions that are chosen from the candidates.
+The checker answers every candidate of the rules in another way: from the whole log, from the
+entries of the clue frames, and with each clue left out. The baselines answer the questions that are
+chosen from the candidates.
 """
 
 import argparse
@@ -43,14 +45,16 @@ def main() -> None:
         further=options.further,
     )
     print(
-        f"chosen: {len(generated.questions)}, by number of clues {generated.by_clues()}, by type {generated.by_type()}"
+        f"chosen: {len(generated.questions)}, by number of clues {generated.by_clues()}, by type "
+        f"{generated.by_type()}"
     )
     samples = [Sample(question, question.clues) for question in generated.questions]
     yes_no = [item for item in samples if item.question.answers[0] in _YES_NO]
     for name in ("oracle", "blind", "blind-count"):
         predict = BASELINES[name](0).fit(samples)
         print(
-            f"{name}, strict: {mean(predict, samples):.3f}; yes/no alone {mean(predict, yes_no):.3f}"
+            f"{name}, strict: {mean(predict, samples):.3f}; yes/no alone "
+            f"{mean(predict, yes_no):.3f}"
         )
 
 
@@ -83,7 +87,8 @@ def check_all(folder: Path) -> None:
             )
             if not verdict.sound:
                 print(
-                    f"  {question.traj_id}: {question.text} {question.answers} {question.clues}: {verdict}"
+                    f"  {question.traj_id}: {question.text} {question.answers} {question.clues}: "
+                    f"{verdict}"
                 )
     shares = ", ".join(f"{name} {counts[name]}" for name in ("right", "sufficient", "minimal"))
     print(f"{len(histories)} trajectories, {counts['all']} candidates: {shares}")

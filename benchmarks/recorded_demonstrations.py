@@ -1,10 +1,13 @@
-"""Does the embedded simulator accept what people's experts did in AI2-THOR? Replay ALFRED's demonstrations.
+"""Does the embedded simulator accept what people's experts did in AI2-THOR? Replay ALFRED's
+demonstrations.
 
-    python benchmarks/recorded_demonstrations.py --data FOLDER [--split valid_seen] [--every 1] [--per-floor-plan N]
+    python benchmarks/recorded_demonstrations.py --data FOLDER [--split valid_seen] [--every 1]
+    [--per-floor-plan N]
 
-It replays the recorded actions of FOLDER/alfred/<split>.jsonl.gz on the recorded floor plans, without frames, and
-prints how many moves and interactions are accepted, how many demonstrations are whole, the shares of puts by
-receptacle, and what was refused and why. Each of these actions succeeded in AI2-THOR.
+It replays the recorded actions of FOLDER/alfred/<split>.jsonl.gz on the recorded floor plans,
+without frames, and prints how many moves and interactions are accepted, how many demonstrations are
+whole, the shares of puts by receptacle, and what was refused and why. Each of these actions
+succeeded in AI2-THOR.
 """
 
 import argparse
@@ -78,7 +81,8 @@ class Counts:
 
 
 def replay_demonstrations(data: Path, trajectories: Iterable[Trajectory]) -> Counts:
-    """Replay demonstrations on the recorded floor plans of a folder, and return what was accepted."""
+    """Replay demonstrations on the recorded floor plans of a folder, and return what was
+    accepted."""
     listed, counts = list(trajectories), Counts()
     with (
         supplement_file(listed) as supplement,
@@ -94,7 +98,8 @@ def replay_demonstrations(data: Path, trajectories: Iterable[Trajectory]) -> Cou
 
 
 def _replay(trajectory: Trajectory, simulator: Simulator) -> Iterator[str | None]:
-    """Yield for each action of a demonstration None, or why it was refused; go on after a refusal, as ALFRED does."""
+    """Yield for each action of a demonstration None, or why it was refused; go on after a refusal,
+    as ALFRED does."""
     restore(simulator, trajectory.scene)
     grounding = Grounding(simulator.view)
     for low in trajectory.plan.low_actions:
@@ -151,7 +156,8 @@ def main() -> None:
     print(f"{counts.whole} of {counts.demonstrations} demonstrations whole")
     for kind in sorted(counts.tried):
         print(
-            f"{kind}s: {counts.accepted[kind]} of {counts.tried[kind]} accepted, {counts.share(kind):.2%}"
+            f"{kind}s: {counts.accepted[kind]} of {counts.tried[kind]} accepted, "
+            f"{counts.share(kind):.2%}"
         )
     for receptacle, results in sorted(counts.puts.items(), key=lambda item: -item[1][False]):
         if results[False]:

@@ -1,12 +1,15 @@
-"""Serve OpenVLA and SpatialVLA with the libraries of their publication, behind `/act`, for `check-parity`.
+"""Serve OpenVLA and SpatialVLA with the libraries of their publication, behind `/act`, for
+`check-parity`.
 
-pip install --no-deps --target OLD timm==0.9.16 transformers==4.47.0 tokenizers==0.21.0 huggingface_hub==0.27.0
-PYTHONPATH=OLD python benchmarks/reference_policies.py openvla CHECKPOINT --port 8000
-infthor-eval check-parity openvla --model-args pretrained=CHECKPOINT,dtype=float32 --reference-url http://127.0.0.1:8000
+pip install --no-deps --target OLD timm==0.9.16 transformers==4.47.0 tokenizers==0.21.0
+huggingface_hub==0.27.0 PYTHONPATH=OLD python benchmarks/reference_policies.py openvla CHECKPOINT
+--port 8000 infthor-eval check-parity openvla --model-args pretrained=CHECKPOINT,dtype=float32
+--reference-url http://127.0.0.1:8000
 
-This implementation shares no code with `model_adapters`. Towers are timm's, all else is from transformers 4.47, loaded
-strictly by the checkpoint's own names. Every token is computed from the whole sequence, without a cache. CHECKPOINT can
-be that of a tiny model: `OpenVLATiny.twin.save(folder, seed=0)`. It runs in float32 on the CPU, one process per policy.
+This implementation shares no code with `model_adapters`. Towers are timm's, all else is from
+transformers 4.47, loaded strictly by the checkpoint's own names. Every token is computed from the
+whole sequence, without a cache. CHECKPOINT can be that of a tiny model:
+`OpenVLATiny.twin.save(folder, seed=0)`. It runs in float32 on the CPU, one process per policy.
 """
 
 import argparse
@@ -259,7 +262,10 @@ def spatialvla(folder: Path, key: str | None) -> Act:
 
     def act(image: Image.Image, instruction: str) -> np.ndarray:
         patches = features(image)
-        text = f"{'<image>' * patches.shape[1]}<bos>What action should the robot take to {instruction}?\n"
+        text = (
+            f"{'<image>' * patches.shape[1]}<bos>What action should the robot take to "
+            f"{instruction}?\n"
+        )
         ids = tokenizer.encode(text, add_special_tokens=False).ids
         written: list[int] = []
         for number in range(3 * processor["action_chunk_size"]):

@@ -1,11 +1,12 @@
 """Check generated trajectories with final tasks by replaying them in a new simulator.
 
-python benchmarks/replayed_trajectories.py --data FOLDER [--procedural 20] [--recorded 20] [--count 100]
+python benchmarks/replayed_trajectories.py --data FOLDER [--procedural 20] [--recorded 20] [--count
+100]
     [--min-steps 300] [--min-subgoals 10] [--out FOLDER]
 
-It runs the commands `generate --test-set` and `replay`. A trajectory is correct if the replay accepts every action, the
-object log is the same in every step, and the types of its final task were seen at both ends of the log. The same
-command with the same --out resumes.
+It runs the commands `generate --test-set` and `replay`. A trajectory is correct if the replay
+accepts every action, the object log is the same in every step, and the types of its final task were
+seen at both ends of the log. The same command with the same --out resumes.
 """
 
 import argparse
@@ -69,7 +70,8 @@ def procedural_scenes(number: int) -> list[str]:
 
 
 def recorded_scenes(data: Path, number: int) -> list[str]:
-    """Return the names of this many recorded floor plans without bathrooms, evenly spaced among all."""
+    """Return the names of this many recorded floor plans without bathrooms, evenly spaced among
+    all."""
     names = [
         name
         for name in floor_plan_names(data)
@@ -131,17 +133,21 @@ def show(
     steps = [len(item.plan.low_actions) for item in trajectories]
     broken = [problem for item in trajectories if (problem := violation(item))]
     print(
-        f"generated: {len(trajectories)}, {len({item.scene.floor_plan for item in trajectories})} scenes; ",
+        f"generated: {len(trajectories)}, {len({item.scene.floor_plan for item in trajectories})} "
+        "scenes; ",
         end="",
     )
     print(
-        f"{min(steps)} to {max(steps)} steps, {sum(steps)} together; not generated: {len(generated['failures'])}"
+        f"{min(steps)} to {max(steps)} steps, {sum(steps)} together; not generated: "
+        f"{len(generated['failures'])}"
     )
     print(
-        f"replayed without a refused action: {replayed['whole']} of {len(trajectories)}; same object log: {same}"
+        f"replayed without a refused action: {replayed['whole']} of {len(trajectories)}; same "
+        f"object log: {same}"
     )
     print(
-        f"final tasks that satisfy the rule of both ends: {len(trajectories) - len(broken)} of {len(trajectories)}"
+        f"final tasks that satisfy the rule of both ends: {len(trajectories) - len(broken)} of "
+        f"{len(trajectories)}"
     )
     for line in [
         *generated["failures"],

@@ -34,7 +34,8 @@ class Served:
 def serve_vllm(
     checkpoint: Path, dtype: str, environment: Mapping[str, str], most_frames: int
 ) -> AbstractContextManager[Served]:
-    """Serve a checkpoint in vLLM on a CPU within the context; requests have at most so many frames."""
+    """Serve a checkpoint in vLLM on a CPU within the context; requests have at most so many
+    frames."""
     options = [
         "--model",
         str(checkpoint),

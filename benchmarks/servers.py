@@ -1,14 +1,17 @@
 """Are replies behind other people's servers those of the same checkpoint in this process?
 
-All questions of `nieh_mini` and all plans of `infthor_plans_mini`, greedy and in float32, of the small trained model:
-behind vLLM's server and `transformers serve`, through `--model openai`, and in vLLM and transformers here.
+All questions of `nieh_mini` and all plans of `infthor_plans_mini`, greedy and in float32, of the
+small trained model: behind vLLM's server and `transformers serve`, through `--model openai`, and in
+vLLM and transformers here.
 
     make test-vllm                                  # once: the environment with vLLM
     .venv-vllm/bin/python benchmarks/servers.py
-    .venv/bin/python benchmarks/servers.py --engines "transformers serve" --pretrained FOLDER --adapter hf-vlm
+    .venv/bin/python benchmarks/servers.py --engines "transformers serve" \\
+        --pretrained FOLDER --adapter hf-vlm
 
-`transformers serve` wants all of torchvision or none of it. For a CPU there is but half of it, and a Qwen2.5-VL needs
-that: so it is asked in the ordinary environment, with a checkpoint of another family.
+`transformers serve` wants all of torchvision or none of it. For a CPU there is but half of it, and
+a Qwen2.5-VL needs that: so it is asked in the ordinary environment, with a checkpoint of another
+family.
 """
 
 import argparse

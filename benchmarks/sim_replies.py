@@ -1,11 +1,13 @@
-"""Digest what the simulator answers to a fixed script of actions, to see that a change of its code changes no reply.
+"""Digest what the simulator answers to a fixed script of actions, to see that a change of its code
+changes no reply.
 
     python benchmarks/sim_replies.py [--steps 2000] [--against CHECKOUT]
 
-The script is a walk through four procedural rooms, one of each kind, with views up and down, doors, drawers, pick-ups,
-puts, switches, slices, crouching and teleports, drawn from a fixed seed by what the agent sees; replies have RGB, depth
-and instance masks. It prints one digest of all metadata and one of all pixels for each room, and how many actions
-succeeded. With --against it compares them with those of another checkout; exit code 1 if one differs.
+The script is a walk through four procedural rooms, one of each kind, with views up and down, doors,
+drawers, pick-ups, puts, switches, slices, crouching and teleports, drawn from a fixed seed by what
+the agent sees; replies have RGB, depth and instance masks. It prints one digest of all metadata and
+one of all pixels for each room, and how many actions succeeded. With --against it compares them
+with those of another checkout; exit code 1 if one differs.
 """
 
 import argparse

@@ -1,13 +1,15 @@
-"""Measure the speed of the embedded simulator through the real Controller, and of the transport alone.
+"""Measure the speed of the embedded simulator through the real Controller, and of the transport
+alone.
 
     python benchmarks/sim_speed.py [--scene kitchen-1] [--steps 600] [--against CHECKOUT]
 
-It prints one JSON object: steps per second with RGB, with RGB, ids and depth, and of a process that answers every
-action with one prepared reply of the same size ("transport"); seconds from start to first frame; megabytes of the
-simulator's process at the start and at the end. The frames are 300x300.
+It prints one JSON object: steps per second with RGB, with RGB, ids and depth, and of a process that
+answers every action with one prepared reply of the same size ("transport"); seconds from start to
+first frame; megabytes of the simulator's process at the start and at the end. The frames are
+300x300.
 
-With --against it compares this simulator with that of another checkout, in alternation: steps per second (median of
-eight rounds) and processor milliseconds per step, with and without smooth edges.
+With --against it compares this simulator with that of another checkout, in alternation: steps per
+second (median of eight rounds) and processor milliseconds per step, with and without smooth edges.
 """
 
 import argparse
@@ -41,7 +43,8 @@ def controller(command: str, scene: str, **init: Any) -> Any:
     from ai2thor.controller import Controller
 
     return Controller(
-        local_executable_path=command, x_display="0", scene=scene, gridSize=0.25, visibilityDistance=1.5,
+        local_executable_path=command, x_display="0", scene=scene, gridSize=0.25,
+        visibilityDistance=1.5,
         fieldOfView=60, server_timeout=60.0, **init,
     )  # fmt: skip
 

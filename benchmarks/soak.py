@@ -1,13 +1,14 @@
 """Check that long runs with injected faults have the same results as undisturbed runs.
 
-    python benchmarks/soak.py --questions SET --trajectories DIR [--data FOLDER] [--n-questions 2000]
+    python benchmarks/soak.py --questions SET --trajectories DIR [--data FOLDER] [--n-questions
+    2000]
         [--n-episodes 300] [--every 20] [--out DIR]
 
-Two workers ask questions of a server in this script, whose replies depend only on the request. Two workers with their
-simulators run pick-ups of planner-arm. Each is run twice: undisturbed in one process, and disturbed. The faults
-alternate: a worker is killed; a simulator is killed; the whole run is killed and the last line of a shard is cut in the
-middle; the whole run is killed and a line is garbled (--recover); the server answers 500 or 429, stalls, or breaks the
-connection.
+Two workers ask questions of a server in this script, whose replies depend only on the request. Two
+workers with their simulators run pick-ups of planner-arm. Each is run twice: undisturbed in one
+process, and disturbed. The faults alternate: a worker is killed; a simulator is killed; the whole
+run is killed and the last line of a shard is cut in the middle; the whole run is killed and a line
+is garbled (--recover); the server answers 500 or 429, stalls, or breaks the connection.
 """
 
 import argparse
@@ -133,8 +134,8 @@ def soak(
     failed = [sum("failure" in record for record in units.values()) for units in (one, other)]
     print(
         f"{name}: {len(one)} and {len(other)} units, {equal} equal; results "
-        f"{'equal' if calm.summary() == harsh.summary() else 'DIFFER'}; failed {failed[0]} and {failed[1]}; "
-        f"faults injected {dict(sorted(injected.items()))}, {n_recorded} recorded; "
+        f"{'equal' if calm.summary() == harsh.summary() else 'DIFFER'}; failed {failed[0]} and "
+        f"{failed[1]}; faults injected {dict(sorted(injected.items()))}, {n_recorded} recorded; "
         f"{calm_seconds:.0f} s undisturbed, {time.monotonic() - began:.0f} s disturbed",
         flush=True,
     )
@@ -211,7 +212,8 @@ class _Run:
         assert self.process is not None
         if self.process.returncode not in (0, 1):
             raise SystemExit(
-                f"{' '.join(self.words)} ended with {self.process.returncode}: see {self.output}/output.txt"
+                f"{' '.join(self.words)} ended with {self.process.returncode}: see "
+                f"{self.output}/output.txt"
             )
 
     def shards(self) -> list[Path]:
@@ -318,7 +320,8 @@ class _Listener(ThreadingHTTPServer):
 
 
 class _Server:
-    """A server of chat completions that depend only on the request; if `disturbing`, some requests fail."""
+    """A server of chat completions that depend only on the request; if `disturbing`, some requests
+    fail."""
 
     def __init__(self, every: int) -> None:
         self.disturbing = False

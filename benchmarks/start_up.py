@@ -1,12 +1,14 @@
-"""Measure the time from a typed command to the first question, and to the end of commands that only print.
+"""Measure the time from a typed command to the first question, and to the end of commands that only
+print.
 
     python benchmarks/start_up.py [--rounds 5] [--against CHECKOUT] [--only NAME ...]
 
-It prints one JSON object: for each command the median seconds and processor seconds until the first question is asked
-and until its reply is there (on nieh_mini), or until the command has ended. A "first run" has an empty user cache: what
-can be guessed of the questions is not known yet. A first round, which does not count, puts all files into memory. With
---against each round runs both checkouts by turns, so that whatever else the machine does hits both; processor seconds
-vary less than seconds.
+It prints one JSON object: for each command the median seconds and processor seconds until the first
+question is asked and until its reply is there (on nieh_mini), or until the command has ended. A
+"first run" has an empty user cache: what can be guessed of the questions is not known yet. A first
+round, which does not count, puts all files into memory. With --against each round runs both
+checkouts by turns, so that whatever else the machine does hits both; processor seconds vary less
+than seconds.
 """
 
 import argparse
@@ -42,7 +44,8 @@ _ANSWERING = "infthor_eval.nieh.asking.answering"
 
 
 class _Stopwatch(MetaPathFinder, Loader):
-    """Times the first call of an answerer; it waits for the import of their module, so as not to cause it."""
+    """Times the first call of an answerer; it waits for the import of their module, so as not to
+    cause it."""
 
     def __init__(self) -> None:
         self.times: dict[str, tuple[float, float]] = {}
@@ -111,7 +114,8 @@ def measure(checkout: Path, name: str, output: Path, shown: Path) -> dict[str, f
         start = time.time()
         done = subprocess.run(
             [sys.executable, __file__, "--execute", *arguments, *where],
-            env=os.environ | {"PYTHONPATH": str(checkout), "OMP_NUM_THREADS": "1", "XDG_CACHE_HOME": cache},
+            env=os.environ | {"PYTHONPATH": str(checkout), "OMP_NUM_THREADS": "1",
+                              "XDG_CACHE_HOME": cache},
             capture_output=True, text=True, check=True,
         )  # fmt: skip
     times = json.loads(done.stdout.splitlines()[-1])
@@ -130,9 +134,11 @@ def compare(checkouts: dict[str, Path], names: list[str], rounds: int) -> dict[s
     with tempfile.TemporaryDirectory() as folder:
         output, shown = Path(folder), Path(folder, "shown")
         subprocess.run(
-            [sys.executable, "-c", "from infthor_eval.cli import main; main()", *_COMMANDS["oracle"], "--quiet",
+            [sys.executable, "-c", "from infthor_eval.cli import main; main()",
+             *_COMMANDS["oracle"], "--quiet",
              "--output", str(shown)],
-            env=os.environ | {"PYTHONPATH": str(checkouts["this"])}, stdout=subprocess.DEVNULL, check=True,
+            env=os.environ | {"PYTHONPATH": str(checkouts["this"])}, stdout=subprocess.DEVNULL,
+            check=True,
         )  # fmt: skip
         for number in range(rounds + 1):
             for name in names:

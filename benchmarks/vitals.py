@@ -1,10 +1,12 @@
-"""Has a figure moved that no change may move unseen? Measure those in vitals.json, beside their last committed values.
+"""Has a figure moved that no change may move unseen? Measure those in vitals.json, beside their
+last committed values.
 
     python benchmarks/vitals.py [--data FOLDER] [--only WORD ...] [--commit "why"]
 
-Prints a line for each figure. Exit code 1 if one has moved beyond its noise; then the change is mended, or it is meant
-so and --commit writes the new value with the commit, the date and why. A command that needs recorded data is left out,
-and said so, without --data. Samples are fixed: vitals.json has the commands.
+Prints a line for each figure. Exit code 1 if one has moved beyond its noise; then the change is
+mended, or it is meant so and --commit writes the new value with the commit, the date and why. A
+command that needs recorded data is left out, and said so, without --data. Samples are fixed:
+vitals.json has the commands.
 """
 
 import argparse
@@ -31,8 +33,8 @@ class Figure(msgspec.Struct, omit_defaults=True):
 
     Attributes:
         name: what is measured, and of what.
-        path: where the number is in the JSON that the command prints: keys and indices joined by dots; two such paths
-            with " / " between them are divided.
+        path: where the number is in the JSON that the command prints: keys and indices joined by
+            dots; two such paths with " / " between them are divided.
         value: last committed value; None: never measured.
         aim: value to be reached.
         noise: difference from run to run that says nothing.
@@ -77,7 +79,8 @@ class Outcome(msgspec.Struct):
 
     @property
     def has_moved(self) -> bool:
-        """Whether it is farther from its committed value than noise takes it, or could not be measured."""
+        """Whether it is farther from its committed value than noise takes it, or could not be
+        measured."""
         if self.now is None:
             return bool(self.problem)
         return (
@@ -91,7 +94,10 @@ class Outcome(msgspec.Struct):
         if self.now is None:
             return f"{figure.name:62} {self.problem or 'left out: needs --data'}"
         verdict = "new" if figure.value is None else "MOVED" if self.has_moved else ""
-        return f"{figure.name:62} {_text(self.now):>9} {_text(figure.value):>9} {_text(figure.aim):>9}  {verdict}"
+        return (
+            f"{figure.name:62} {_text(self.now):>9} {_text(figure.value):>9} "
+            f"{_text(figure.aim):>9}  {verdict}"
+        )
 
 
 def measure(measurement: Measurement, data: Path | None) -> list[Outcome]:
@@ -101,7 +107,8 @@ def measure(measurement: Measurement, data: Path | None) -> list[Outcome]:
     with tempfile.TemporaryDirectory() as scratch:
         words = _words(measurement.command, {_DATA: str(data), _SCRATCH: scratch})
         done = subprocess.run(words, cwd=ROOT, capture_output=True, check=False)
-    # A benchmark may end with 1, as some tell by that what they found; what it found is in what it printed.
+    # A benchmark may end with 1, as some tell by that what they found; what it found is in what it
+    # printed.
     try:
         document = json.loads(done.stdout)
     except ValueError:
@@ -130,7 +137,8 @@ def number_at(document: Any, path: str) -> float:
 
 
 def measure_all(measurements: Sequence[Measurement], data: Path | None) -> Iterable[Outcome]:
-    """Yield all outcomes: first what measures no time, two commands at once, then the others one by one."""
+    """Yield all outcomes: first what measures no time, two commands at once, then the others one by
+    one."""
     untimed = [measurement for measurement in measurements if not measurement.is_timed]
     with ThreadPoolExecutor(2) as pool:
         for outcomes in pool.map(lambda measurement: measure(measurement, data), untimed):
@@ -157,7 +165,8 @@ def commit(outcomes: Iterable[Outcome], why: str) -> None:
 
 
 def _words(command: Sequence[str], folders: dict[str, str]) -> list[str]:
-    """Return a command as it is run: by this environment's programs, and with folders for the names of such."""
+    """Return a command as it is run: by this environment's programs, and with folders for the names
+    of such."""
     program = (
         sys.executable
         if command[0] == "python"
@@ -196,7 +205,8 @@ def main() -> int:
     moved = sum(outcome.has_moved for outcome in outcomes)
     if moved:
         print(
-            f"{moved} moved: mend the change, or, if it is meant so: python benchmarks/vitals.py --commit WHY"
+            f"{moved} moved: mend the change, or, if it is meant so: python benchmarks/vitals.py "
+            "--commit WHY"
         )
     return 1 if moved and not options.commit else 0
 

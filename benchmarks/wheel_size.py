@@ -17,7 +17,8 @@ QUIETLY = ("--quiet", "--disable-pip-version-check", "--no-index", "--no-deps")
 
 
 def build_wheel(scratch: Path) -> Path:
-    """Return the path of a wheel built from a copy of the sources in an empty folder: setuptools writes into it."""
+    """Return the path of a wheel built from a copy of the sources in an empty folder: setuptools
+    writes into it."""
     source, out = scratch / "source", scratch / "wheel"
     for name in SOURCES:
         shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))

@@ -2,9 +2,10 @@
 
     python benchmarks/workers.py [--workers 2] [--scenes 6] [--steps 150] [--cluster] [--out DIR]
 
-Trajectories and questions are generated and replayed, and a tiny model answers questions on their clue frames
-(`nieh_mini_gt`): with one worker, with several processes and, with --cluster, on a Ray cluster of two nodes that this
-script starts. Every process has one thread, so that a worker uses one core.
+Trajectories and questions are generated and replayed, and a tiny model answers questions on their
+clue frames (`nieh_mini_gt`): with one worker, with several processes and, with --cluster, on a Ray
+cluster of two nodes that this script starts. Every process has one thread, so that a worker uses
+one core.
 """
 
 import argparse

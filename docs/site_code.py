@@ -1,4 +1,5 @@
-"""Blocks of code in the site: those with columns (tables, drawings) fit, others are wrapped (a hook of mkdocs).
+"""Blocks of code in the site: those with columns (tables, drawings) fit, others are wrapped (a hook
+of mkdocs).
 
 `site/site.css` makes the letters of a block with columns as small as its longest line needs.
 """

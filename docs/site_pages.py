@@ -1,7 +1,8 @@
 """Pages of the site that lie outside docs/, and links between all pages (a hook of mkdocs).
 
-Every page is written to be read in the repository, so a link leads to where a file lies there; here it is made one to
-where the page stands in the site. A link to a file that is no page is left as it is, and `--strict` names it.
+Every page is written to be read in the repository, so a link leads to where a file lies there; here
+it is made one to where the page stands in the site. A link to a file that is no page is left as it
+is, and `--strict` names it.
 """
 
 import posixpath

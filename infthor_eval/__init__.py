@@ -18,11 +18,13 @@ def load_run(folder: str | os.PathLike[str]) -> DataFrame:
     """Return the samples of a run, of any suite, as a data frame of pandas.
 
     Args:
-        folder: folder of the run ("results/oracle/nieh_mini_gt-HASH"); the run may still be going on.
+        folder: folder of the run ("results/oracle/nieh_mini_gt-HASH"); the run may still be going
+            on.
 
     Returns:
-        A row per sample (a question, a plan, an episode of an arm). Numbers are numbers: scores (1 is right, NaN does
-        not count), seconds, tokens, clues. docs/formats.md lists the columns. A cell without a value is NaN.
+        A row per sample (a question, a plan, an episode of an arm). Numbers are numbers: scores (1
+        is right, NaN does not count), seconds, tokens, clues. docs/formats.md lists the columns. A
+        cell without a value is NaN.
 
     Raises:
         DataError: there is no journal in the folder, or one with a bad line, or of another format.

@@ -17,5 +17,6 @@ __all__ = ["load_run"]
 
 
 def load_run(folder: str | os.PathLike[str]) -> DataFrame:
-    """Return the samples of the run in a folder, a row each; `infthor_eval.load_run` documents it."""
+    """Return the samples of the run in a folder, a row each; `infthor_eval.load_run` documents
+    it."""
     return sample_table(read_report_runs([Path(folder)], find_suite, find_presenter)).to_pandas()

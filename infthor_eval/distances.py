@@ -6,7 +6,8 @@ from itertools import pairwise
 
 __all__ = ["DISTANCES", "LENGTHS", "distance_class", "length_class"]
 
-# Bins double in width, so that they serve trajectories of hundreds and of thousands of frames alike.
+# Bins double in width, so that they serve trajectories of hundreds and of thousands of frames
+# alike.
 _FRAMES = (0, 50, 100, 200, 400, 800, 1600, 3200)
 DISTANCES = (
     *(f"{low}-{high - 1}" for low, high in pairwise(_FRAMES)),

@@ -1,7 +1,7 @@
 """Errors meant for people.
 
-Every message is one line that says what is wrong, where, and how to fix it. The command line prints it without a
-traceback and exits with the error's `exit_code`.
+Every message is one line that says what is wrong, where, and how to fix it. The command line prints
+it without a traceback and exits with the error's `exit_code`.
 """
 
 import difflib
@@ -39,8 +39,8 @@ _LINE_BREAKS = {
 class InfthorError(Exception):
     """Base of all errors that the command line shows as one line.
 
-    Messages quote what is in files and replies, and that may be anything: line breaks are escaped, and the middle of a
-    very long message is left out.
+    Messages quote what is in files and replies, and that may be anything: line breaks are escaped,
+    and the middle of a very long message is left out.
     """
 
     exit_code = 2
@@ -57,7 +57,8 @@ class UsageError(InfthorError):
 
 
 class DataError(InfthorError):
-    """A file is missing or does not have the documented form; the message names the file and the place in it."""
+    """A file is missing or does not have the documented form; the message names the file and the
+    place in it."""
 
 
 class ModelError(InfthorError):
@@ -65,7 +66,8 @@ class ModelError(InfthorError):
 
 
 class UserCodeError(InfthorError):
-    """Code that is not this package's raised an unexpected exception, which is the cause of this one."""
+    """Code that is not this package's raised an unexpected exception, which is the cause of this
+    one."""
 
 
 class AdapterError(UserCodeError, ModelError):
@@ -83,7 +85,8 @@ class SceneError(SimulatorError):
 
 
 def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
-    """Return the error for an unknown name of a kind ("task"); it suggests the closest known name, or lists all."""
+    """Return the error for an unknown name of a kind ("task"); it suggests the closest known name,
+    or lists all."""
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names)}"
@@ -91,7 +94,8 @@ def unknown_name(what: str, name: str, known: Iterable[str]) -> UsageError:
 
 
 def in_one_line(error: BaseException) -> str:
-    """Return the message of another library's error as one line, short enough to be part of our message."""
+    """Return the message of another library's error as one line, short enough to be part of our
+    message."""
     reason = error.strerror if isinstance(error, OSError) else None  # `str` would repeat the path
     text = " ".join((reason or str(error)).split()) or type(error).__name__
     if isinstance(error, KeyError):  # its text is only the key
@@ -114,7 +118,8 @@ def wrap_errors(
     catch: type[BaseException] | tuple[type[BaseException], ...] = OSError,
     raise_as: type[InfthorError] = DataError,
 ) -> Iterator[None]:
-    """Turn errors of another library or of the system into a one-line error for people; our own pass unchanged.
+    """Turn errors of another library or of the system into a one-line error for people; our own
+    pass unchanged.
 
     Args:
         problem: the problem and its place ("set.json: not JSON").

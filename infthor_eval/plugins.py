@@ -1,4 +1,5 @@
-"""Classes and functions by name, of this package and of others: a built-in table first, then entry points.
+"""Classes and functions by name, of this package and of others: a built-in table first, then entry
+points.
 
 They are imported only when they are asked for, so that `--help` stays quick.
 """
@@ -47,7 +48,8 @@ class PluginTable:
         """Import the class of a name; one of another package must have the members of the protocol.
 
         Raises:
-            UsageError: there is no such name, or another package's class cannot be imported or lacks a member.
+            UsageError: there is no such name, or another package's class cannot be imported or
+                lacks a member.
         """
         if name in self.built_in:  # first: no package can change what a built-in name means
             return import_target(self.built_in[name])
@@ -69,7 +71,8 @@ class PluginTable:
         missing = [member for member in members if not hasattr(loaded, member)]
         if missing:
             raise UsageError(
-                f"the {self.kind} {name} of another package lacks {', '.join(missing)}; see {self.docs}"
+                f"the {self.kind} {name} of another package lacks {', '.join(missing)}; see "
+                f"{self.docs}"
             )
         return loaded
 
@@ -84,10 +87,11 @@ def import_target(target: str) -> Any:
 
 @contextmanager
 def collecting_no_garbage() -> Iterator[None]:
-    """Pause garbage collection, and let later collections pass over what was made meanwhile, which modules keep.
+    """Pause garbage collection, and let later collections pass over what was made meanwhile, which
+    modules keep.
 
-    Importing torch and transformers makes a million objects, and collections look at them again and again: a quarter
-    of the time from the command to a small model's first question.
+    Importing torch and transformers makes a million objects, and collections look at them again and
+    again: a quarter of the time from the command to a small model's first question.
     """
     if not gc.isenabled():
         yield

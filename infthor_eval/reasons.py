@@ -9,12 +9,14 @@ __all__ = ["count_reasons"]
 
 _Where = TypeVar("_Where", str, tuple[str, str])  # a task, or a task and the outcome of its units
 
-# A number that is a word of its own. Numbers in paths, names and ids are not merged: they tell things apart.
+# A number that is a word of its own. Numbers in paths, names and ids are not merged: they tell
+# things apart.
 _NUMBER = re.compile(r"(?<![\w/.,-])\d+(?:,\d{3})*(?:\.\d+)?(?![\w/]|[.,-]\w)")
 
 
 def count_reasons(reasons: Iterable[tuple[_Where, str]]) -> list[tuple[_Where, str, int]]:
-    """Count reasons by task (or task and outcome), in alphabetical order; numbers that differ are given as a range."""
+    """Count reasons by task (or task and outcome), in alphabetical order; numbers that differ are
+    given as a range."""
     groups: dict[tuple[_Where, str], list[str]] = defaultdict(list)
     for where, reason in reasons:
         groups[where, _NUMBER.sub("#", reason)].append(reason)

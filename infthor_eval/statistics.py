@@ -1,7 +1,8 @@
 """Means of scores with 95 % intervals that are clustered by trajectory.
 
-Questions on one trajectory share its frames, scene and objects, so their scores are correlated. The independent unit
-is the trajectory. Every interval here sums or resamples over trajectories, through one partition (`_partition`).
+Questions on one trajectory share its frames, scene and objects, so their scores are correlated. The
+independent unit is the trajectory. Every interval here sums or resamples over trajectories, through
+one partition (`_partition`).
 """
 
 import math
@@ -28,7 +29,8 @@ _LEVEL = 0.95
 
 @dataclass(frozen=True)
 class MeanEstimate:
-    """The mean of n scores with its clustered standard error and 95 % interval, which need not be symmetric.
+    """The mean of n scores with its clustered standard error and 95 % interval, which need not be
+    symmetric.
 
     Error and interval are None with fewer than two clusters.
     """
@@ -55,9 +57,9 @@ class Difference:
 def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> MeanEstimate:
     """Return the mean with a cluster-robust standard error and a 95 % interval.
 
-    If all scores lie between 0 and 1, the interval is of Wilson's type on the effective sample size, so it stays valid
-    near 0 and 1 and is not empty where all scores are equal. Other scores (the reference scorer can exceed 1) get a t
-    interval with `n_clusters - 1` degrees of freedom.
+    If all scores lie between 0 and 1, the interval is of Wilson's type on the effective sample
+    size, so it stays valid near 0 and 1 and is not empty where all scores are equal. Other scores
+    (the reference scorer can exceed 1) get a t interval with `n_clusters - 1` degrees of freedom.
 
     Raises:
         DataError: there is no score, or a score has no cluster.
@@ -71,10 +73,11 @@ def clustered_mean(scores: Sequence[float], clusters: Sequence[Hashable]) -> Mea
 
 
 def mean_over_clusters(values: Sequence[float]) -> MeanEstimate:
-    """Return the mean and t interval of values with one per cluster (such as the rewards of trajectories).
+    """Return the mean and t interval of values with one per cluster (such as the rewards of
+    trajectories).
 
-    Unlike `clustered_mean`, this never takes values for shares: the points of a reward curve that happen to lie between
-    0 and 1 get the same kind of interval as all others.
+    Unlike `clustered_mean`, this never takes values for shares: the points of a reward curve that
+    happen to lie between 0 and 1 get the same kind of interval as all others.
 
     Raises:
         DataError: there is no value.
@@ -87,8 +90,8 @@ def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> MeanEstimate:
     mean = float(totals.sum() / n)
     if n_clusters < 2:
         return MeanEstimate(mean, None, None, None, n, n_clusters)
-    # Clusters differ in size, so the mean is a ratio of two random sums. This linearises the ratio (Taylor): the
-    # residual of a cluster is its total minus what the mean predicts for its size.
+    # Clusters differ in size, so the mean is a ratio of two random sums. This linearises the ratio
+    # (Taylor): the residual of a cluster is its total minus what the mean predicts for its size.
     residuals = totals - mean * sizes
     stderr = math.sqrt(n_clusters / (n_clusters - 1) * float(residuals @ residuals)) / n
     margin = _t_quantile(n_clusters) * stderr
@@ -109,31 +112,37 @@ def _normal_quantile() -> float:
 def _effective_size(estimate: MeanEstimate) -> float:
     """Return the number of independent questions that would give as much information.
 
-    It is the number of questions over the design effect, the factor by which clustering inflates the variance. The
-    coverage of the resulting interval is measured by `benchmarks/interval_coverage.py`.
+    It is the number of questions over the design effect, the factor by which clustering inflates
+    the variance. The coverage of the resulting interval is measured by
+    `benchmarks/interval_coverage.py`.
     """
     # If each cluster is right or wrong as a whole, a cluster counts as one question.
     worst = estimate.n / estimate.n_clusters
     variance, stderr = estimate.mean * (1 - estimate.mean), estimate.stderr or 0.0
-    # At least 1: clusters that happen to be more alike than chance are no evidence for more than `n` questions.
+    # At least 1: clusters that happen to be more alike than chance are no evidence for more than
+    # `n` questions.
     measured = max(1.0, stderr**2 * estimate.n / variance) if variance > 0 else worst
     # The effect is itself estimated on few clusters, which widens the interval as in a t interval.
     measured *= (_t_quantile(estimate.n_clusters) / _normal_quantile()) ** 2
-    # Only the rarer outcome tells how strongly clusters agree. Where it is rare, the measured effect is unreliable and
-    # the worst case gets more weight: that of one question beside `n_rare` observed ones.
+    # Only the rarer outcome tells how strongly clusters agree. Where it is rare, the measured
+    # effect is unreliable and the worst case gets more weight: that of one question beside `n_rare`
+    # observed ones.
     n_rare = estimate.n * min(estimate.mean, 1 - estimate.mean)
     return estimate.n / ((n_rare * measured + worst) / (n_rare + 1))
 
 
 def _wilson(mean: float, n: float) -> tuple[float, float]:
-    """Return Wilson's score interval of a share among `n` questions (Wilson 1927, with z the normal quantile).
+    """Return Wilson's score interval of a share among `n` questions (Wilson 1927, with z the normal
+    quantile).
 
-    centre = (mean + z²/2n) / (1 + z²/n), margin = z / (1 + z²/n) * sqrt(mean (1 - mean) / n + z²/4n²)
+    centre = (mean + z²/2n) / (1 + z²/n), margin = z / (1 + z²/n) * sqrt(mean (1 - mean) / n +
+    z²/4n²)
     """
     spread = _normal_quantile() ** 2 / n
     centre = (mean + spread / 2) / (1 + spread)
     margin = _normal_quantile() / (1 + spread) * math.sqrt(mean * (1 - mean) / n + spread / (4 * n))
-    # The interval holds the mean and lies within [0, 1] exactly; rounding alone could break both at 0 and 1.
+    # The interval holds the mean and lies within [0, 1] exactly; rounding alone could break both at
+    # 0 and 1.
     return max(0.0, min(mean, centre - margin)), min(1.0, max(mean, centre + margin))
 
 
@@ -142,8 +151,8 @@ def bootstrap_interval(
 ) -> tuple[float, float] | None:
     """Return the 95 % percentile interval of the mean over resampled clusters.
 
-    It is None where resampling has nothing to vary: with fewer than two clusters, or if all scores are equal. The same
-    seed and the same order of clusters give the same interval.
+    It is None where resampling has nothing to vary: with fewer than two clusters, or if all scores
+    are equal. The same seed and the same order of clusters give the same interval.
 
     Raises:
         DataError: as in `clustered_mean`.
@@ -160,14 +169,16 @@ def bootstrap_interval(
 def paired_difference(
     first: Sequence[float], second: Sequence[float], clusters: Sequence[Hashable]
 ) -> Difference:
-    """Return the mean difference of the scores of two runs on the same questions in the same order, second minus first.
+    """Return the mean difference of the scores of two runs on the same questions in the same order,
+    second minus first.
 
     Raises:
         DataError: the runs differ in length, or as in `clustered_mean`.
     """
     if len(first) != len(second):
         raise DataError(
-            f"{len(first)} and {len(second)} scores cannot be paired; compare runs on the same questions"
+            f"{len(first)} and {len(second)} scores cannot be paired; compare runs on the same "
+            "questions"
         )
     totals, sizes = _partition([b - a for a, b in zip(first, second, strict=True)], clusters)
     estimate = _with_t_interval(totals, sizes)
@@ -184,12 +195,14 @@ def paired_difference(
 def _partition(
     scores: Sequence[float], clusters: Sequence[Hashable]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sum of scores and the number of questions per cluster, from which all else here is computed."""
+    """Return the sum of scores and the number of questions per cluster, from which all else here is
+    computed."""
     if not scores:
         raise DataError("there is no score to take the mean of")
     if len(scores) != len(clusters):
         raise DataError(
-            f"{len(scores)} scores but {len(clusters)} trajectories; each score needs its trajectory"
+            f"{len(scores)} scores but {len(clusters)} trajectories; each score needs its "
+            "trajectory"
         )
     for index, cluster in enumerate(clusters):
         if cluster is None or cluster == "":

@@ -1,8 +1,10 @@
-"""The suites by the names that task files use, with their presenters and their adapters for lm-eval's requests.
+"""The suites by the names that task files use, with their presenters and their adapters for
+lm-eval's requests.
 
-Each class is imported only when needed, so that `--help` stays quick. Other packages add theirs through entry points,
-as "module:Class" under the suite's name: the suite in `infthor_eval.suites`, its presenter in `infthor_eval.presenters`
-(without one it gets `PlainPresenter`), its adapter in `infthor_eval.lm_eval`.
+Each class is imported only when needed, so that `--help` stays quick. Other packages add theirs
+through entry points, as "module:Class" under the suite's name: the suite in `infthor_eval.suites`,
+its presenter in `infthor_eval.presenters` (without one it gets `PlainPresenter`), its adapter in
+`infthor_eval.lm_eval`.
 """
 
 from collections.abc import Iterable, Mapping
@@ -25,7 +27,8 @@ if TYPE_CHECKING:
     from infthor_eval.report.presenter import Presenter
     from infthor_eval.runs import Suite, TaskFile
 
-    # mypy holds the built-in suites to the protocol here: `find_suite`, which imports them by name, cannot.
+    # mypy holds the built-in suites to the protocol here: `find_suite`, which imports them by name,
+    # cannot.
     _PROTOCOL: tuple[
         Suite[NiehUnit, NiehAnswer], Suite[ArmUnit, ArmRecord], Suite[PlanUnit, PlanRecord]
     ]
@@ -44,7 +47,8 @@ __all__ = [
 
 
 class _BuiltIn(NamedTuple):
-    """A suite of this package: "module:Class" of each part, and names of its baselines, listed without importing it."""
+    """A suite of this package: "module:Class" of each part, and names of its baselines, listed
+    without importing it."""
 
     suite: str
     options: str
@@ -110,7 +114,8 @@ def find_suite(name: str) -> "Suite[Any, Any]":
     suite_class = _SUITES.load(name, Suite)
     if suite_class.name != name:
         raise UsageError(
-            f"the suite {name} of another package calls itself {suite_class.name!r}; give it one name"
+            f"the suite {name} of another package calls itself {suite_class.name!r}; give it one "
+            "name"
         )
     return suite_class()
 
@@ -148,7 +153,8 @@ def options_class(name: str) -> type:
 
 
 def suite_code(name: str) -> dict[str, Any]:
-    """Return package, version and source digest of another package's suite as JSON values; {} for a built-in one.
+    """Return package, version and source digest of another package's suite as JSON values; {} for a
+    built-in one.
 
     Raises:
         ModelError: its source cannot be read.

@@ -16,7 +16,8 @@ class TableCell(str):
     """Text of a cell that holds several numbers, and each of them for files.
 
     Attributes:
-        numbers: the numbers by name, as text; the main one has an empty name, missing ones are empty.
+        numbers: the numbers by name, as text; the main one has an empty name, missing ones are
+            empty.
     """
 
     __slots__ = ("numbers",)
@@ -32,7 +33,8 @@ class TableCell(str):
 def interval_cell(
     low: float | None, high: float | None, form: str = ".1f", pattern: str = "[{}, {}]"
 ) -> TableCell:
-    """Return a cell with an interval, its ends formatted and in the places of the pattern; `-` if there is none."""
+    """Return a cell with an interval, its ends formatted and in the places of the pattern; `-` if
+    there is none."""
     if low is None or high is None:
         return TableCell("-", {"low": "", "high": ""})
     ends = {"low": f"{low:{form}}", "high": f"{high:{form}}"}
@@ -49,7 +51,8 @@ class Column:
 
 @dataclass(frozen=True)
 class Row:
-    """A row: a text per column (missing ones at the end are empty), of published numbers or our own.
+    """A row: a text per column (missing ones at the end are empty), of published numbers or our
+    own.
 
     Attributes:
         ends_section: True if a line is drawn below it.
@@ -62,7 +65,8 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of at least one column, with a title of one line (empty for none), and notes below, a paragraph each."""
+    """A table of at least one column, with a title of one line (empty for none), and notes below, a
+    paragraph each."""
 
     title: str
     columns: tuple[Column, ...]
@@ -74,8 +78,9 @@ def left_out_notes(runs: Sequence[Sequence[tuple[Reasons, Reasons]]]) -> list[st
     """Return notes on units that do not count, by reason.
 
     Args:
-        runs: for each run and each of its tasks the number of excluded and of skipped units, by reason. The tasks of a
-            run read the same files and runs side by side leave out the same, so these are not added up over runs.
+        runs: for each run and each of its tasks the number of excluded and of skipped units, by
+            reason. The tasks of a run read the same files and runs side by side leave out the same,
+            so these are not added up over runs.
     """
     reasons: Counter[str] = Counter()
     for tasks in runs:

@@ -1,7 +1,8 @@
 """The one place where text is written to the terminal.
 
-Names, questions and replies come from data and models. They are shown as plain text: no rich markup, no emoji codes,
-and no control characters, which could move the cursor, colour what follows or rename the window.
+Names, questions and replies come from data and models. They are shown as plain text: no rich
+markup, no emoji codes, and no control characters, which could move the cursor, colour what follows
+or rename the window.
 """
 
 import unicodedata
@@ -78,7 +79,8 @@ class _Description(TextColumn):
 
 
 def progress_bar(on: Console) -> Progress:
-    """Return a bar that disappears when the work is done; it draws nothing where there is no terminal."""
+    """Return a bar that disappears when the work is done; it draws nothing where there is no
+    terminal."""
     columns = (_Description(), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     return Progress(*columns, console=on, transient=True, disable=not on.is_terminal)
 

@@ -1,8 +1,9 @@
 """The embedded simulator: a process that takes the place of the Unity build of AI2-THOR.
 
 `python -m infthor_sim` speaks the FIFO protocol of ai2thor 5.0.0, so the unmodified
-`ai2thor.controller.Controller` drives it through `local_executable_path`. No other package imports this one; all use
-it as that process. Its geometry is calibrated on recordings of AI2-THOR, its looks are not.
+`ai2thor.controller.Controller` drives it through `local_executable_path`. No other package imports
+this one; all use it as that process. Its geometry is calibrated on recordings of AI2-THOR, its
+looks are not.
 
 It differs from Unity on purpose in these points (docs/simulator.md lists all of them by action):
 
@@ -11,6 +12,6 @@ It differs from Unity on purpose in these points (docs/simulator.md lists all of
 - What the agent holds is stopped by the outer walls only while it walks.
 - An object has one parent receptacle, the innermost.
 - In a recorded floor plan the agent can stand only on the cells of the recording.
-- In a recorded floor plan a pick-up may reach what only the coarse box of its open receptacle hides. `visible` stays
-  false then.
+- In a recorded floor plan a pick-up may reach what only the coarse box of its open receptacle
+  hides. `visible` stays false then.
 """

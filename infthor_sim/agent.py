@@ -23,7 +23,8 @@ class Agent:
         yaw: direction, degrees clockwise from +z.
         horizon: tilt of the camera below the horizon, degrees.
         standing: not crouching.
-        eye: camera relative to the agent's position (right, up, ahead), metres; the stretch robot's is off centre.
+        eye: camera relative to the agent's position (right, up, ahead), metres; the stretch robot's
+            is off centre.
         crouch: metres that crouching lowers the camera; 0 for a robot that cannot crouch.
     """
 

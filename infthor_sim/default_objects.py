@@ -1,4 +1,5 @@
-"""Objects of their type's usual size: for procedural scenes, and for what a recording names without describing."""
+"""Objects of their type's usual size: for procedural scenes, and for what a recording names without
+describing."""
 
 import numpy as np
 

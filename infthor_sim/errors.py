@@ -25,7 +25,8 @@ class ErrorCode(StrEnum):
 
 
 class ActionError(Exception):
-    """An action that the world refuses: the reply has `lastActionSuccess` false and this message and code."""
+    """An action that the world refuses: the reply has `lastActionSuccess` false and this message
+    and code."""
 
     def __init__(self, message: str, code: ErrorCode = ErrorCode.NONE) -> None:
         super().__init__(message)

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Array", "aabb_gap", "aabb_overlap", "convex_hull", "corners", "cross", "euler_matrix", "level_gaps",
-    "matrix_euler", "object_id", "round_vector", "round_xyz", "to_array", "to_xyz", "wrap_degrees", "yaw_matrix",
+    "Array", "aabb_gap", "aabb_overlap", "convex_hull", "corners", "cross", "euler_matrix",
+    "level_gaps",
+    "matrix_euler", "object_id", "round_vector", "round_xyz", "to_array", "to_xyz", "wrap_degrees",
+    "yaw_matrix",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -32,7 +34,8 @@ _CORNERS = np.array(  # of a box, in the order of AI2-THOR's `cornerPoints`
 
 
 def euler_matrix(rotation: Sequence[float] | Array) -> Array:
-    """Return the rotation matrix (3, 3) of Unity's Euler angles (x, y, z) in degrees: first z, then x, then y."""
+    """Return the rotation matrix (3, 3) of Unity's Euler angles (x, y, z) in degrees: first z, then
+    x, then y."""
     x, y, z = (math.radians(float(a)) for a in rotation)
     cx, sx, cy, sy, cz, sz = (
         math.cos(x),
@@ -52,12 +55,14 @@ def euler_matrix(rotation: Sequence[float] | Array) -> Array:
 
 
 def yaw_matrix(yaw: float) -> Array:
-    """Return the rotation matrix (3, 3) about the vertical by `yaw` degrees; 0 looks along +z, 90 along +x."""
+    """Return the rotation matrix (3, 3) about the vertical by `yaw` degrees; 0 looks along +z, 90
+    along +x."""
     return euler_matrix((0.0, yaw, 0.0))
 
 
 def matrix_euler(matrix: Array) -> Array:
-    """Return Unity's Euler angles (3,) of a rotation matrix, degrees within 0 to 360; straight up or down, z is 0."""
+    """Return Unity's Euler angles (3,) of a rotation matrix, degrees within 0 to 360; straight up
+    or down, z is 0."""
     x = math.asin(min(max(-float(matrix[1, 2]), -1.0), 1.0))  # clamped, as rounding may exceed 1
     if abs(math.cos(x)) < _VERTICAL:
         y, z = math.atan2(-matrix[2, 0], matrix[0, 0]), 0.0
@@ -73,19 +78,22 @@ def wrap_degrees(angle: float) -> float:
 
 
 def corners(center: Array, size: Array, rotation: Array | None = None) -> Array:
-    """Return the 8 corners (8, 3) of a box, bottom four first, in AI2-THOR's order; `rotation` is a matrix."""
+    """Return the 8 corners (8, 3) of a box, bottom four first, in AI2-THOR's order; `rotation` is a
+    matrix."""
     offsets = _CORNERS * (np.asarray(size) * 0.5)
     return center + (offsets if rotation is None else offsets @ rotation.T)
 
 
 def cross(first: Array, second: Array) -> Array:
-    """Return cross products (n, 3) of vectors (n, 3); for few of them much faster than numpy's own."""
+    """Return cross products (n, 3) of vectors (n, 3); for few of them much faster than numpy's
+    own."""
     (ax, ay, az), (bx, by, bz) = first.T, second.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def convex_hull(points: Array) -> list[Array]:
-    """Return the corners of the convex hull of points (n, 2), in order around it; none lies between two others."""
+    """Return the corners of the convex hull of points (n, 2), in order around it; none lies between
+    two others."""
     # Andrew's monotone chain. Rounding merges corners of upright boxes, which coincide from above.
     ordered = [
         np.array(p) for p in sorted({(float(p[0]), float(p[1])) for p in np.round(points, 6)})
@@ -124,19 +132,22 @@ def round_vector(vector: Array, digits: int = 4) -> list[float]:
 
 
 def round_xyz(vector: Array) -> dict[str, float]:
-    """Return a position or angles (3,) as the metadata has them: `{"x", "y", "z"}` with 6 digits."""
+    """Return a position or angles (3,) as the metadata has them: `{"x", "y", "z"}` with 6
+    digits."""
     return to_xyz(round_vector(vector, 6))
 
 
 def object_id(object_type: str, position: Sequence[float] | Array) -> str:
-    """Return AI2-THOR's id of an object that starts at `position`, e.g. `Mug|-01.90|+00.94|+00.38`."""
+    """Return AI2-THOR's id of an object that starts at `position`, e.g.
+    `Mug|-01.90|+00.94|+00.38`."""
     return "|".join([object_type, *(_coordinate_text(float(v)) for v in position)])
 
 
 def _coordinate_text(value: float) -> str:
     """Return a coordinate as Unity's Mono prints it in ids."""
-    # Mono prints the single-precision number with 7 digits first and rounds that text to two decimals, halves away from
-    # zero. A negative number that rounds to zero loses its sign: `00.00`. Ids of recordings must match to the letter.
+    # Mono prints the single-precision number with 7 digits first and rounds that text to two
+    # decimals, halves away from zero. A negative number that rounds to zero loses its sign:
+    # `00.00`. Ids of recordings must match to the letter.
     decimal = Decimal(f"{float(np.float32(value)):.7g}").quantize(Decimal("0.01"), ROUND_HALF_UP)
     sign = "+" if value >= 0 else "-" if decimal else ""
     return f"{sign}{abs(decimal):05.2f}"
@@ -154,7 +165,8 @@ def aabb_gap(point: Array, low: Array, high: Array) -> float:
 
 
 def level_gaps(points: Array, low: Array, high: Array) -> Array:
-    """Return horizontal metres from points (x, z), (n, 2) or (2,), to a box given by its corners (3,)."""
+    """Return horizontal metres from points (x, z), (n, 2) or (2,), to a box given by its corners
+    (3,)."""
     nearest = np.clip(points, low[[0, 2]], high[[0, 2]])
     gaps: Array = np.hypot(*(points - nearest).T)
     return gaps

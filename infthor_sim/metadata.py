@@ -17,9 +17,11 @@ __all__ = ["Outcome", "agent_metadata", "object_metadata", "third_party_metadata
 
 _ITHOR = re.compile(r"FloorPlan\d+")
 _LEGACY: dict[str, Any] = {
-    "colorBounds": None, "visibleRange": None, "flatSurfacesOnGrid": [], "distances": [], "normals": [],
+    "colorBounds": None, "visibleRange": None, "flatSurfacesOnGrid": [], "distances": [],
+    "normals": [],
     "isOpenableGrid": [], "segmentedObjectIds": [], "objectIdsInBox": [], "actionIntReturn": 0,
-    "actionFloatReturn": 0.0, "actionFloatsReturn": [], "actionStringsReturn": [], "actionVector3sReturn": [],
+    "actionFloatReturn": 0.0, "actionFloatsReturn": [], "actionStringsReturn": [],
+    "actionVector3sReturn": [],
 }  # fmt: skip
 """Keys of old actions, which Unity sends empty with every reply."""
 
@@ -49,7 +51,8 @@ class Outcome:
 
 
 def object_metadata(item: SimObject) -> dict[str, Any]:
-    """Return all fields of one object but those that depend on the agent: `visible`, `isInteractable`, `distance`."""
+    """Return all fields of one object but those that depend on the agent: `visible`,
+    `isInteractable`, `distance`."""
     abilities, state = item.type, item.state
     movable = abilities.pickupable or abilities.moveable
     return {
@@ -101,7 +104,8 @@ def object_metadata(item: SimObject) -> dict[str, Any]:
 
 
 def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
-    """Return the fields of the agent, of the scene and of the last action: all but `objects` and `colors`."""
+    """Return the fields of the agent, of the scene and of the last action: all but `objects` and
+    `colors`."""
     world, agent = sim.world, sim.world.agent
     held = None if world.held is None else world.objects[world.held]
     low, high = world.scene_bounds()
@@ -154,10 +158,11 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
 
 
 def _hand_pose(world: World) -> dict[str, Any]:
-    """Return the hand's pose in the world and in the camera's frame; all zeros where nothing is held.
+    """Return the hand's pose in the world and in the camera's frame; all zeros where nothing is
+    held.
 
-    AI2-THOR calls it the held object's, but it is the hand's: 0 in the camera's frame until the hand is turned,
-    however the object lies in it.
+    AI2-THOR calls it the held object's, but it is the hand's: 0 in the camera's frame until the
+    hand is turned, however the object lies in it.
     """
     if world.held is None:
         return dict.fromkeys(
@@ -174,9 +179,11 @@ def _hand_pose(world: World) -> dict[str, Any]:
 
 
 def _corners_with_lid(item: SimObject) -> Array:
-    """Return the 8 corners (8, 3) of an object's box, turned with it, which is higher by what its open lid stands up.
+    """Return the 8 corners (8, 3) of an object's box, turned with it, which is higher by what its
+    open lid stands up.
 
-    Only the metadata has the higher box: the lid's room is above the object's back and keeps nothing from its top.
+    Only the metadata has the higher box: the lid's room is above the object's back and keeps
+    nothing from its top.
     """
     lid = item.type.lid * float(item.front_size[2])
     rise = np.array([0.0, lid * np.sin(np.radians(DOOR_SWING * item.state.openness)), 0.0])

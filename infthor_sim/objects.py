@@ -17,7 +17,8 @@ WALL = 0.02  # thickness in metres of the sides and floors of hollow things
 
 @dataclass
 class SimObjectState:
-    """What actions change about an object, besides its pose; the names follow AI2-THOR's metadata."""
+    """What actions change about an object, besides its pose; the names follow AI2-THOR's
+    metadata."""
 
     openness: float = 0.0
     toggled: bool = False
@@ -44,11 +45,13 @@ class SimObject:
         box_center: centre of the box in the object's own frame, metres (3,).
         box_size: extents of the box in the object's own frame, metres (3,).
         asset_id: AI2-THOR's name of the model; empty for procedural objects.
-        front: yaw in degrees of the object's front relative to its own frame; doors and drawers open that way.
-        support: height in metres above the bottom of the box where things stand on it; None: the top of the box.
+        front: yaw in degrees of the object's front relative to its own frame; doors and drawers
+            open that way.
+        support: height in metres above the bottom of the box where things stand on it; None: the
+            top of the box.
         hinge: -1 or 1, the side of the door's hinge seen from the front; 0 without a hinge.
-        pieces: rectangles that the object covers seen from above, metres from the box's middle in the object's own
-            frame; empty if it covers its whole box.
+        pieces: rectangles that the object covers seen from above, metres from the box's middle in
+            the object's own frame; empty if it covers its whole box.
         hollow: its front is drawn open, as drawers or doors that are separate objects fill it.
         style: index that varies colours between objects of one type.
         parent: id of the receptacle that contains it.
@@ -104,8 +107,8 @@ class SimObject:
 
     def bounds(self) -> tuple[Array, Array]:
         """Return the low and high corner of the axis-aligned box in the world, metres."""
-        # Nearly every rule asks for bounds, and poses are replaced in many places. The arrays' bytes are the key, so
-        # that no setter can be forgotten.
+        # Nearly every rule asks for bounds, and poses are replaced in many places. The arrays'
+        # bytes are the key, so that no setter can be forgotten.
         key = b"".join(
             a.tobytes() for a in (self.position, self.rotation, self.box_center, self.box_size)
         )
@@ -121,7 +124,8 @@ class SimObject:
 
     @property
     def floors(self) -> tuple[float, ...]:
-        """Heights in metres above the underside of its box at which contents stand inside it, lowest first.
+        """Heights in metres above the underside of its box at which contents stand inside it,
+        lowest first.
 
         Placement and drawing both take them from here. Empty if nothing stands inside.
         """
@@ -133,7 +137,8 @@ class SimObject:
         return ()
 
     def place_bottom(self, point: Array) -> None:
-        """Move the object so that the middle of the underside of its box is at `point` (world, metres)."""
+        """Move the object so that the middle of the underside of its box is at `point` (world,
+        metres)."""
         low, high = self.bounds()
         middle = (low + high) / 2
         self.position = self.position + np.array(
@@ -141,7 +146,8 @@ class SimObject:
         )
 
     def duplicate(self, object_id: str) -> "SimObject":
-        """Return a copy of this object with a state of its own, another id, and neither parent nor contents."""
+        """Return a copy of this object with a state of its own, another id, and neither parent nor
+        contents."""
         return replace(
             self,
             object_id=object_id,

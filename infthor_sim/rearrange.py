@@ -36,10 +36,11 @@ class NamedPose:
 
 
 def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
-    """Give the named objects new poses, and new ids made of the poses; loose objects that are not named vanish.
+    """Give the named objects new poses, and new ids made of the poses; loose objects that are not
+    named vanish.
 
-    A name that the scene does not have means any object of its type: the part of a name after the type differs between
-    versions of AI2-THOR.
+    A name that the scene does not have means any object of its type: the part of a name after the
+    type differs between versions of AI2-THOR.
     """
     chooser = _Templates(world)
     world.release()
@@ -66,7 +67,8 @@ def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = Fa
 
 
 def _lower_supports(world: World) -> None:
-    """Lower surfaces that the placed objects would be sunk in: their poses are more exact than recorded boxes."""
+    """Lower surfaces that the placed objects would be sunk in: their poses are more exact than
+    recorded boxes."""
     for item in world.objects.values():
         if not _has_surface(item.type):
             continue
@@ -115,7 +117,8 @@ class _Templates:
         self._count: dict[str, int] = defaultdict(int)
 
     def choose(self, name: str) -> SimObject | None:
-        """Return the object that a name means; the same for the same name, and in turn for different ones."""
+        """Return the object that a name means; the same for the same name, and in turn for
+        different ones."""
         if name in self._named:
             return self._named[name]
         if name not in self._chosen:
@@ -162,7 +165,8 @@ def spawn_randomly(
             continue
         homes = [
             o for o in world.objects.values()
-            if o.type.receptacle and not o.type.pickupable and allowed_in(item.object_type, o.object_type)
+            if o.type.receptacle and not o.type.pickupable and allowed_in(item.object_type,
+                                                                          o.object_type)
             and o.object_type not in excluded_types and not (in_open_only and o.type.encloses)
         ]  # fmt: skip
         for home_index in random.permutation(len(homes)):

@@ -7,13 +7,15 @@ __all__ = ["AGENT_MODES", "ARM_MODES", "SMOOTH_LEVELS", "SMOOTH_QUALITIES", "Sim
 ARM_MODES = ("arm", "stretch")
 AGENT_MODES = ("default", *ARM_MODES)
 SMOOTH_QUALITIES = {"High": 5, "Very High": 6, "Ultra": 7, "High WebGL": 8}
-"""The `quality` values whose pictures are anti-aliased, with the numbers that the Controller passes to the player."""
+"""The `quality` values whose pictures are anti-aliased, with the numbers that the Controller passes
+to the player."""
 SMOOTH_LEVELS = frozenset(SMOOTH_QUALITIES.values())
 
 
 @dataclass(frozen=True)
 class SimulatorSettings:
-    """Settings of the agent and of the pictures, with AI2-THOR 5's defaults; metres, degrees, kilograms.
+    """Settings of the agent and of the pictures, with AI2-THOR 5's defaults; metres, degrees,
+    kilograms.
 
     Attributes:
         agent_mode: one of `AGENT_MODES`.

@@ -1,4 +1,5 @@
-"""The state of a running simulator: its scene, settings, cameras, random numbers and saved states."""
+"""The state of a running simulator: its scene, settings, cameras, random numbers and saved
+states."""
 
 import copy
 from dataclasses import dataclass, field
@@ -28,7 +29,8 @@ class Simulation:
         cameras: third-party cameras, by their ids.
         random: random numbers of the actions that draw some.
         object_filter: ids of the objects that replies list; None for all.
-        failed_reset: why the last Reset loaded no scene. Initialize repeats it, as the client reads only its reply.
+        failed_reset: why the last Reset loaded no scene. Initialize repeats it, as the client reads
+            only its reply.
         world: the scene.
         views: pictures of the scene.
         vision: queries about what the agent sees.
@@ -63,16 +65,19 @@ class Simulation:
         equip(self.world, settings.agent_mode)
 
     def save(self, slot: int) -> None:
-        """Keep a copy of the scene's state and of the random numbers; replaces what the slot held."""
+        """Keep a copy of the scene's state and of the random numbers; replaces what the slot
+        held."""
         self._saved[slot] = copy.deepcopy((self.world, self.random))
 
     def restore(self, slot: int) -> bool:
-        """Bring back the state that a slot keeps, which stays kept; return False if it has none of this scene."""
+        """Bring back the state that a slot keeps, which stays kept; return False if it has none of
+        this scene."""
         if slot not in self._saved:
             return False
         world, self.random = copy.deepcopy(self._saved[slot])
-        # Caches (packed metadata, primitives) compare versions. Objects of the restored state get versions that
-        # neither state has used, so that nothing cached for the abandoned one is taken for theirs.
+        # Caches (packed metadata, primitives) compare versions. Objects of the restored state get
+        # versions that neither state has used, so that nothing cached for the abandoned one is
+        # taken for theirs.
         newest = max(
             (item.version for w in (self.world, world) for item in w.objects.values()), default=0
         )

@@ -74,7 +74,8 @@ class World:
         version: number that grows with every change; cached views compare it.
         coarse: the shapes of its furniture are only known as boxes, as in recordings.
         walls: walls of rooms that are not `walled`.
-        open_at_start: ids of the objects that are open in the recording; its cells already go around them.
+        open_at_start: ids of the objects that are open in the recording; its cells already go
+            around them.
         templates: copies of the loose objects as the scene first had them, by type.
         grip: pose of the held object in the camera's frame; None for the usual one after a pick-up.
         hand: pose of the hand in the camera's frame; the held object keeps its place in it.
@@ -123,8 +124,9 @@ class World:
 
     def mark_changed(self, *changed: SimObject) -> None:
         """Record that the view and these objects changed; with none, that only the view did."""
-        # Objects take the world's number. So no two states under one id ever have the same version, not even when a
-        # new object gets the id of a removed one, and caches by id and version are safe.
+        # Objects take the world's number. So no two states under one id ever have the same version,
+        # not even when a new object gets the id of a removed one, and caches by id and version are
+        # safe.
         self.version += 1
         for item in changed:
             item.version = self.version
@@ -196,7 +198,8 @@ class World:
         """Move what the agent holds, and all it contains, along with the agent.
 
         Args:
-            keep_grip: leave the object as it was moved in the hand; else the hand returns to its usual place.
+            keep_grip: leave the object as it was moved in the hand; else the hand returns to its
+                usual place.
         """
         if not keep_grip:
             self.grip, self.hand = None, _HAND
@@ -204,7 +207,8 @@ class World:
             self.set_pose(self.objects[self.held], *self._held_pose(self.objects[self.held]))
         if self.arm is not None:
             wrist = self.arm.wrist(self.agent)
-            # Contents have grips of their own: an arm tilts what it holds, which `set_pose` would not do to contents.
+            # Contents have grips of their own: an arm tilts what it holds, which `set_pose` would
+            # not do to contents.
             for object_id, grip in self.arm.grips():
                 item = self.objects[object_id]
                 item.position, item.rotation = (
@@ -246,7 +250,8 @@ class World:
         self.mark_changed(item)
 
     def move_hand(self, hand: Grip) -> None:
-        """Move the hand to a pose in the camera's frame; what it holds moves and turns as it does."""
+        """Move the hand to a pose in the camera's frame; what it holds moves and turns as it
+        does."""
         assert self.held is not None
         item, camera = self.objects[self.held], self.agent.camera_matrix()
         offset = (
@@ -260,8 +265,8 @@ class World:
 
     def set_pose(self, item: SimObject, position: Array, rotation: Array) -> None:
         """Move and turn an object; its contents keep their places in it."""
-        # Positions of contents follow the whole rotation, their own rotations only its yaw: they stay upright in a bowl
-        # that is tilted.
+        # Positions of contents follow the whole rotation, their own rotations only its yaw: they
+        # stay upright in a bowl that is tilted.
         turn = euler_matrix(rotation) @ item.matrix.T
         yaw = float(rotation[1] - item.rotation[1])
         pivot = item.position.copy()
@@ -278,7 +283,8 @@ class World:
         self.mark_changed(item)
 
     def keep_templates(self) -> None:
-        """Keep copies of the loose objects, for SetObjectPoses with names of objects that were removed meanwhile."""
+        """Keep copies of the loose objects, for SetObjectPoses with names of objects that were
+        removed meanwhile."""
         self.templates = {}
         for item in self.objects.values():
             if item.type.pickupable:

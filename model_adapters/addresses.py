@@ -10,7 +10,8 @@ def server_address(option: str, url: str) -> SplitResult:
     """Return the parts of an address; the message names the option that gives it.
 
     Raises:
-        ValueError: the address is neither http nor https, or holds a password or a query, which would be recorded.
+        ValueError: the address is neither http nor https, or holds a password or a query, which
+            would be recorded.
     """
     try:
         parts = urlsplit(url)
@@ -25,7 +26,8 @@ def server_address(option: str, url: str) -> SplitResult:
         raise ValueError(f"{option} is not the address of a server; write http://HOST:PORT")
     if parts.username is not None or parts.password is not None or parts.query or parts.fragment:
         raise ValueError(
-            f"{option} holds a password, a query or a fragment, which would be written to every record; leave it out"
+            f"{option} holds a password, a query or a fragment, which would be written to every "
+            "record; leave it out"
         )
     return parts
 

@@ -17,7 +17,8 @@ class Notice:
         facts: names and values, in order.
         news: what became of the last reply; empty if there is nothing to say.
         words: words that complete what is typed.
-        replies: replies that are possible now, as buttons; others are possible too, unless the decoding has choices.
+        replies: replies that are possible now, as buttons; others are possible too, unless the
+            decoding has choices.
     """
 
     title: str = ""
@@ -32,4 +33,5 @@ class Attended(Model, Protocol):
     """A model that is a person at a page."""
 
     def tell(self, notice: Notice) -> None:
-        """Take what is to be shown with the next request, and with those after it until the next notice."""
+        """Take what is to be shown with the next request, and with those after it until the next
+        notice."""

@@ -25,7 +25,8 @@ class Backend(Protocol):
         """Capabilities of the model."""
 
     def count(self, turns: Sequence[Turn]) -> int | None:
-        """Return the context size of a reply to these turns, in tokens, or None if the model does not count them."""
+        """Return the context size of a reply to these turns, in tokens, or None if the model does
+        not count them."""
 
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         """Answer a conversation; see `Conversation.reply`."""
@@ -45,7 +46,8 @@ class BackendConversation(Transcript):
 
     @property
     def n_tokens(self) -> int | None:
-        """Tokens that the model would be given by `reply` now, or None if the model does not count them.
+        """Tokens that the model would be given by `reply` now, or None if the model does not count
+        them.
 
         Raises:
             DataError: a frame cannot be read.

@@ -25,7 +25,8 @@ def name_in_file(name: str) -> str:
 
 
 def load_from_file(name: str, kind: str = "class") -> Any:
-    """Run the file, once for each version of its content, and return what it defines under that name.
+    """Run the file, once for each version of its content, and return what it defines under that
+    name.
 
     The file cannot import its neighbours: code of several files has to be a package.
 
@@ -34,7 +35,8 @@ def load_from_file(name: str, kind: str = "class") -> Any:
         kind: what is behind the name in words, for messages.
 
     Raises:
-        ModelError: the file or the name in it does not exist, or the file fails when it is imported.
+        ModelError: the file or the name in it does not exist, or the file fails when it is
+            imported.
     """
     path = _path(name)
     module = _module(path, _source(path))
@@ -47,7 +49,8 @@ def load_from_file(name: str, kind: str = "class") -> Any:
 
 
 def file_identity(name: str) -> dict[str, Any]:
-    """Return the file's name and a digest of its content, as JSON values; its folder does not matter.
+    """Return the file's name and a digest of its content, as JSON values; its folder does not
+    matter.
 
     Raises:
         ModelError: the file cannot be read.
@@ -72,7 +75,8 @@ def _source(path: Path) -> bytes:
 
 @cache
 def _module(path: Path, source: bytes) -> ModuleType:
-    # Python's own import would run a stale .pyc if the edited file has the same size and modification second.
+    # Python's own import would run a stale .pyc if the edited file has the same size and
+    # modification second.
     module = ModuleType(f"infthor_eval_own_{digest(source)}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses resolve annotations through it

@@ -1,8 +1,8 @@
 """Protocols of models and policies.
 
-A conversation is an append-only list of turns with marks. The harness appends what the model is to see, requests a
-reply, and rewinds to a mark; each back end decides how it avoids encoding the same parts twice. A policy is simpler: it
-maps a frame and an instruction to a chunk of arm movements.
+A conversation is an append-only list of turns with marks. The harness appends what the model is to
+see, requests a reply, and rewinds to a mark; each back end decides how it avoids encoding the same
+parts twice. A policy is simpler: it maps a frame and an instruction to a chunk of arm movements.
 """
 
 from collections.abc import Sequence
@@ -56,12 +56,14 @@ class Decoding:
     Attributes:
         max_new_tokens: most tokens of the reply, at least 1.
         temperature: sampling temperature; 0 decodes greedily.
-        top_p: probability mass of the most likely tokens that are sampled from; ignored when greedy.
+        top_p: probability mass of the most likely tokens that are sampled from; ignored when
+            greedy.
         seed: seed of the samples; the same request with the same seed gets the same reply.
         stop: strings that end the reply; the reply is cut before the first to appear.
-        choices: allowed replies; if there are any, the reply is one of them, and no stop string cuts it.
-        repetition_penalty: penalty of tokens in context and reply, as in transformers, 1 for none; None for the
-            checkpoint's own (1.05 in Qwen2.5-VL).
+        choices: allowed replies; if there are any, the reply is one of them, and no stop string
+            cuts it.
+        repetition_penalty: penalty of tokens in context and reply, as in transformers, 1 for none;
+            None for the checkpoint's own (1.05 in Qwen2.5-VL).
     """
 
     max_new_tokens: int
@@ -93,7 +95,8 @@ class Decoding:
         return self.temperature == 0
 
     def document(self) -> dict[str, Any]:
-        """Return all settings as JSON values, for fingerprints; a penalty that is the checkpoint's own is left out."""
+        """Return all settings as JSON values, for fingerprints; a penalty that is the checkpoint's
+        own is left out."""
         given = {name: value for name, value in asdict(self).items() if value is not None}
         return {
             name: list(value) if isinstance(value, tuple) else value
@@ -108,14 +111,17 @@ class Reply:
     Attributes:
         text: text of the reply without end-of-turn tokens, cut before the first stop string.
         n_reply_tokens: tokens of the reply, or None if the model does not report them.
-        n_context_tokens: tokens of the context, frames expanded, or None if the model does not report them.
-        n_cached_tokens: tokens of the context that were not encoded again, or None if the model does not report them.
-        token_ids: generated ids without the end-of-turn token, or None if the model does not report them; after a stop
-            string, all up to the token that completed it.
+        n_context_tokens: tokens of the context, frames expanded, or None if the model does not
+            report them.
+        n_cached_tokens: tokens of the context that were not encoded again, or None if the model
+            does not report them.
+        token_ids: generated ids without the end-of-turn token, or None if the model does not report
+            them; after a stop string, all up to the token that completed it.
         faults: faults that were recovered from by a retry, a line each.
         cost: cost of the reply in US dollars, or None if it is free or its price unknown.
-        thinking: what the model thought before the reply, if it is told apart from the text; thoughts between markers
-            in the text are told from the answer where the reply is read (`model_adapters.thinking`).
+        thinking: what the model thought before the reply, if it is told apart from the text;
+            thoughts between markers in the text are told from the answer where the reply is read
+            (`model_adapters.thinking`).
         n_watched: different frames that a person looked at before replying; None for models.
     """
 
@@ -140,12 +146,16 @@ class Capabilities:
         deterministic: the same request gets the same reply, greedily or with the same seed.
         sampling: temperatures above 0 are supported.
         choices: replies can be restricted to given texts.
-        video_input: conversations take videos; if false, a video is refused, and its frames can be given as images.
+        video_input: conversations take videos; if false, a video is refused, and its frames can be
+            given as images.
         batch_size: continuations of a conversation that the model answers together.
-        batch_contexts: continuations that have no frames in common are worth answering together, too.
+        batch_contexts: continuations that have no frames in common are worth answering together,
+            too.
         max_in_flight: conversations that may be asked at the same time, each from its own thread.
-        max_tokens: limit of context and reply together, in tokens, or None if there is none or it is unknown.
-        max_tokens_before_extension: the checkpoint's own limit if `max_tokens` extends it, else None.
+        max_tokens: limit of context and reply together, in tokens, or None if there is none or it
+            is unknown.
+        max_tokens_before_extension: the checkpoint's own limit if `max_tokens` extends it, else
+            None.
     """
 
     counts_tokens: bool = True
@@ -178,7 +188,8 @@ class Conversation(Protocol):
 
     @property
     def n_tokens(self) -> int | None:
-        """Tokens that `reply` would give the model now, chat template included; None if it does not count them.
+        """Tokens that `reply` would give the model now, chat template included; None if it does not
+        count them.
 
         Raises:
             DataError: a frame cannot be read.
@@ -199,23 +210,26 @@ class Conversation(Protocol):
         """Return a mark at the current end of the conversation."""
 
     def rewind(self, mark: Mark) -> None:
-        """Drop everything that was appended after the mark; later marks become invalid, the mark itself stays valid.
+        """Drop everything that was appended after the mark; later marks become invalid, the mark
+        itself stays valid.
 
         Raises:
-            ValueError: the mark belongs to another conversation, or to a part that was dropped by a rewind.
+            ValueError: the mark belongs to another conversation, or to a part that was dropped by a
+                rewind.
         """
 
     def reply(self, decoding: Decoding) -> Reply:
         """Return the assistant's next turn without adding it to the conversation.
 
         Raises:
-            ModelError: the context does not fit (the message has its tokens and the limit), memory ran out, or the
-                model does not support these turns or this decoding.
+            ModelError: the context does not fit (the message has its tokens and the limit), memory
+                ran out, or the model does not support these turns or this decoding.
             DataError: a frame cannot be read.
         """
 
     def replies(self, continuations: Sequence[Sequence[Part]], decoding: Decoding) -> list[Reply]:
-        """Return the reply to each continuation, as append (as user), reply and rewind would; nothing is added.
+        """Return the reply to each continuation, as append (as user), reply and rewind would;
+        nothing is added.
 
         Args:
             continuations: the parts to append, one sequence per reply.
@@ -239,7 +253,8 @@ class Subject(Protocol):
         """Capabilities; of a policy's only `deterministic` and `max_in_flight` are used."""
 
     def identity(self) -> dict[str, Any]:
-        """Return everything that can change a result, as JSON values; equal identities give equal results."""
+        """Return everything that can change a result, as JSON values; equal identities give equal
+        results."""
 
     def close(self) -> None:
         """Free all memory; the subject cannot be used afterwards."""
@@ -250,7 +265,8 @@ class Model(Subject, Protocol):
     """A model that answers in conversations."""
 
     def tokens_per_frame(self, frame: FrameRef) -> int | None:
-        """Return the tokens of one frame, without its surroundings in the chat template; None if they are not counted.
+        """Return the tokens of one frame, without its surroundings in the chat template; None if
+        they are not counted.
 
         Raises:
             DataError: the frame cannot be read.
@@ -262,7 +278,8 @@ class Model(Subject, Protocol):
 
 @dataclass(frozen=True)
 class ArmDelta:
-    """One step of a robot arm's end effector, in the frame of the robot's base: x forward, y left, z up (right-handed).
+    """One step of a robot arm's end effector, in the frame of the robot's base: x forward, y left,
+    z up (right-handed).
 
     docs/policies.md says how the outputs of policies are converted to this.
 
@@ -298,7 +315,8 @@ class Policy(Subject, Protocol):
 
 
 class Adapter(Protocol):
-    """An adapter class: its options, a dataclass with defaults, and a method that builds the model."""
+    """An adapter class: its options, a dataclass with defaults, and a method that builds the
+    model."""
 
     Options: ClassVar[type]
 

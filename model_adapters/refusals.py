@@ -17,7 +17,8 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
     """
     if not (decoding.greedy or capabilities.sampling):
         raise ModelError(
-            f"{name} decodes greedily only, not at temperature {decoding.temperature}; ask at temperature 0"
+            f"{name} decodes greedily only, not at temperature {decoding.temperature}; ask at "
+            "temperature 0"
         )
     if decoding.choices and not capabilities.choices:
         raise ModelError(
@@ -26,11 +27,12 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
 
 
 def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) -> None:
-    """Check that it is the turn of the model of this name, and that it takes all parts of the conversation.
+    """Check that it is the turn of the model of this name, and that it takes all parts of the
+    conversation.
 
     Raises:
-        ModelError: the conversation is empty, its last turn is not the user's, or it has a video and the model no
-            video input.
+        ModelError: the conversation is empty, its last turn is not the user's, or it has a video
+            and the model no video input.
     """
     if not turns or turns[-1].role != "user":
         state = f"the last turn is the {turns[-1].role}'s" if turns else "the conversation is empty"
@@ -45,7 +47,8 @@ def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) ->
 def wrap_adapter_errors(problem: str) -> Iterator[None]:
     """Turn any error in an adapter's code into an `AdapterError` of one line.
 
-    The line has the place of the error. The error itself, with its traceback, is the cause of the `AdapterError`.
+    The line has the place of the error. The error itself, with its traceback, is the cause of the
+    `AdapterError`.
 
     Args:
         problem: the model and what it fails to do, for the message.
@@ -64,5 +67,6 @@ def wrap_adapter_errors(problem: str) -> Iterator[None]:
 
 
 def wrap_request_errors(name: str) -> AbstractContextManager[None]:
-    """Turn any error of an adapter on a request into a failure of this request alone; see `wrap_adapter_errors`."""
+    """Turn any error of an adapter on a request into a failure of this request alone; see
+    `wrap_adapter_errors`."""
     return wrap_adapter_errors(f"{name} fails on the request")

@@ -1,8 +1,8 @@
 """Names of models, and how to build a model by its name.
 
-Adapters are "module:Class" strings that are imported only when a model is needed, so that listing names, and the
-options of built-in models, is fast. Packages add theirs by the entry point group `infthor_eval.models`. A name may also
-be a file and a class in it, `./my_adapter.py:MyModel`.
+Adapters are "module:Class" strings that are imported only when a model is needed, so that listing
+names, and the options of built-in models, is fast. Packages add theirs by the entry point group
+`infthor_eval.models`. A name may also be a file and a class in it, `./my_adapter.py:MyModel`.
 """
 
 import dataclasses
@@ -108,15 +108,18 @@ def check_options(name: str, options: Mapping[str, str]) -> None:
 
 
 def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
-    """Build the model or the policy of this name, and check that it has all members of its protocol.
+    """Build the model or the policy of this name, and check that it has all members of its
+    protocol.
 
     Args:
         name: one of `names()`, or FILE.py:CLASS.
-        options: values of the adapter's options as typed, `{"dtype": "float32"}`; the others take their defaults.
+        options: values of the adapter's options as typed, `{"dtype": "float32"}`; the others take
+            their defaults.
         seed: seed of whatever is random in the model (random weights).
 
     Raises:
-        UsageError: a name is unknown (the message has the nearest one), or a value does not fit its option.
+        UsageError: a name is unknown (the message has the nearest one), or a value does not fit its
+            option.
         ModelError: the model cannot be loaded, or lacks a member.
     """
     model = build(name, options, seed)
@@ -142,8 +145,8 @@ def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
 def adapter_identity(name: str) -> dict[str, Any]:
     """Return what distinguishes this adapter's code from other versions of it, as JSON values.
 
-    It is empty for a built-in adapter, whose version is that of the harness. For others it has the package (or file),
-    its version and a digest of its source.
+    It is empty for a built-in adapter, whose version is that of the harness. For others it has the
+    package (or file), its version and a digest of its source.
 
     Raises:
         UsageError: the name is unknown.
@@ -170,8 +173,9 @@ def label(name: str, options: Mapping[str, str]) -> str:
 
     Args:
         name: name of the model.
-        options: its options as typed. If they name a checkpoint, so does the label: `Qwen2.5-VL-3B-Instruct@main`. The
-            label of a model behind a server is the server's name of it.
+        options: its options as typed. If they name a checkpoint, so does the label:
+            `Qwen2.5-VL-3B-Instruct@main`. The label of a model behind a server is the server's name
+            of it.
     """
     checkpoint = options.get("pretrained") or options.get("model")
     name = name_in_file(name) if names_a_file(name) else name
@@ -214,7 +218,8 @@ def _target(name: str) -> str:
 
 
 def _options(name: str) -> type:
-    """Return the dataclass of a model's options, without importing a built-in adapter, which may import torch."""
+    """Return the dataclass of a model's options, without importing a built-in adapter, which may
+    import torch."""
     if name not in BUILT_IN:
         return _adapter(name).Options
     return cast(type, import_target(BUILT_IN[name].options))

@@ -1,8 +1,9 @@
 """Telling what a model thinks from what it answers.
 
-Models that think write it before the answer, between markers of their family. The markers below are those of the
-families' chat templates and of vLLM's reasoning parsers. Some templates write the first marker themselves, so that a
-reply has the second alone. A server that tells thoughts apart sends them in a field of their own (`Reply.thinking`).
+Models that think write it before the answer, between markers of their family. The markers below are
+those of the families' chat templates and of vLLM's reasoning parsers. Some templates write the
+first marker themselves, so that a reply has the second alone. A server that tells thoughts apart
+sends them in a field of their own (`Reply.thinking`).
 """
 
 import re
@@ -65,7 +66,8 @@ def answer_of(reply: Reply) -> Thought:
 
 
 def opening_marker(prompt: str) -> str:
-    """Return the marker that a prompt ends with, so that the reply begins in thought; empty if there is none."""
+    """Return the marker that a prompt ends with, so that the reply begins in thought; empty if
+    there is none."""
     return next((before for before, _ in MARKERS.values() if prompt.rstrip().endswith(before)), "")
 
 

@@ -11,8 +11,8 @@ __all__ = ["Transcript"]
 class Transcript:
     """An append-only list of turns with marks to rewind to.
 
-    Adapters inherit from it and add `reply` and `n_tokens`. An adapter that answers several continuations faster than
-    one by one overrides `replies`.
+    Adapters inherit from it and add `reply` and `n_tokens`. An adapter that answers several
+    continuations faster than one by one overrides `replies`.
     """
 
     def __init__(self) -> None:
@@ -25,7 +25,8 @@ class Transcript:
         return self.turns_with(())
 
     def turns_with(self, continuation: Sequence[Part]) -> tuple[Turn, ...]:
-        """Return the turns as if these parts had been appended by the user; the conversation is unchanged.
+        """Return the turns as if these parts had been appended by the user; the conversation is
+        unchanged.
 
         Raises:
             TypeError: a part is neither text, frame reference nor video.
@@ -55,7 +56,8 @@ class Transcript:
         """Drop everything that was appended after the mark, and the marks set after it.
 
         Raises:
-            ValueError: the mark belongs to another conversation, or to a part that was dropped by a rewind.
+            ValueError: the mark belongs to another conversation, or to a part that was dropped by a
+                rewind.
         """
         if mark not in self._marks:
             raise ValueError(
@@ -67,7 +69,8 @@ class Transcript:
     def replies(
         self: Conversation, continuations: Sequence[Sequence[Part]], decoding: Decoding
     ) -> list[Reply]:
-        """Append, reply and rewind, one continuation after the other; see `Conversation.replies`."""
+        """Append, reply and rewind, one continuation after the other; see
+        `Conversation.replies`."""
         here = self.mark()
         replies = []
         for parts in continuations:

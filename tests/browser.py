@@ -1,4 +1,5 @@
-"""A browser to open pages in: one for all tests of a process, as Playwright cannot be started twice in it."""
+"""A browser to open pages in: one for all tests of a process, as Playwright cannot be started twice
+in it."""
 
 import shutil
 from collections.abc import Callable, Iterator

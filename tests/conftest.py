@@ -19,11 +19,12 @@ from .browser import browser, open_page  # noqa: F401 - fixtures
 from .plans.cut import MUG, cut, write
 from .processor_times import read_slow_tests
 
-# Before torch is imported, here and in processes that tests start: on a busy machine two threads that wait for each
-# other take ten times as long as one.
+# Before torch is imported, here and in processes that tests start: on a busy machine two threads
+# that wait for each other take ten times as long as one.
 os.environ["OMP_NUM_THREADS"] = "1"
 
-# No property fails because the machine is busy: no deadline for an example, no complaint that making one takes long.
+# No property fails because the machine is busy: no deadline for an example, no complaint that
+# making one takes long.
 hypothesis.settings.register_profile(
     "unhurried", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
@@ -128,7 +129,8 @@ def scripted_run(tmp_path_factory: pytest.TempPathFactory, scripted_data: Path) 
 
 @pytest.fixture
 def task_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the packaged task files that commands and runs of this process find instead; its folder."""
+    """A copy of the packaged task files that commands and runs of this process find instead; its
+    folder."""
     folder = tmp_path / "tasks"
     shutil.copytree(Catalog.find_packaged().folder, folder)
     monkeypatch.setattr(Catalog, "find_packaged", classmethod(lambda cls: cls(folder)))

@@ -2,9 +2,10 @@
 
     make test-times        # all tests, with this plugin, then `python -m tests.processor_times`
 
-A pytest plugin (`-p tests.processor_times`) writes the processor seconds of each test, with its fixtures and child
-processes, into build/processor_times/. The command lists those above `LIMIT_S` in tests/slow_tests.txt, which
-`make test` leaves out and `make test-all` runs. Processor time changes little with other work on the machine.
+A pytest plugin (`-p tests.processor_times`) writes the processor seconds of each test, with its
+fixtures and child processes, into build/processor_times/. The command lists those above `LIMIT_S`
+in tests/slow_tests.txt, which `make test` leaves out and `make test-all` runs. Processor time
+changes little with other work on the machine.
 """
 
 import json
@@ -19,7 +20,8 @@ import pytest
 __all__ = ["LIMIT_S", "read_slow_tests"]
 
 LIMIT_S = 1.0
-# Slow ones that `make test` runs all the same: no other test goes the same whole way, or later ones need their results.
+# Slow ones that `make test` runs all the same: no other test goes the same whole way, or later ones
+# need their results.
 KEPT = (
     "tests/generation/test_factory.py::test_a_thousand_steps_are_made_with_the_defaults",
     "tests/nieh/test_suite.py::test_the_tiny_model_runs_through_and_shares_prefixes",
@@ -47,7 +49,8 @@ _ROOT = Path(__file__).parents[1]
 _LIST = Path(__file__).with_name("slow_tests.txt")
 _MEASURED = _ROOT / "build" / "processor_times"
 _HEAD = """\
-# Tests that take more than {limit} s of processor time: `make test` leaves them out, `make test-all` runs them.
+# Tests that take more than {limit} s of processor time: `make test` leaves them out, `make \
+test-all` runs them.
 # Written by `make test-times` (tests/processor_times.py says how). A line: seconds, test.
 """
 
@@ -74,7 +77,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 
 
 def main() -> None:
-    """Write the list of slow tests from what was measured; tests that were not measured stay as they are listed."""
+    """Write the list of slow tests from what was measured; tests that were not measured stay as
+    they are listed."""
     seconds: Counter[str] = Counter()
     for path in _MEASURED.glob("*.jsonl"):
         for line in path.read_text().splitlines():
@@ -89,7 +93,8 @@ def main() -> None:
     _LIST.write_text(_HEAD.format(limit=LIMIT_S) + "\n".join(lines) + "\n")
     of_slow = sum(seconds[test] for test in slow)
     print(
-        f"{len(slow)} slow tests: {of_slow:.0f} s of processor time; others: {seconds.total() - of_slow:.0f} s"
+        f"{len(slow)} slow tests: {of_slow:.0f} s of processor time; others: "
+        f"{seconds.total() - of_slow:.0f} s"
     )
 
 

@@ -164,7 +164,10 @@ def test_a_folder_without_a_run_is_named(tmp_path: Path) -> None:
 
 
 def test_the_package_is_imported_without_pandas() -> None:
-    code = "import infthor_eval, sys; print(*{'pandas', 'pyarrow', 'numpy', 'click'}.intersection(sys.modules))"
+    code = (
+        "import infthor_eval, sys; print(*{'pandas', 'pyarrow', 'numpy', "
+        "'click'}.intersection(sys.modules))"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=600
     )

@@ -37,7 +37,8 @@ def machine(simulation: Any) -> Any:
 def test_a_request_encodes_what_is_not_there_and_looks_back_at_all(costs: Any) -> None:
     rates = costs.Rates(token=1.0, pair=0.1, step=2.0, cached_token=0.01)
     request = costs.Request(context=10, cached=6, reply=3)
-    # 4 tokens; 4 * 6 pairs with what was there and 8 among themselves; 3 tokens of reply on a context of 10.
+    # 4 tokens; 4 * 6 pairs with what was there and 8 among themselves; 3 tokens of reply on a
+    # context of 10.
     assert costs.seconds(request, rates) == pytest.approx(4 + 0.1 * (24 + 8) + 3 * 2.1)
     assert costs.seconds(request, rates, reuse=False) == pytest.approx(10 + 0.1 * 50 + 3 * 2.1)
 
@@ -78,7 +79,8 @@ def test_memory_is_weights_and_what_each_token_takes(costs: Any, shape: Any, mac
         4,
         None,
     ]
-    # SDPA repeats keys and values for 4 heads (32 bytes) and has a mask of 3 bytes for each token of a chunk.
+    # SDPA repeats keys and values for 4 heads (32 bytes) and has a mask of 3 bytes for each token
+    # of a chunk.
     assert (
         costs.context_bytes(shape, replace(small, attention="sdpa", chunk_tokens=12))
         == 16 + 32 + 36

@@ -2,7 +2,10 @@ from infthor_eval.reasons import count_reasons
 
 
 def test_reasons_that_differ_in_their_numbers_alone_are_one():
-    said = "a context of {} tokens and 50 new ones is beyond the 32,768 tokens of qwen2.5-vl-7b; use fewer frames"
+    said = (
+        "a context of {} tokens and 50 new ones is beyond the 32,768 tokens of qwen2.5-vl-7b; use "
+        "fewer frames"
+    )
     reasons = [("nieh_full", said.format(n)) for n in (203_456, 147_123, 150_000)] + [
         ("nieh_gt", said.format(9))
     ]

@@ -19,7 +19,8 @@ FILES = [
 
 
 def decisions(tree):
-    """Strings that decide something: compared, looked up, keys of a dictionary, cases of a match."""
+    """Strings that decide something: compared, looked up, keys of a dictionary, cases of a
+    match."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Compare):
             sides = [node.left, *node.comparators]

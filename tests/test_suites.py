@@ -51,7 +51,10 @@ def package(tmp_path, monkeypatch):
     info = tmp_path / "Sums-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: Sums\nVersion: 1.0\n")
-    points = "[infthor_eval.suites]\nsums = sums_suite:SumsSuite\n[infthor_eval.tasks]\nsums = sums_tasks.here\n"
+    points = (
+        "[infthor_eval.suites]\nsums = sums_suite:SumsSuite\n[infthor_eval.tasks]\nsums = "
+        "sums_tasks.here\n"
+    )
     (info / "entry_points.txt").write_text(points)
     monkeypatch.syspath_prepend(tmp_path)
     return tmp_path
@@ -147,7 +150,8 @@ def test_a_fault_in_the_module_of_a_suite_is_told_with_its_place(point, package)
         find_suite("sums")
     place = "KeyError in broken_suite.py:2 (<module>): no 'sums'"
     assert str(caught.value) == (
-        f"the suite sums cannot be imported from broken_suite:Sums ({place}); fix its package, or uninstall it"
+        f"the suite sums cannot be imported from broken_suite:Sums ({place}); fix its package, or "
+        "uninstall it"
     )
 
 
@@ -188,7 +192,8 @@ def test_an_option_that_every_run_has_is_refused(package):
     done = command(package, "--model", "adder", "--tasks", "sums")
     assert (done.returncode, done.stderr) == (
         2,
-        "infthor-eval: the option limit of the suite sums is one of every run; give it another name\n",
+        "infthor-eval: the option limit of the suite sums is one of every run; give it another "
+        "name\n",
     )
 
 

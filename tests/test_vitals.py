@@ -1,4 +1,5 @@
-"""The figures that no change may move unseen: what is measured, what counts as moved, and how a change is committed."""
+"""The figures that no change may move unseen: what is measured, what counts as moved, and how a
+change is committed."""
 
 import json
 import subprocess
@@ -19,7 +20,8 @@ def figure(**fields):
 
 
 def vitals(tmp_path: Path, *words: str, command=("python", "-c", PRINTS), **fields):
-    """Run the script on one figure; returns its exit code, what it printed, and the figure as the file has it then."""
+    """Run the script on one figure; returns its exit code, what it printed, and the figure as the
+    file has it then."""
     file = tmp_path / "vitals.json"
     if not file.exists():
         file.write_text(json.dumps([{"command": list(command), "figures": [figure(**fields)]}]))

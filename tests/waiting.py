@@ -1,4 +1,5 @@
-"""Waiting for what another process or thread does, on a machine that may be busy with other work."""
+"""Waiting for what another process or thread does, on a machine that may be busy with other
+work."""
 
 import subprocess
 import time

@@ -1,9 +1,11 @@
-"""Runs a memory that was written for LongMemEval-V2: `insert(trajectory)`, then `query(text, image)`.
+"""Runs a memory that was written for LongMemEval-V2: `insert(trajectory)`, then `query(text,
+image)`.
 
-    infthor-eval --memory ./longmemeval.py:LongMemEval --memory-args memory=my_package:MyMemory,params=my.json ...
+    infthor-eval --memory ./longmemeval.py:LongMemEval --memory-args
+    memory=my_package:MyMemory,params=my.json ...
 
-Their states have the action that is taken next, ours the one before. They insert whole trajectories: ours is inserted
-at the first question, and anew when an agent has gone on.
+Their states have the action that is taken next, ours the one before. They insert whole
+trajectories: ours is inserted at the first question, and anew when an agent has gone on.
 """
 
 import json

@@ -12,7 +12,8 @@ class Check(msgspec.Struct, frozen=True):
 
     Attributes:
         name: what is checked.
-        state: "ok"; "optional" if it is missing and only some uses need it; "wrong" if every use needs it.
+        state: "ok"; "optional" if it is missing and only some uses need it; "wrong" if every use
+            needs it.
         detail: what is installed, or what is missing.
         hint: how to fix it; empty if there is nothing to fix.
     """

@@ -19,7 +19,8 @@ from infthor_eval.terminal import print_error
 
 __all__ = ["main"]
 
-# By group: the name of each command, of which infthor_eval.cli.commands has the module, and its line in the overview.
+# By group: the name of each command, of which infthor_eval.cli.commands has the module, and its
+# line in the overview.
 _COMMANDS = {
     "Evaluate": {
         "run": "Evaluate a model on tasks (the default command).",
@@ -94,7 +95,8 @@ class _Commands(ExampleGroup):
         return name, command, rest
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands, then the options, with those of the default command, which is typed without its name."""
+        """Write the commands, then the options, with those of the default command, which is typed
+        without its name."""
         for group, commands in _COMMANDS.items():
             with formatter.section(group):  # not click's own list, which would import every command
                 formatter.write_dl(list(commands.items()))
@@ -131,7 +133,8 @@ def main(args: list[str] | None = None) -> None:
     try:
         with handle_signal(signal.SIGTERM, _raise_terminated):
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
-        sys.stdout.flush()  # here and not at Python's exit, so that a full disk is an error like any other
+        # here and not at Python's exit, so that a full disk is an error like any other
+        sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
         sys.exit(2)
@@ -153,7 +156,8 @@ def main(args: list[str] | None = None) -> None:
         _discard_output()
         place = error.filename if error.filename is not None else "standard output or a file"
         _exit(
-            f"{place}: cannot be read or written ({in_one_line(error)}); fix that and run the same command again",
+            f"{place}: cannot be read or written ({in_one_line(error)}); fix that and run the same "
+            "command again",
             2,
         )
     else:
@@ -165,12 +169,14 @@ class _Terminated(BaseException):
 
 
 def _raise_terminated(_number: int, _frame: FrameType | None) -> None:
-    """Handle SIGTERM, so that temporary folders and simulator processes are removed as on Ctrl-C."""
+    """Handle SIGTERM, so that temporary folders and simulator processes are removed as on
+    Ctrl-C."""
     raise _Terminated
 
 
 def _discard_output() -> None:
-    """Discard what standard output cannot take; Python would try again at its exit, and complain."""
+    """Discard what standard output cannot take; Python would try again at its exit, and
+    complain."""
     try:
         sys.stdout.flush()
     except OSError:

@@ -30,7 +30,8 @@ def set_checks(root: Path, trajectories: Path | None) -> Iterator[Check]:
     yield from _questions(contents)
     yield from _trajectories(contents)
     if not contents.frames:
-        yield Check("frames", "optional", "none can be read: tables of the files' own scores can be made, and no more",
+        yield Check("frames", "optional", "none can be read: tables of the files' own scores can "
+                                          "be made, and no more",
                     "unpack the set's metadata.tar beside its question files")  # fmt: skip
         return
     n_asked = 0
@@ -62,7 +63,10 @@ def _questions(contents: SetContents) -> Iterator[Check]:
 def _trajectories(contents: SetContents) -> Iterator[Check]:
     if contents.frames:
         low, high = min(contents.frames), max(contents.frames)
-        detail = f"{len(contents.frames):,} of {contents.n_trajectories:,} can be read; {sum(contents.frames):,} frames"
+        detail = (
+            f"{len(contents.frames):,} of {contents.n_trajectories:,} can be read; "
+            f"{sum(contents.frames):,} frames"
+        )
         detail += f" ({low:,} to {high:,} each, median {statistics.median(contents.frames):g})"
         if contents.n_unasked:
             detail += f"; {contents.n_unasked:,} more without a question"

@@ -1,1 +1,2 @@
-"""What suites that act in a simulator share: trajectories, simulators, retries, records and curves."""
+"""What suites that act in a simulator share: trajectories, simulators, retries, records and
+curves."""

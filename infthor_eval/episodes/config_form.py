@@ -1,4 +1,5 @@
-"""The part of a run's config that summaries and tables of episodes read, as `EpisodeTask.config` writes it."""
+"""The part of a run's config that summaries and tables of episodes read, as `EpisodeTask.config`
+writes it."""
 
 from typing import Generic, TypeVar
 
@@ -8,7 +9,8 @@ __all__ = ["EpisodeTaskForm", "EpisodesConfig"]
 
 
 class EpisodeTaskForm(msgspec.Struct, kw_only=True):
-    """The config of a task; `broken` has the names of trajectories that could not be read, and why."""
+    """The config of a task; `broken` has the names of trajectories that could not be read, and
+    why."""
 
     broken: list[tuple[str, str]]
 

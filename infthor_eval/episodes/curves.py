@@ -1,4 +1,5 @@
-"""Cumulative reward along trajectories: step functions of single trajectories, and their mean over trajectories."""
+"""Cumulative reward along trajectories: step functions of single trajectories, and their mean over
+trajectories."""
 
 import math
 from bisect import bisect_right
@@ -33,7 +34,8 @@ _MAX_POINTS = 400  # of a grid; a picture resolves no more
 
 @dataclass(frozen=True)
 class StepFunction:
-    """Cumulative reward in one trajectory: 0 before the first place, and constant from each place to the next.
+    """Cumulative reward in one trajectory: 0 before the first place, and constant from each place
+    to the next.
 
     Attributes:
         places: places of the steps, ascending; several episodes may end in one place.
@@ -50,8 +52,9 @@ class StepFunction:
         """Sum up the rewards of episodes in time order.
 
         Args:
-            units: place where each episode ends (None if unknown) and its reward. An unknown place, or one before an
-                earlier episode's, becomes the earlier one's: a context that was truncated is shorter than the last.
+            units: place where each episode ends (None if unknown) and its reward. An unknown place,
+                or one before an earlier episode's, becomes the earlier one's: a context that was
+                truncated is shorter than the last.
             start: place where the first episode begins, with nothing earned; None leaves it out.
         """
         points = units if start is None else [(start, 0.0), *units]
@@ -91,9 +94,11 @@ class Facet:
         over: label of the x axis.
         title: heading of the column; empty if `over` suffices.
         missing: text in a panel if no run has such a curve.
-        end_at: heading of the table's column with the place where curves end; None for no such column.
+        end_at: heading of the table's column with the place where curves end; None for no such
+            column.
         earned: heading of the table's column with the last mean; None for no such column.
-        has_bound: whether the highest possible reward has places of its own on this axis; else runs lend it theirs.
+        has_bound: whether the highest possible reward has places of its own on this axis; else runs
+            lend it theirs.
     """
 
     over: str
@@ -176,12 +181,14 @@ def compute_curves(
 ) -> RewardCurves:
     """Compute the curves of some runs, and an upper bound.
 
-    At each point of a common grid stands the mean over trajectories of the last value. A trajectory that is shorter
-    keeps its last value, so the end of a curve is the mean reward of whole trajectories. Failed episodes earn nothing.
+    At each point of a common grid stands the mean over trajectories of the last value. A trajectory
+    that is shorter keeps its last value, so the end of a curve is the mean reward of whole
+    trajectories. Failed episodes earn nothing.
 
-    There is exactly one bound: the planner among the runs if there is one, else the highest possible reward. Several
-    planners (of other settings) are runs like the others, as none of them bounds them all. In a facet where the bound
-    has no places, each of its episodes stands at the first place that a run has for it.
+    There is exactly one bound: the planner among the runs if there is one, else the highest
+    possible reward. Several planners (of other settings) are runs like the others, as none of them
+    bounds them all. In a facet where the bound has no places, each of its episodes stands at the
+    first place that a run has for it.
 
     Args:
         functions_of: returns the step functions of a run's trajectories, by facet.
@@ -244,7 +251,8 @@ def _highest_possible(
     facets: Mapping[str, Facet],
     functions_of: Callable[[Sequence[Earned[P]]], Functions],
 ) -> tuple[_Drawn[P], int]:
-    """Return the highest possible reward, and the number of episodes for which no run recorded it."""
+    """Return the highest possible reward, and the number of episodes for which no run recorded
+    it."""
     most = [list(_highest_rewards(of_runs)) for of_runs in zip(*records, strict=True)]
     earned = [[(record, reward or 0.0) for record, reward in units] for units in most]
     functions = {name: it for name, it in functions_of(earned).items() if facets[name].has_bound}
@@ -289,7 +297,8 @@ def _on_lent_places(
 def _highest_rewards(
     of_runs: Sequence[Sequence[UnitRecord[P]]],
 ) -> Iterator[tuple[UnitRecord[P], float | None]]:
-    """Yield the episodes of a trajectory with the highest possible reward that any run recorded; None if none did."""
+    """Yield the episodes of a trajectory with the highest possible reward that any run recorded;
+    None if none did."""
     for same in zip(*of_runs, strict=True):
         recorded = [
             record.payload.max_reward for record in same if record.payload.max_reward is not None
@@ -305,17 +314,22 @@ def _missing_notes(runs: Sequence[_Drawn[Any]], facets: Mapping[str, Facet]) -> 
 
 def _lent_notes(bound: _Drawn[Any], lent: Sequence[Facet]) -> Iterator[str]:
     for facet in lent:
-        yield f"{bound.label}, {facet.over}: its {next(iter(bound.counts))} are where the first of the runs has them"
+        yield (
+            f"{bound.label}, {facet.over}: its {next(iter(bound.counts))} are where the first of "
+            "the runs has them"
+        )
 
 
 def _grid(runs: Sequence[Sequence[StepFunction]]) -> np.ndarray:
-    """Return all places where a function of a run steps, or evenly spaced ones if these are too many."""
+    """Return all places where a function of a run steps, or evenly spaced ones if these are too
+    many."""
     places = np.unique([place for functions in runs for item in functions for place in item.places])
     return places if len(places) <= _MAX_POINTS else np.linspace(places[0], places[-1], _MAX_POINTS)
 
 
 def _mean_curve(functions: Sequence[StepFunction], grid: np.ndarray) -> Curve:
-    """Return the mean of a run's functions, one of each trajectory, up to the end of the longest."""
+    """Return the mean of a run's functions, one of each trajectory, up to the end of the
+    longest."""
     last = max(item.places[-1] for item in functions)
     places = tuple(float(place) for place in grid if place <= last)
     return Curve(

@@ -62,8 +62,8 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
     """A suite of episodes set up for a run; see `infthor_eval.runs.Evaluation`.
 
     Attributes:
-        trajectories: all trajectories that were found, used or not, so that neither what baselines learn nor the floor
-            plans of the simulators depend on --limit.
+        trajectories: all trajectories that were found, used or not, so that neither what baselines
+            learn nor the floor plans of the simulators depend on --limit.
     """
 
     def __init__(
@@ -168,7 +168,8 @@ class BoundEpisodes(Generic[U, P]):
     def _find_records(
         self, group: Group[U], session: Session[P]
     ) -> tuple[dict[UnitKey, str], dict[UnitKey, UnitRecord[P] | None]]:
-        """Return the fingerprints of a group's units, and the records of those that have a result already."""
+        """Return the fingerprints of a group's units, and the records of those that have a result
+        already."""
         fingerprints = {unit.key: self._fingerprint(unit) for unit in group.units}
         return fingerprints, {
             unit.key: session.find_record(unit, fingerprints[unit.key]) for unit in group.units

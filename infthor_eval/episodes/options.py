@@ -14,7 +14,8 @@ class SimulatorOptions:
     """Options that the suites share, with their help texts.
 
     Attributes:
-        simulator: "embedded", "unity" (the build that ai2thor downloads), or the path of a Unity executable.
+        simulator: "embedded", "unity" (the build that ai2thor downloads), or the path of a Unity
+            executable.
         scenes: folder of recorded floor plans, for trajectories in them.
         frames: "shown", or "blank" for grey frames.
     """

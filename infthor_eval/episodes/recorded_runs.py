@@ -18,7 +18,8 @@ _EMBEDDED = "embedded"  # as the option --simulator names it
 
 
 class TaskConfig(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need: digests of trajectories by name, and settings."""
+    """The part of a task's run config that curves and replays need: digests of trajectories by
+    name, and settings."""
 
     trajectories: dict[str, str]
     config: dict[str, Any] = {}
@@ -34,7 +35,8 @@ T = TypeVar("T", bound=TaskConfig)
 
 
 class RunConfig(msgspec.Struct, Generic[T], frozen=True):
-    """The part of a run's config that curves and replays need; `model` has the subject's name and options."""
+    """The part of a run's config that curves and replays need; `model` has the subject's name and
+    options."""
 
     model: dict[str, Any]
     simulator: str
@@ -58,7 +60,8 @@ class RecordedRun(Generic[P, T]):
 
     @classmethod
     def read(cls, folder: Path, label: str | None = None) -> Self:
-        """Read the run in a folder, by default labelled by its own name; DataError for a missing or damaged journal."""
+        """Read the run in a folder, by default labelled by its own name; DataError for a missing or
+        damaged journal."""
         header, records = read_run(folder, cls.record_types)
         return cls(label or header.name, header, records)
 

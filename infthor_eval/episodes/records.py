@@ -16,8 +16,8 @@ class EpisodeRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
         index: place in the trajectory.
         reward: reward of all steps.
         max_reward: highest possible reward; None if it is not known.
-        ended: how it ended; "not attempted" if an earlier one ended the trajectory, and empty if the subject failed or
-            the episode is excluded.
+        ended: how it ended; "not attempted" if an earlier one ended the trajectory, and empty if
+            the subject failed or the episode is excluded.
     """
 
     index: int

@@ -1,8 +1,10 @@
-"""Recorded episodes replayed, so that they can be looked at: a journal has every action, and no frame.
+"""Recorded episodes replayed, so that they can be looked at: a journal has every action, and no
+frame.
 
-Actions, rewards and endings are shown as the run recorded them. What the subject saw is recomputed: the environment is
-reset to each episode and the recorded calls are repeated, which leads to the same states if the simulator is
-deterministic. Where it does not, a frame notes the first difference.
+Actions, rewards and endings are shown as the run recorded them. What the subject saw is recomputed:
+the environment is reset to each episode and the recorded calls are repeated, which leads to the
+same states if the simulator is deterministic. Where it does not, a frame notes the first
+difference.
 """
 
 from abc import ABC, abstractmethod
@@ -39,7 +41,8 @@ F = TypeVar("F", bound=EpisodeFrame[Any, Any])
 
 @dataclass(frozen=True)
 class RecordedTrajectory(Generic[R, P]):
-    """What a run recorded of one trajectory: its name, and the records of its episodes in time order."""
+    """What a run recorded of one trajectory: its name, and the records of its episodes in time
+    order."""
 
     run: R
     trajectory: str
@@ -54,7 +57,8 @@ class RecordedTrajectory(Generic[R, P]):
 def records_of_trajectory(
     run: RecordedRun[P, Any], tasks: Collection[str], trajectory: str | None
 ) -> tuple[str, tuple[UnitRecord[P], ...]]:
-    """Return the name of a trajectory (None: the only one), and a run's records of it in some tasks, in time order.
+    """Return the name of a trajectory (None: the only one), and a run's records of it in some
+    tasks, in time order.
 
     Raises:
         UsageError: there is no such trajectory, or none is given and there are several.
@@ -95,7 +99,8 @@ def restore_trajectory(
     with ExitStack() as stack:
 
         def start_simulator(**options: Any) -> Simulator:
-            # With all trajectories, as in the run: the embedded simulator completes floor plans from each of them.
+            # With all trajectories, as in the run: the embedded simulator completes floor plans
+            # from each of them.
             every = [item.data for item in available.trajectories]
             simulators = Simulators(
                 recorded.run.config.simulator, scenes, every, instances=False, **options
@@ -110,7 +115,8 @@ class EpisodeInReplay(Protocol):
     """An episode that is being replayed."""
 
     def repeat(self, step: Any, *, is_last: bool) -> str:
-        """Repeat a recorded step unless the episode is over; return how its result differs, empty if it does not."""
+        """Repeat a recorded step unless the episode is over; return how its result differs, empty
+        if it does not."""
 
     def observe(self) -> Any:
         """Return the present observation; raises DataError if the simulator sent no frame."""
@@ -130,7 +136,8 @@ class EpisodeReplay(ABC, Generic[P, F]):
 
     @abstractmethod
     def _frame(self, record: UnitRecord[P], number: int, observation: Any, note: str) -> F:
-        """Return the frame after a number of steps; `observation` is None if nobody acted in the episode."""
+        """Return the frame after a number of steps; `observation` is None if nobody acted in the
+        episode."""
 
     @abstractmethod
     def _place(self, record: UnitRecord[P], number: int) -> str:
@@ -155,7 +162,8 @@ class EpisodeReplay(ABC, Generic[P, F]):
         steps, differs = record.payload.steps, False
         for number, step in enumerate(steps, 1):
             difference = episode.repeat(step, is_last=number == len(steps))
-            # Once the worlds differ all later steps may differ too, so the first difference alone is noted.
+            # Once the worlds differ all later steps may differ too, so the first difference alone
+            # is noted.
             note = (
                 f"{self._place(record, number)}: {difference}" if difference and not differs else ""
             )
@@ -164,7 +172,8 @@ class EpisodeReplay(ABC, Generic[P, F]):
 
 
 def ending_of(record: UnitRecord[P], number: int) -> str:
-    """Return how an episode ended if it did with that step, or why nobody acted in it; else an empty text."""
+    """Return how an episode ended if it did with that step, or why nobody acted in it; else an
+    empty text."""
     if record.excluded is not None:
         return f"excluded: {record.excluded}"
     if not record.payload.attempted and record.failure is not None:

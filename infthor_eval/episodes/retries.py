@@ -17,14 +17,16 @@ def with_retries(
 ) -> tuple[T, tuple[str, ...]]:
     """Do something, and retry it in a fresh process if the simulator fails.
 
-    The simulator itself survives the loss of its process by repeating the actions since the last mark. It gives up if
-    these end otherwise than before, or if it is lost again and again; then only the whole work can be done again.
+    The simulator itself survives the loss of its process by repeating the actions since the last
+    mark. It gives up if these end otherwise than before, or if it is lost again and again; then
+    only the whole work can be done again.
 
     Args:
         reset: drops everything that was built in the failed process.
 
     Returns:
-        The result, and the faults on the way: errors of the simulator, and restarts that it survived itself.
+        The result, and the faults on the way: errors of the simulator, and restarts that it
+        survived itself.
 
     Raises:
         SceneError: the simulator has no such scene; a retry would end the same way.

@@ -35,7 +35,8 @@ class EpisodeRunner(Generic[E, P]):
     """A trajectory's environment, in which one episode is run after the other.
 
     Attributes:
-        begun: payload of the present episode once it has begun, without steps; recorded if the subject fails.
+        begun: payload of the present episode once it has begun, without steps; recorded if the
+            subject fails.
         usage: usage of all requests for the present episode, with those of tries that were retried.
     """
 
@@ -43,13 +44,15 @@ class EpisodeRunner(Generic[E, P]):
     usage: Usage
 
     def __init__(self, simulator: Simulator, build: Callable[[], E]) -> None:
-        """Take the trajectory's simulator, and what builds the environment, which restores the scene."""
+        """Take the trajectory's simulator, and what builds the environment, which restores the
+        scene."""
         self._simulator, self._build = simulator, build
         self._environment: E | None = None
 
     @property
     def environment(self) -> E:
-        """The environment. It is built for the first episode, and again after the simulator failed for good."""
+        """The environment. It is built for the first episode, and again after the simulator failed
+        for good."""
         if self._environment is None:
             self._environment = self._build()
         return self._environment
@@ -61,7 +64,8 @@ class EpisodeRunner(Generic[E, P]):
         run: Callable[[], EpisodeResult[P]],
         session: Session[P],
     ) -> UnitRecord[P]:
-        """Run an episode and return its record, also of an error; `run` is repeated if the simulator fails for good."""
+        """Run an episode and return its record, also of an error; `run` is repeated if the
+        simulator fails for good."""
         self.begun, self.usage = None, NOTHING
         start = time.perf_counter()
         try:

@@ -21,7 +21,8 @@ class SharedUnits(Generic[P]):
 
     Attributes:
         trajectories: names of the trajectories that all runs have in full.
-        records: by run, then by trajectory: records of the episodes that count in every run, in time order.
+        records: by run, then by trajectory: records of the episodes that count in every run, in
+            time order.
         notes: what was left out, and how the runs differ, a line each.
     """
 
@@ -32,7 +33,8 @@ class SharedUnits(Generic[P]):
 
 
 def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | None) -> list[str]:
-    """Return the names of the tasks that all runs (at least one) have, or the chosen ones; in the first run's order.
+    """Return the names of the tasks that all runs (at least one) have, or the chosen ones; in the
+    first run's order.
 
     Raises:
         UsageError: there is no shared task, or a chosen one is not shared.
@@ -59,7 +61,8 @@ def shared_units(
     excluded: str,
     differences: Iterable[str] = (),
 ) -> SharedUnits[P]:
-    """Find the episodes of trajectories that all runs (at least one) have in full, in tasks that all have.
+    """Find the episodes of trajectories that all runs (at least one) have in full, in tasks that
+    all have.
 
     Args:
         excluded: description of episodes that some run excludes, for a note.
@@ -90,7 +93,8 @@ def shared_units(
     if not shared:
         which = " and ".join(tasks)
         raise DataError(
-            f"the runs share no trajectory of {which} that all of them have in full; draw runs on the same data"
+            f"the runs share no trajectory of {which} that all of them have in full; draw runs on "
+            "the same data"
         )
     records = tuple(
         tuple(
@@ -102,7 +106,8 @@ def shared_units(
     notes = []
     if len(shared) < len(names):
         notes.append(
-            f"{len(shared)} of {len(names)} trajectories are drawn: those that all of these runs have in full"
+            f"{len(shared)} of {len(names)} trajectories are drawn: those that all of these runs "
+            "have in full"
         )
     if len(shared) == 1:
         notes.append("a mean over one trajectory has no interval")
@@ -123,7 +128,8 @@ def difference_notes(
 
 
 def only_name(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
-    """Return the given name, or the only one that a run has; `what` is its kind, `option` the option that gives it.
+    """Return the given name, or the only one that a run has; `what` is its kind, `option` the
+    option that gives it.
 
     Raises:
         UsageError: the run has nothing of that name, or no name is given and there are several.

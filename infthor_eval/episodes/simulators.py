@@ -1,4 +1,5 @@
-"""Simulator processes for episodes that run at the same time: each has its own, and they are used again."""
+"""Simulator processes for episodes that run at the same time: each has its own, and they are used
+again."""
 
 import weakref
 from collections.abc import Iterator, Sequence
@@ -18,7 +19,8 @@ _COPIES = 512  # of the simulator's state: one for each plan of a long trajector
 
 
 class Simulators:
-    """Starts simulators as they are needed. They are stopped by `close`, or when nobody holds this any more."""
+    """Starts simulators as they are needed. They are stopped by `close`, or when nobody holds this
+    any more."""
 
     def __init__(
         self, name: str, scenes: Path | None, trajectories: Sequence[Trajectory], **options: Any

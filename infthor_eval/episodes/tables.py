@@ -10,7 +10,10 @@ from infthor_eval.tables import Column, Row, Table, left_out_notes
 __all__ = ["NAME_COLUMNS", "endings_table", "named_tasks", "result_notes", "run_name"]
 
 NAME_COLUMNS = (Column("model", False), Column("task", False))
-_EMBEDDED = "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR in Unity."
+_EMBEDDED = (
+    "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR "
+    "in Unity."
+)
 
 T = TypeVar("T", bound=EpisodeTaskSummary)
 
@@ -22,7 +25,8 @@ def run_name(header: RunHeader) -> str:
 
 
 def named_tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, Any]]:
-    """Yield the run's name, the task's name and the task's results (`EpisodeTaskSummary`), for all runs."""
+    """Yield the run's name, the task's name and the task's results (`EpisodeTaskSummary`), for all
+    runs."""
     for run in runs:
         for task_name, task in run.summary.tasks.items():
             yield run_name(run.header), task_name, task
@@ -34,7 +38,8 @@ def endings_table(
     column: str = "",
     value: Callable[[T], Any] = str,
 ) -> Table:
-    """Return the table of how episodes ended, with a further column for a value of each task if it has a heading."""
+    """Return the table of how episodes ended, with a further column for a value of each task if it
+    has a heading."""
     endings = list(dict.fromkeys(ending for _, _, task in tasks for ending in task.endings))
     further = [column] if column else []
     rows = [
@@ -51,7 +56,8 @@ def endings_table(
 
 
 def result_notes(runs: Sequence[RunSummary]) -> tuple[str, ...]:
-    """Return the notes below tables of results: on the embedded simulator, and on what was left out."""
+    """Return the notes below tables of results: on the embedded simulator, and on what was left
+    out."""
     notes = [_EMBEDDED] if any(run.summary.simulator == "embedded" for run in runs) else []
     left_out = left_out_notes(
         [[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs]

@@ -28,7 +28,8 @@ def task_settings(
     """Return the settings of a task file, with those that are given instead.
 
     Args:
-        kind: dataclass of all settings, with defaults; numbers are above 0, and a text may be optional.
+        kind: dataclass of all settings, with defaults; numbers are above 0, and a text may be
+            optional.
         given: settings by name that replace the file's; None keeps the file's.
         choices: allowed texts of settings, by name.
 

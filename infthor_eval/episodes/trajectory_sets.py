@@ -1,4 +1,5 @@
-"""The trajectories of a task: from a file, a folder or an NIEH set, or from a set in the package."""
+"""The trajectories of a task: from a file, a folder or an NIEH set, or from a set in the
+package."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -55,7 +56,8 @@ def find_trajectories(
 
     Args:
         data: file or folder of trajectories, or an NIEH set that has them.
-        bundled: name of a set in the package, which is used instead of `data`; None for no such set.
+        bundled: name of a set in the package, which is used instead of `data`; None for no such
+            set.
         read: reads one trajectory; raises DataError if it cannot be used.
 
     Raises:
@@ -79,7 +81,8 @@ def find_trajectories(
             continue
         if trajectory.traj_id in by_name:
             raise DataError(
-                f"{source.place}: {trajectory.traj_id} is the name of another trajectory too; rename one"
+                f"{source.place}: {trajectory.traj_id} is the name of another trajectory too; "
+                "rename one"
             )
         by_name[trajectory.traj_id] = trajectory
     if not by_name:
@@ -110,8 +113,8 @@ def find_recorded_trajectory(
     """
     if data is None and bundled is None:
         raise UsageError(
-            f"the trajectories of {task} do not come with the package; give them as --data FILE or FOLDER, "
-            "as for the run"
+            f"the trajectories of {task} do not come with the package; give them as --data FILE or "
+            "FOLDER, as for the run"
         )
     available = find_trajectories(data, None if data is not None else bundled, read)
     trajectory = next((item for item in available.trajectories if item.traj_id == name), None)
@@ -131,7 +134,8 @@ def _within(root: Path, text: str) -> str:
 
 
 def _sources(root: Path, broken: _Broken) -> Iterator[TrajectorySource]:
-    """Yield the trajectories that are there; files that cannot be read to the end are added to the broken ones.
+    """Yield the trajectories that are there; files that cannot be read to the end are added to the
+    broken ones.
 
     The trajectories of an NIEH set are beside the logs of their replay.
     """

@@ -27,7 +27,8 @@ class _Log(msgspec.Struct):
 
 
 def read_action_log(path: Path, places: Mapping[str, int]) -> dict[int, tuple[int, ...]]:
-    """Return the frames of each low-level action that has any; `places` are their positions by the stem of the file.
+    """Return the frames of each low-level action that has any; `places` are their positions by the
+    stem of the file.
 
     Raises:
         DataError: the file is missing, has another form, or names frames that are not in `places`.
@@ -40,9 +41,11 @@ def read_action_log(path: Path, places: Mapping[str, int]) -> dict[int, tuple[in
 
 
 def logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] | None:
-    """Return the frames, by their position, of each low-level action by the step log; None if it does not say.
+    """Return the frames, by their position, of each low-level action by the step log; None if it
+    does not say.
 
-    As in the published loader, frames of action 0 are left out with those before the first action: both have 0 there.
+    As in the published loader, frames of action 0 are left out with those before the first action:
+    both have 0 there.
     """
     if all(step.low_idx is None for step in steps):
         return None

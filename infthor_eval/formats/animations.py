@@ -31,12 +31,14 @@ def require_animation_name(path: Path) -> None:
     """
     if path.suffix.lower() not in ANIMATION_FORMATS:
         raise UsageError(
-            f"--out {path}: unknown format; give a file name that ends in {' or '.join(ANIMATION_FORMATS)}"
+            f"--out {path}: unknown format; give a file name that ends in "
+            f"{' or '.join(ANIMATION_FORMATS)}"
         )
 
 
 def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    """Write pictures as an animation, atomically, and return their number; only one at a time is in memory.
+    """Write pictures as an animation, atomically, and return their number; only one at a time is in
+    memory.
 
     Args:
         path: the file; its suffix is one of `ANIMATION_FORMATS`.
@@ -63,7 +65,8 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
 
 
 def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    """Write a GIF whose pictures share one palette: with one each, what does not move would change its colours."""
+    """Write a GIF whose pictures share one palette: with one each, what does not move would change
+    its colours."""
     counts = np.zeros((4, _SHADES**3))
     kept = []
     for number, picture in enumerate(
@@ -84,7 +87,8 @@ def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -
 
 
 def _count_colours(picture: Image.Image) -> NDArray[np.float64]:
-    """Return number, and sums of red, green and blue, of the pixels in each of `_SHADES`³ cubes of colours: [4, n]."""
+    """Return number, and sums of red, green and blue, of the pixels in each of `_SHADES`³ cubes of
+    colours: [4, n]."""
     pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(np.int64)
     cubes = pixels * _SHADES // 256 @ (_SHADES**2, _SHADES, 1)
     weights = (None, *pixels.T)

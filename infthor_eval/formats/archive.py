@@ -1,7 +1,8 @@
 """Unpacking downloaded archives.
 
-An archive is untrusted: its members may point outside the folder, be links or devices, or unpack to more than the
-disk holds. Nothing is unpacked unless every member is a plain file or a folder below the target.
+An archive is untrusted: its members may point outside the folder, be links or devices, or unpack to
+more than the disk holds. Nothing is unpacked unless every member is a plain file or a folder below
+the target.
 """
 
 import gzip
@@ -71,7 +72,8 @@ class _BoundedInfo(tarfile.TarInfo):
 
 
 def _check_end(tar: tarfile.TarFile) -> None:
-    """Check that all members were read: tarfile takes a damaged header for the end of the archive."""
+    """Check that all members were read: tarfile takes a damaged header for the end of the
+    archive."""
     assert tar.fileobj is not None
     tar.fileobj.seek(tar.offset)
     if tar.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
@@ -107,7 +109,8 @@ def _check_members(
         members.append(member)
         if member.size > _MAX_FILE_BYTES or total > max_bytes or len(members) > _MAX_FILES:
             raise DataError(
-                f"{archive}: unpacks to more than the limit or the free disk; make room or check the file"
+                f"{archive}: unpacks to more than the limit or the free disk; make room or check "
+                "the file"
             )
     _check_end(tar)
     if not members:

@@ -18,8 +18,8 @@ _GREY = (128, 128, 128)
 def blank_like(frame: FrameRef) -> FrameRef:
     """Return a plain grey frame of the same size, which costs a model as many tokens.
 
-    One file per size is kept in the user's cache. A frame that cannot be read is returned as it is: reading its pixels
-    then raises the error that says what is wrong with it.
+    One file per size is kept in the user's cache. A frame that cannot be read is returned as it is:
+    reading its pixels then raises the error that says what is wrong with it.
 
     Raises:
         DataError: the file cannot be written.
@@ -46,7 +46,8 @@ def _size(frame: FrameRef) -> tuple[int, int] | None:
 def _write(path: Path, size: tuple[int, int]) -> None:
     """Write the file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    # A folder with a random name, not `write_atomically`: workers may write the same file at the same time.
+    # A folder with a random name, not `write_atomically`: workers may write the same file at the
+    # same time.
     with tempfile.TemporaryDirectory(dir=path.parent, prefix="partial-") as partial:
         file = Path(partial) / path.name
         Image.new("RGB", size, _GREY).save(file)

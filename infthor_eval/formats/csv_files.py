@@ -1,4 +1,5 @@
-"""CSV files: read strictly, so that a missing quote cannot swallow rows, and written so that no cell is a formula."""
+"""CSV files: read strictly, so that a missing quote cannot swallow rows, and written so that no
+cell is a formula."""
 
 import csv
 import io
@@ -40,10 +41,12 @@ def read_rows(
         path: the file.
         columns: columns that the file must have.
         hint: the way to fix a bad file.
-        line_breaks: True if a cell may have several lines; otherwise a line break means an unclosed quote.
+        line_breaks: True if a cell may have several lines; otherwise a line break means an unclosed
+            quote.
 
     Raises:
-        DataError: the file cannot be read, lacks a column or has it twice, or has a quote that is never closed.
+        DataError: the file cannot be read, lacks a column or has it twice, or has a quote that is
+            never closed.
     """
     text = read_text(path, hint)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -93,5 +96,6 @@ def unshield(cell: str) -> str:
 
 
 def shield(cell: str) -> str:
-    """Return the text that a spreadsheet shows as this one: a formula gets an apostrophe before it."""
+    """Return the text that a spreadsheet shows as this one: a formula gets an apostrophe before
+    it."""
     return _SHIELD + cell if cell.startswith((*_FORMULA, _SHIELD)) else cell

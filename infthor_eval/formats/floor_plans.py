@@ -1,7 +1,8 @@
 """Folders of recorded floor plans (`--data`).
 
-`thor_scenes/objects.jsonl.gz` has one `{"scene", "objects"}` per line: the metadata of every object as AI2-THOR 5.x
-reports it (boxes without corner points). `alfred/layouts/FloorPlan<N>-layout.npy` has the reachable (x, z), in metres.
+`thor_scenes/objects.jsonl.gz` has one `{"scene", "objects"}` per line: the metadata of every object
+as AI2-THOR 5.x reports it (boxes without corner points). `alfred/layouts/FloorPlan<N>-layout.npy`
+has the reachable (x, z), in metres.
 """
 
 import gzip
@@ -61,7 +62,8 @@ def write_floor_plan(
         overwrite: True to replace a different recording of the same name.
 
     Raises:
-        DataError: the folder has a different recording of the scene, or `objects.jsonl.gz` cannot be read or written.
+        DataError: the folder has a different recording of the scene, or `objects.jsonl.gz` cannot
+            be read or written.
     """
     path = root / _OBJECTS
     line = json.dumps({"scene": scene, "objects": [_without_corners(item) for item in objects]})
@@ -91,7 +93,8 @@ def write_floor_plan(
 def _layout_files(
     root: Path, scene: str, objects: Sequence[dict[str, Any]], cells: Sequence[tuple[float, float]]
 ) -> dict[Path, bytes]:
-    """Return the content of a floor plan's small files: its reachable cells, and its object types."""
+    """Return the content of a floor plan's small files: its reachable cells, and its object
+    types."""
     array = io.BytesIO()
     np.save(array, np.array(cells, dtype=np.float64).reshape(-1, 2))
     types = sorted({item["objectType"] for item in objects})
@@ -108,7 +111,8 @@ def _read_scenes(path: Path) -> Iterator[tuple[str, str]]:
         scene = entry.get("scene")
         if not isinstance(scene, str):
             raise DataError(
-                f"{path}: a line has no scene name; give a folder of recorded floor plans with --data"
+                f"{path}: a line has no scene name; give a folder of recorded floor plans with "
+                "--data"
             )
         yield scene, json.dumps(entry)
 

@@ -1,7 +1,8 @@
 """References to frames, which are decoded only where pixels are needed.
 
-A trajectory has thousands of frames and a question refers to many of them, so requests carry references and the
-model's adapter decodes. Caches recognise a frame by the digest of its file's content.
+A trajectory has thousands of frames and a question refers to many of them, so requests carry
+references and the model's adapter decodes. Caches recognise a frame by the digest of its file's
+content.
 """
 
 import struct
@@ -46,7 +47,8 @@ _DAMAGED = (
 
 @dataclass(frozen=True)
 class FrameRef:
-    """One frame of a trajectory: the path of its image file (PNG or JPEG, 300x300 in the published data)."""
+    """One frame of a trajectory: the path of its image file (PNG or JPEG, 300x300 in the published
+    data)."""
 
     path: Path
 
@@ -72,7 +74,8 @@ class FrameRef:
             return image.size
 
     def problem(self) -> str | None:
-        """Return why this cannot be a frame, judged by its first bytes, or None if nothing is wrong with those."""
+        """Return why this cannot be a frame, judged by its first bytes, or None if nothing is wrong
+        with those."""
         reason = file_problem(self.path)
         if reason is not None:
             return f"{self.path}: {reason}"
@@ -116,11 +119,18 @@ class FrameRef:
             ) from error
 
     def _wrong_size(self, width: int, height: int) -> str | None:
-        """Return why an image of this size is refused: it would fill the memory, or no image processor accepts it."""
+        """Return why an image of this size is refused: it would fill the memory, or no image
+        processor accepts it."""
         if min(width, height) < 1:
             return f"{self.path}: an image of {width}x{height} pixels"
         if width * height > IMAGE_MEGAPIXELS.value * 1_000_000:
-            return f"{self.path}: an image of {width}x{height} pixels is too large; {IMAGE_MEGAPIXELS.hint}"
+            return (
+                f"{self.path}: an image of {width}x{height} pixels is too large; "
+                f"{IMAGE_MEGAPIXELS.hint}"
+            )
         if max(width, height) > IMAGE_ASPECT.value * min(width, height):
-            return f"{self.path}: an image of {width}x{height} pixels is too narrow; {IMAGE_ASPECT.hint}"
+            return (
+                f"{self.path}: an image of {width}x{height} pixels is too narrow; "
+                f"{IMAGE_ASPECT.hint}"
+            )
         return None

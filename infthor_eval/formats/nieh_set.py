@@ -1,8 +1,9 @@
 """An NIEH set: questions about long egocentric trajectories, and the frames of these.
 
-The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`): `qa_set*.csv` beside
-`metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`, `expert_log.json` and, in some sets,
-`<traj_id>_10fps.mp4`. The trajectory files are in a separate folder (published data) or inside the set (ours).
+The folder has the layout of the published data (hub dataset `PEARLS-Lab/infini-thor-nieh`):
+`qa_set*.csv` beside `metadata/<traj_id>/` with `img/` (or `img_768/`), `metadata.json`,
+`expert_log.json` and, in some sets, `<traj_id>_10fps.mp4`. The trajectory files are in a separate
+folder (published data) or inside the set (ours).
 
 Question files alone, without `metadata/`, are a set too: for whatever needs no frame.
 """
@@ -46,10 +47,12 @@ class NiehSet:
     Attributes:
         root: folder of the set, or one question file.
         has_frames: False if there are question files alone.
-        trajectories: folder of its trajectories (`<traj_id>.json` or `.txt`), or None if they are inside the set.
-        files: all questions by the name of their file, in its order, also those that cannot be asked; rows that are no
-            question are `SkippedQuestion`.
-        simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does not say.
+        trajectories: folder of its trajectories (`<traj_id>.json` or `.txt`), or None if they are
+            inside the set.
+        files: all questions by the name of their file, in its order, also those that cannot be
+            asked; rows that are no question are `SkippedQuestion`.
+        simulator: simulator that rendered the frames ("embedded", "unity"), or None if the set does
+            not say.
     """
 
     def __init__(
@@ -58,8 +61,8 @@ class NiehSet:
         """Read the questions of the set in `root`, which may have none if they are not needed.
 
         Raises:
-            DataError: a folder or file is missing, the set has another format version, or a question file has no
-                row that is a question.
+            DataError: a folder or file is missing, the set has another format version, or a
+                question file has no row that is a question.
         """
         if not root.exists():
             raise DataError(f"{root}: no such folder; {_GIVE_A_SET}")
@@ -75,13 +78,15 @@ class NiehSet:
             raise DataError(f"{root}: {_NO_FRAMES}")
         if trajectories is not None and not trajectories.is_dir():
             raise DataError(
-                f"{trajectories}: no such folder; give the folder of the trajectories with --trajectories"
+                f"{trajectories}: no such folder; give the folder of the trajectories with "
+                "--trajectories"
             )
         self.trajectories = trajectories
         self.simulator = simulator_of(self._folder)
         self.files = {file.stem: self._read_file(file) for file in self._files}
         self._frames: dict[str, dict[int, FrameRef] | DataError] = {}
-        # One tuple per trajectory, shared by all its questions: a copy each would be thousands of references.
+        # One tuple per trajectory, shared by all its questions: a copy each would be thousands of
+        # references.
         self._all_frames: dict[str, tuple[FrameRef, ...] | DataError] = {}
         self._videos: dict[tuple[str, float], Video | DataError] = {}
         self._outlines: dict[str, Outline | DataError] = {}
@@ -89,7 +94,8 @@ class NiehSet:
 
     @cached_property
     def rows(self) -> tuple[Question | SkippedQuestion, ...]:
-        """All questions in the order of the files, as `SkippedQuestion` where they cannot be asked."""
+        """All questions in the order of the files, as `SkippedQuestion` where they cannot be
+        asked."""
         rows: list[Question | SkippedQuestion] = []
         seen = set()
         for question in chain.from_iterable(self.files.values()):
@@ -122,8 +128,10 @@ class NiehSet:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of the questions, the step logs, and the names and sizes of the frames (hex, 32 characters)."""
-        # Not the content of frames, which would mean reading all of it: a record has the digests of its own frames.
+        """Hash of the questions, the step logs, and the names and sizes of the frames (hex, 32
+        characters)."""
+        # Not the content of frames, which would mean reading all of it: a record has the digests of
+        # its own frames.
         digest = hashlib.blake2b(digest_size=16)
         for file in self._files:
             digest.update(file.read_bytes())
@@ -192,10 +200,12 @@ class NiehSet:
     def action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
         """Return the positions in time order of the frames of each low-level action that has any.
 
-        They come from `expert_log.json`, or else from a step log that names the action of each frame.
+        They come from `expert_log.json`, or else from a step log that names the action of each
+        frame.
 
         Raises:
-            DataError: neither says, or `expert_log.json` names frames that the trajectory does not have.
+            DataError: neither says, or `expert_log.json` names frames that the trajectory does not
+                have.
         """
         if traj_id not in self._action_frames:
             self._action_frames[traj_id] = self._read_action_frames(traj_id)
@@ -302,17 +312,20 @@ def _read_frames(folder: Path) -> dict[int, FrameRef]:
     ):
         if duplicate is not None:
             raise DataError(
-                f"trajectory {folder.name}: two entries of metadata.json have {what} {duplicate}; {_HINT}"
+                f"trajectory {folder.name}: two entries of metadata.json have {what} {duplicate}; "
+                f"{_HINT}"
             )
     by_stem = _images(home)
     unknown = sorted(by_stem.keys() - set(names))
-    # Only a surplus of files is an error of the trajectory. A renamed frame is one unknown and one missing file.
+    # Only a surplus of files is an error of the trajectory. A renamed frame is one unknown and one
+    # missing file.
     if len(unknown) > len(set(names) - by_stem.keys()):
         raise DataError(
-            f"trajectory {folder.name}: {len(by_stem)} frames but {len(steps)} entries in metadata.json "
-            f"(none for {unknown[0]}); {_HINT}"
+            f"trajectory {folder.name}: {len(by_stem)} frames but {len(steps)} entries in "
+            f"metadata.json (none for {unknown[0]}); {_HINT}"
         )
-    # A missing file affects only the questions that show it, so it raises an error only when it is read.
+    # A missing file affects only the questions that show it, so it raises an error only when it is
+    # read.
     return {
         step.img_idx: FrameRef(by_stem.get(name, home / Path(step.img_filename).name))
         for step, name in zip(steps, names, strict=True)

@@ -1,7 +1,7 @@
 """Object ids: what they say about an object, and the names that they give it.
 
-Ids are "Type|x|y|z". Parts have the type of the part at the end ("Sink|...|SinkBasin"), slices also a number after an
-underscore ("Apple|...|AppleSliced_2").
+Ids are "Type|x|y|z". Parts have the type of the part at the end ("Sink|...|SinkBasin"), slices also
+a number after an underscore ("Apple|...|AppleSliced_2").
 """
 
 from enum import StrEnum
@@ -30,8 +30,9 @@ def modern_type(object_type: str) -> str:
 class Words(StrEnum):
     """The words in which plans and actions name objects.
 
-    `PUBLISHED` are those of the published scripts: the first part of an object's id, so that a slice of bread is
-    "Bread" and the basin of a sink is "Sink". `NATURAL` are the objects' own types: "BreadSliced", "SinkBasin".
+    `PUBLISHED` are those of the published scripts: the first part of an object's id, so that a
+    slice of bread is "Bread" and the basin of a sink is "Sink". `NATURAL` are the objects' own
+    types: "BreadSliced", "SinkBasin".
     """
 
     PUBLISHED = "published"

@@ -1,4 +1,5 @@
-"""Goals, actions and states of a trajectory, which some contexts show beside its frames; read from its JSON.
+"""Goals, actions and states of a trajectory, which some contexts show beside its frames; read from
+its JSON.
 
 Only these fields are required, so that the reduced files of the published evaluation can be read.
 """
@@ -68,7 +69,8 @@ class Outline(msgspec.Struct):
     @property
     def tasks(self) -> list[tuple[str, range]]:
         """Goals with the ranges of their actions, paired one to one as in the published code."""
-        # Published files repeat the final task as the last sub-task. Ours do not, so it is appended here.
+        # Published files repeat the final task as the last sub-task. Ours do not, so it is appended
+        # here.
         goals = [item.task_desc for item in self.sub_tasks]
         if len(self.sub_trajs) == len(goals) + 1 and self.long_horizon_task is not None:
             goals.append(self.long_horizon_task.task_desc)

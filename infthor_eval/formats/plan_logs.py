@@ -1,10 +1,14 @@
-"""Logs of the published scripts on final long-horizon tasks: counts of plans, a trajectory a line (`.gz` too).
+"""Logs of the published scripts on final long-horizon tasks: counts of plans, a trajectory a line
+(`.gz` too).
 
-    {"traj_id": "floorplan7_12_471_1744791924", "metric": {"total_count": 4, "success_count": 1, "goto_count": 2,
-     "goto_success": 1, "pick_count": 1, "pick_success": 0, "put_count": 1, "put_success": 0, "agent_reward": 0}}
+    {"traj_id": "floorplan7_12_471_1744791924", "metric": {"total_count": 4, "success_count": 1,
+    "goto_count": 2,
+     "goto_success": 1, "pick_count": 1, "pick_success": 0, "put_count": 1, "put_success": 0,
+     "agent_reward": 0}}
 
-A total of 0 says that the trajectory never came to its final task: the set-up failed, which means the task just before
-it; of earlier ones the script leaves out the rest. `agent_reward` is not read: it is 0 in every published row.
+A total of 0 says that the trajectory never came to its final task: the set-up failed, which means
+the task just before it; of earlier ones the script leaves out the rest. `agent_reward` is not read:
+it is 0 in every published row.
 """
 
 import re
@@ -74,7 +78,8 @@ class PlanLog:
 
     @property
     def model(self) -> str | None:
-        """Checkpoint and extension of its context, as a published name has them; None if the log has another name."""
+        """Checkpoint and extension of its context, as a published name has them; None if the log
+        has another name."""
         name = _PUBLISHED_NAME.match(self.path.name)
         return name["model"] if name else None
 

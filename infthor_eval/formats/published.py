@@ -1,7 +1,9 @@
-"""Numbers that the authors published, as data: `results/published/*.yaml`. A new table is a new file.
+"""Numbers that the authors published, as data: `results/published/*.yaml`. A new table is a new
+file.
 
-A row is compared with a run if the run's checkpoint has one of the row's names and about as many parameters. The name
-alone is not enough: one adapter runs a 3B and a 7B checkpoint, and a local folder can have any name.
+A row is compared with a run if the run's checkpoint has one of the row's names and about as many
+parameters. The name alone is not enough: one adapter runs a 3B and a 7B checkpoint, and a local
+folder can have any name.
 """
 
 from collections.abc import Mapping
@@ -31,9 +33,11 @@ class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         values: one number per column, in percent.
         source: origin of the row, if it is not that of the table.
         task: task of ours, or group of tasks, that asks as the row was made; None if there is none.
-        match: column of the published question files with the scores behind the row, if they have it.
+        match: column of the published question files with the scores behind the row, if they have
+            it.
         log: model in the name of the published plan log behind the row, if there is one.
-        misprints: by column, the number that the row should have; only where the printed one is known to be wrong.
+        misprints: by column, the number that the row should have; only where the printed one is
+            known to be wrong.
     """
 
     name: str
@@ -67,7 +71,8 @@ class PublishedTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         context: evaluated setting (for NIEH: the context).
         columns: names of the columns, as in the suite's summary if it has them.
         rows: rows in the paper's order.
-        notes: what is to be known about the numbers, such as other published ones; shown below them.
+        notes: what is to be known about the numbers, such as other published ones; shown below
+            them.
     """
 
     title: str

@@ -1,13 +1,14 @@
 """Question files: `qa_set*.csv` of an NIEH set.
 
-Columns `traj_id`, `question`, `gt_img_idx`, `answer`; the last two are Python-literal lists (`[12, 13]`, `['yes']`).
-`question_type` and `absence` are ours and optional. `absence` is `yes` for questions whose answer is that something is
-nowhere: no frame is evidence for that, and `gt_img_idx` is a sample. Without a `question_type` the tables take the type
-that the question's words have in Table 3 (`question_forms`).
+Columns `traj_id`, `question`, `gt_img_idx`, `answer`; the last two are Python-literal lists (`[12,
+13]`, `['yes']`). `question_type` and `absence` are ours and optional. `absence` is `yes` for
+questions whose answer is that something is nowhere: no frame is evidence for that, and `gt_img_idx`
+is a sample. Without a `question_type` the tables take the type that the question's words have in
+Table 3 (`question_forms`).
 
-The two published files (`qa_set_nieh_single_clue.csv`, `qa_set_nsieh_multi_clue.csv`) have `qid`, `num_evidence`,
-`gt_steps` and `match1` to `match4` too, which are kept; copies without some of them can be read. Other columns are
-ignored.
+The two published files (`qa_set_nieh_single_clue.csv`, `qa_set_nsieh_multi_clue.csv`) have `qid`,
+`num_evidence`, `gt_steps` and `match1` to `match4` too, which are kept; copies without some of them
+can be read. Other columns are ignored.
 """
 
 import ast
@@ -38,7 +39,8 @@ def read_questions(path: Path) -> list[Question | SkippedQuestion]:
     """Read a question file; a row with a malformed cell is a `SkippedQuestion` that names its line.
 
     Raises:
-        DataError: the file cannot be read, is not a CSV file of this form, or no row of it is a question.
+        DataError: the file cannot be read, is not a CSV file of this form, or no row of it is a
+            question.
     """
     hint = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
     file = next((name for name in _CLUE_FILES if f"{name}_clue" in path.stem), None)

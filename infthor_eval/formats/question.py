@@ -14,15 +14,16 @@ ABSENCE = "absence"  # column of the absence questions (no frame is evidence)
 
 @dataclass(frozen=True)
 class PublishedColumns:
-    """What only the published question files say of a question; None or empty where a column is missing.
+    """What only the published question files say of a question; None or empty where a column is
+    missing.
 
     Attributes:
         file: the file that it is in: the one of a single clue or the one of several.
         qid: its name.
         n_evidence: `num_evidence`, pieces of evidence as the published scripts count them.
         steps: `gt_steps`, the steps that its clues belong to.
-        matches: scores on the clue frames by column, `match1` (LLaVA-OneVision), `match2` (Pixtral), `match3`
-            (Qwen2.5-VL) and `match4` (DeepSeek-VL).
+        matches: scores on the clue frames by column, `match1` (LLaVA-OneVision), `match2`
+            (Pixtral), `match3` (Qwen2.5-VL) and `match4` (DeepSeek-VL).
     """
 
     file: Literal["single", "multi"]
@@ -42,9 +43,11 @@ class Question:
         clues: numbers (`img_idx`) of the frames with the evidence, in the order of the file.
         answers: gold answers; if there are several, all are required.
         question_type: content of the `question_type` column, or None if the file has none.
-        absence: True if the answer is that something is nowhere. No frame is evidence; the clues are a sample.
+        absence: True if the answer is that something is nowhere. No frame is evidence; the clues
+            are a sample.
         published: further columns of a published file; None elsewhere.
-        file: name of its file without suffix, among several of a set; empty elsewhere. It is no part of what is asked.
+        file: name of its file without suffix, among several of a set; empty elsewhere. It is no
+            part of what is asked.
     """
 
     traj_id: str
@@ -63,10 +66,12 @@ class Question:
 
     @property
     def clue_column(self) -> str:
-        """Column of the question in the paper's Table 4, `ABSENCE`, or empty if it is in the total alone.
+        """Column of the question in the paper's Table 4, `ABSENCE`, or empty if it is in the total
+        alone.
 
-        Columns count clue frames, not steps. Two published files make one exception: "1" is the whole file of a single
-        clue, and a question of the other file with one frame is in the total alone.
+        Columns count clue frames, not steps. Two published files make one exception: "1" is the
+        whole file of a single clue, and a question of the other file with one frame is in the total
+        alone.
         """
         file = self.published.file if self.published else None
         if self.n_clues == 0:
@@ -77,7 +82,8 @@ class Question:
 
     @cached_property
     def id(self) -> str:
-        """Name of the question, which does not depend on the order of the file: `<traj_id>/<12 hex digits>`, or qid."""
+        """Name of the question, which does not depend on the order of the file: `<traj_id>/<12 hex
+        digits>`, or qid."""
         if (
             self.published and self.published.qid
         ):  # a few published questions are there twice, under two names
@@ -88,7 +94,8 @@ class Question:
 
 @dataclass(frozen=True)
 class SkippedQuestion:
-    """A question that cannot be asked, with the reason; in one variant of the task, or in all if `variant` is empty."""
+    """A question that cannot be asked, with the reason; in one variant of the task, or in all if
+    `variant` is empty."""
 
     question: Question
     reason: str

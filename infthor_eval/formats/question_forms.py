@@ -1,7 +1,8 @@
 """The forms of questions, those of the paper's Table 3 and our further ones, told by their words.
 
-The published question files have no `question_type`. The type and the form of a question follow from its text, in the
-published words ("Is Mug on the Table?") and in ours ("Is the mug on the table?").
+The published question files have no `question_type`. The type and the form of a question follow
+from its text, in the published words ("Is Mug on the Table?") and in ours ("Is the mug on the
+table?").
 """
 
 import re
@@ -17,7 +18,8 @@ class QuestionForm:
     """A form of questions.
 
     Attributes:
-        question_type: its type in the words of the `question_type` column: one of Table 3's, or one of ours.
+        question_type: its type in the words of the `question_type` column: one of Table 3's, or one
+            of ours.
         words: the question with {} for each object.
     """
 
@@ -30,7 +32,8 @@ class QuestionForm:
         return re.fullmatch(pattern, text.strip(), flags=re.IGNORECASE) is not None
 
 
-# In this order: the first that matches is taken, so a form comes before one that its words fit, too.
+# In this order: the first that matches is taken, so a form comes before one that its words fit,
+# too.
 FORMS = (
     QuestionForm("object_presence", "Is there any {} in this room?"),
     QuestionForm("object_presence", "Have you seen {}?"),
@@ -72,7 +75,8 @@ FURTHER_FORMS = (
     ),
     QuestionForm(
         _CONTENT,
-        "Which other things that can be picked up were directly in/on {} when you picked up {} from it?",
+        "Which other things that can be picked up were directly in/on {} when you picked up {} "
+        "from it?",
     ),
     QuestionForm(_PUT, "What did you put in/on {}?"),
     QuestionForm(_PUT, "What did you put down?"),

@@ -1,7 +1,8 @@
 """Reading files of users safely; every such file is read by one of these functions.
 
-Opening a named pipe or a device would block for ever, a packed file can hold a thousand times its size, and a nested
-one can exceed any decoder's recursion limit. Each of these is a `DataError` here, with the file, the reason and a hint.
+Opening a named pipe or a device would block for ever, a packed file can hold a thousand times its
+size, and a nested one can exceed any decoder's recursion limit. Each of these is a `DataError`
+here, with the file, the reason and a hint.
 """
 
 import gzip
@@ -106,7 +107,8 @@ def read_json(path: Path, hint: str, form: Any = Any) -> Any:
     """Return the content of a JSON file as the type that `msgspec` decodes it to.
 
     Raises:
-        DataError: as `read_bytes`, or the content is not JSON, nested too deep, or does not match the type.
+        DataError: as `read_bytes`, or the content is not JSON, nested too deep, or does not match
+            the type.
     """
     content = read_bytes(path, hint)
     expected = "valid JSON" if form is Any else "in its documented form"
@@ -115,7 +117,8 @@ def read_json(path: Path, hint: str, form: Any = Any) -> Any:
 
 
 def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
-    """Yield number (from 1) and content of the lines of a file that are not empty; a `.gz` file is unpacked.
+    """Yield number (from 1) and content of the lines of a file that are not empty; a `.gz` file is
+    unpacked.
 
     Raises:
         DataError: it is not a file, damaged, or a line or the whole file exceeds its limit.
@@ -142,7 +145,8 @@ def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
 
 
 def json_value(text: bytes) -> Any:
-    """Return the value of a JSON text of others, with NaN where it has it, but without lone surrogates.
+    """Return the value of a JSON text of others, with NaN where it has it, but without lone
+    surrogates.
 
     Python's decoder lets these through, and no file could hold what is made of them.
 

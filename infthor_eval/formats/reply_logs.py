@@ -1,13 +1,16 @@
-"""Replies to NIEH questions that others made, a JSON object a line (`.gz` too), in one of three forms.
+"""Replies to NIEH questions that others made, a JSON object a line (`.gz` too), in one of three
+forms.
 
 | form | question | reply |
 |---|---|---|
-| published log (`eval_<question file>_<model>_<mode>.log`) | `qidx`, its row in the question file | `llm_response` |
+| published log | `qidx`, its row in the question file | `llm_response` |
 | neutral | `question_id`, its id or qid | `reply` |
 | lm-eval's `samples_<task>_<time>.jsonl` | `doc`: `question_id` | `resps` |
 
-A published row repeats its question (`question`, `traj_id`, `gt_img_idx`, `gt_answer`) and has a `score`. A neutral one
-may have `n_context_tokens`, `n_reply_tokens`, `seconds` and `frames_shown`, the numbers of the frames that were shown.
+A published log is named `eval_<question file>_<model>_<mode>.log`; a row
+repeats its question (`question`, `traj_id`, `gt_img_idx`, `gt_answer`) and has a `score`. A neutral
+one may have `n_context_tokens`, `n_reply_tokens`, `seconds` and `frames_shown`, the numbers of the
+frames that were shown.
 """
 
 from collections.abc import Iterator
@@ -23,7 +26,8 @@ from infthor_eval.formats.reading import json_value, lines_of
 
 __all__ = ["LoggedReply", "UnreadRow", "read_reply_log"]
 
-_LONGEST = 20_000  # characters of a reply: scoring compares texts in quadratic time, and an answer has a few words
+# characters of a reply: scoring compares texts in quadratic time, and an answer has a few words
+_LONGEST = 20_000
 _HINT = "give a log with a JSON object a line"
 
 
@@ -104,7 +108,8 @@ class UnreadRow:
 
 
 def read_reply_log(path: Path) -> Iterator[LoggedReply | UnreadRow]:
-    """Yield the replies of a log in its order; a bad line, such as a last one that is cut, is an `UnreadRow`.
+    """Yield the replies of a log in its order; a bad line, such as a last one that is cut, is an
+    `UnreadRow`.
 
     Raises:
         DataError: the file cannot be read.

@@ -1,4 +1,5 @@
-"""`set.json` of an NIEH set: the format of its files, and the simulator that rendered its frames."""
+"""`set.json` of an NIEH set: the format of its files, and the simulator that rendered its
+frames."""
 
 import json
 from pathlib import Path
@@ -15,7 +16,8 @@ _FILE = "set.json"
 
 
 def simulator_of(root: Path) -> str | None:
-    """Return the simulator that rendered the set's frames ("embedded", "unity"), or None if it is not recorded.
+    """Return the simulator that rendered the set's frames ("embedded", "unity"), or None if it is
+    not recorded.
 
     Published sets do not record it.
 
@@ -33,7 +35,8 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
     """Record the simulator of a set that is about to be written or continued.
 
     Raises:
-        DataError: another simulator, or another version of this package, has rendered the existing frames.
+        DataError: another simulator, or another version of this package, has rendered the existing
+            frames.
     """
     path, version = root / _FILE, infthor_eval.__version__
     if not path.exists():
@@ -45,11 +48,13 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
     theirs, wrote = info.get("simulator"), info.get("infthor_eval")
     if theirs != simulator:
         raise DataError(
-            f"{root}: its frames are of the {theirs} simulator; give another folder for the {simulator} one"
+            f"{root}: its frames are of the {theirs} simulator; give another folder for the "
+            f"{simulator} one"
         )
     if wrote != version:
         raise DataError(
-            f"{root}: its frames were rendered by version {wrote}, this is {version}; give another folder"
+            f"{root}: its frames were rendered by version {wrote}, this is {version}; give another "
+            "folder"
         )
 
 
@@ -59,7 +64,7 @@ def _read(path: Path) -> dict[str, Any]:
         raise DataError(f"{path}: not a JSON object; write the set again")
     if info.get("format", FORMAT) != FORMAT:
         raise DataError(
-            f"{path}: the set has format {info['format']}, this version reads {FORMAT}; "
-            "use the version that wrote it, or create the set again"
+            f"{path}: the set has format {info['format']}, this version reads {FORMAT}; use the "
+            "version that wrote it, or create the set again"
         )
     return info

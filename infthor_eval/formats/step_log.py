@@ -1,12 +1,12 @@
 """The log of a replayed trajectory: `metadata/<traj_id>/metadata.json`, one entry per frame.
 
-Published data have four layouts (`Layout`), and all are read. In the last one `img_idx` is a list of objects with
-`low_idx` and `img_filename`, as the loader of the branch `dev` reads it. Published entries have `img_idx`,
-`img_filename`, `step` and `object_log`. Ours add optional fields for the question rules and their checker, so that
-either kind of log can be read by either kind of reader.
+Published data have four layouts (`Layout`), and all are read. In the last one `img_idx` is a list
+of objects with `low_idx` and `img_filename`, as the loader of the branch `dev` reads it. Published
+entries have `img_idx`, `img_filename`, `step` and `object_log`. Ours add optional fields for the
+question rules and their checker, so that either kind of log can be read by either kind of reader.
 
-Frame 0 shows the scene before the first action, frame k + 1 the outcome of low-level action k. `step` is the index of
-that action. Frame 0 has step 0, as in the published logs, and no `action`.
+Frame 0 shows the scene before the first action, frame k + 1 the outcome of low-level action k.
+`step` is the index of that action. Frame 0 has step 0, as in the published logs, and no `action`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -46,7 +46,8 @@ class Layout(StrEnum):
 
 
 class ObjectLog(msgspec.Struct, omit_defaults=False):
-    """What the simulator reports about the objects at one frame, by object type (the published fields).
+    """What the simulator reports about the objects at one frame, by object type (the published
+    fields).
 
     Attributes:
         visible: types of the visible objects (within the simulator's visibility distance).
@@ -54,7 +55,8 @@ class ObjectLog(msgspec.Struct, omit_defaults=False):
         is_open: types of the visible objects that are open.
         inven_obj: types of the objects in the agent's hand.
         receptacles: types of the visible receptacles.
-        recep_objs: types of the visible objects in each visible receptacle, by the receptacle's type.
+        recep_objs: types of the visible objects in each visible receptacle, by the receptacle's
+            type.
     """
 
     visible: list[str] = msgspec.field(default_factory=list)
@@ -66,7 +68,8 @@ class ObjectLog(msgspec.Struct, omit_defaults=False):
 
 
 class LoggedPose(msgspec.Struct):
-    """The agent's pose: position in metres, rotation about the vertical and camera horizon in degrees."""
+    """The agent's pose: position in metres, rotation about the vertical and camera horizon in
+    degrees."""
 
     x: float
     y: float
@@ -81,7 +84,8 @@ class ObjectInFrame(msgspec.Struct, omit_defaults=True):
     Attributes:
         pixels: number of the frame's pixels that show it.
         box: [xmin, ymin, xmax, ymax] of these pixels, both ends inclusive.
-        visible: the simulator's flag, True if the object is in view and within the visibility distance.
+        visible: the simulator's flag, True if the object is in view and within the visibility
+            distance.
     """
 
     pixels: int
@@ -127,7 +131,8 @@ class Step(msgspec.Struct, omit_defaults=True):
         img_filename: name of the frame's file.
         step: index of the low-level action before the frame (see the module's docstring).
         object_log: the published fields.
-        action: text of that action ("PickupObject Mug"); None at the first frame and in published logs.
+        action: text of that action ("PickupObject Mug"); None at the first frame and in published
+            logs.
         success: True if the simulator accepted the action.
         error: the simulator's message if it refused the action.
         high_idx: index of the sub-goal that the action belongs to.
@@ -135,8 +140,10 @@ class Step(msgspec.Struct, omit_defaults=True):
         target: id of the object acted on.
         receptacle: id of the receptacle acted on.
         seen: object instances in the frame by id; None in published logs.
-        changes: states, by id, of the objects that changed since the frame before; of all objects at the first frame.
-        low_idx: `step` in the layout of `dev`, where it is null or 0 before the first action; None in the others.
+        changes: states, by id, of the objects that changed since the frame before; of all objects
+            at the first frame.
+        low_idx: `step` in the layout of `dev`, where it is null or 0 before the first action; None
+            in the others.
     """
 
     img_idx: int
@@ -156,7 +163,8 @@ class Step(msgspec.Struct, omit_defaults=True):
 
 
 def read_steps(folder: Path) -> list[Step]:
-    """Read the log of the trajectory in `metadata/<traj_id>`: one entry per frame, in the order of the file.
+    """Read the log of the trajectory in `metadata/<traj_id>`: one entry per frame, in the order of
+    the file.
 
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
@@ -167,7 +175,8 @@ def read_steps(folder: Path) -> list[Step]:
 
 
 def write_steps(folder: Path, steps: Sequence[Step]) -> None:
-    """Write the log of one trajectory into its folder, which must exist: a list of entries, one per line."""
+    """Write the log of one trajectory into its folder, which must exist: a list of entries, one per
+    line."""
     lines = b",\n".join(msgspec.json.encode(step) for step in steps)
     (Path(folder) / _FILE).write_bytes(b"[\n" + lines + b"\n]\n")
 
@@ -215,7 +224,8 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
         case Layout.COLUMNS:
             return _rows(path, document)
         case Layout.OBJECTS:
-            # The published code counts the sorted pictures, so a frame's number is its place among their names.
+            # The published code counts the sorted pictures, so a frame's number is its place among
+            # their names.
             listed = enumerate(
                 sorted(document["img_idx"], key=lambda frame: str(frame.get("img_filename")))
             )
@@ -226,13 +236,15 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
 
 
 def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of a dict of columns, without the columns that are not lists (remarks, not per frame)."""
+    """Return the rows of a dict of columns, without the columns that are not lists (remarks, not
+    per frame)."""
     lists = {name: column for name, column in columns.items() if isinstance(column, list)}
     n_rows = len(columns["img_idx"])
     for name, column in lists.items():
         if len(column) != n_rows:
             raise DataError(
-                f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {n_rows}; {_HINT}"
+                f"{path}: column '{name}' has {len(column)} entries, 'img_idx' has {n_rows}; "
+                f"{_HINT}"
             )
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 

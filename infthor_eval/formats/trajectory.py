@@ -1,8 +1,10 @@
-"""Trajectory JSON: ∞-THOR's, ours, and that of their single-task predecessor, ALFRED's `traj_data.json`.
+"""Trajectory JSON: ∞-THOR's, ours, and that of their single-task predecessor, ALFRED's
+`traj_data.json`.
 
-One set of types serves all three; `_normalize` converts what the published saver writes differently. Unknown fields are
-ignored, so code that passes a trajectory on keeps `TrajectorySource.raw`. Coordinates are metres, except x and z of
-`PlannerAction.location`, which are grid cells of 0.25 m. Angles are degrees.
+One set of types serves all three; `_normalize` converts what the published saver writes
+differently. Unknown fields are ignored, so code that passes a trajectory on keeps
+`TrajectorySource.raw`. Coordinates are metres, except x and z of `PlannerAction.location`, which
+are grid cells of 0.25 m. Angles are degrees.
 """
 
 import re
@@ -77,7 +79,8 @@ class InitAction(_Fields, omit_defaults=False):
 
 
 class ObjectPose(_Fields):
-    """The pose of one object in the initial scene; `name` is that of the Unity object, without "(Clone)"."""
+    """The pose of one object in the initial scene; `name` is that of the Unity object, without
+    "(Clone)"."""
 
     name: str = msgspec.field(name="objectName")
     position: dict[str, float]
@@ -106,7 +109,8 @@ class Scene(_Fields, omit_defaults=False):
 
 
 class ApiAction(_Fields):
-    """One recorded call of the simulator, with object ids of the AI2-THOR version that recorded it."""
+    """One recorded call of the simulator, with object ids of the AI2-THOR version that recorded
+    it."""
 
     action: Annotated[str, Meta(pattern=r"\S")]
     object_id: str | None = msgspec.field(name="objectId", default=None)
@@ -125,7 +129,8 @@ class DiscreteAction(_Fields, omit_defaults=False):
 
     @property
     def box(self) -> tuple[int, int, int, int] | None:
-        """Recorded box [xmin, ymin, xmax, ymax] of the object acted on, in pixels of the 300x300 frame."""
+        """Recorded box [xmin, ymin, xmax, ymax] of the object acted on, in pixels of the 300x300
+        frame."""
         box = self.args.get("bbox") if isinstance(self.args, dict) else None
         return tuple(box) if isinstance(box, list) and len(box) == 4 else None
 
@@ -193,7 +198,8 @@ class SubTrajectory(_Fields, omit_defaults=False):
 
 
 class Trajectory(_Fields):
-    """One trajectory; the fields below `plan` are not in all of the formats (see the module's docstring)."""
+    """One trajectory; the fields below `plan` are not in all of the formats (see the module's
+    docstring)."""
 
     scene: Scene
     plan: ExpertPlan
@@ -214,7 +220,8 @@ class Trajectory(_Fields):
 
 @dataclass(frozen=True)
 class TrajectorySource:
-    """One trajectory in a file, not yet decoded, so that a malformed one does not prevent reading the others.
+    """One trajectory in a file, not yet decoded, so that a malformed one does not prevent reading
+    the others.
 
     `line` is its line in the file, from 1; None if the file holds only this trajectory.
     """
@@ -229,10 +236,12 @@ class TrajectorySource:
         return str(self.path) if self.line is None else f"{self.path}:{self.line}"
 
     def read(self) -> Trajectory:
-        """Decode and check the trajectory; a missing `traj_id` becomes the task's id, else the file's name.
+        """Decode and check the trajectory; a missing `traj_id` becomes the task's id, else the
+        file's name.
 
         Raises:
-            DataError: the text is not JSON, not of the documented form, or has more object poses than the limit.
+            DataError: the text is not JSON, not of the documented form, or has more object poses
+                than the limit.
         """
         catch = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
         with wrap_errors(f"{self.place}: not a trajectory", _HINT, catch=catch):
@@ -240,7 +249,8 @@ class TrajectorySource:
         n_poses = len(trajectory.scene.object_poses)
         if n_poses > OBJECT_POSES.value:
             raise DataError(
-                f"{self.place}: {n_poses:,} object_poses are too many for a scene; {OBJECT_POSES.hint}"
+                f"{self.place}: {n_poses:,} object_poses are too many for a scene; "
+                f"{OBJECT_POSES.hint}"
             )
         stem = self.path.name.split(".")[0]
         in_file = stem if self.line is None else f"{stem}-{self.line}"
@@ -249,7 +259,8 @@ class TrajectorySource:
 
 
 def iter_sources(path: Path) -> Iterator[TrajectorySource]:
-    """Yield the trajectories of a file (`.json`, `.jsonl`, `.jsonl.gz`) or a folder of such files, not decoded.
+    """Yield the trajectories of a file (`.json`, `.jsonl`, `.jsonl.gz`) or a folder of such files,
+    not decoded.
 
     They come in the order of file names and lines.
 
@@ -297,7 +308,8 @@ def iter_trajectories(path: Path) -> Iterator[Trajectory]:
 
 
 def encode_trajectory(trajectory: Trajectory) -> bytes:
-    """Return the trajectory as indented JSON, with the keys that the published saver always writes."""
+    """Return the trajectory as indented JSON, with the keys that the published saver always
+    writes."""
     document = {name: empty() for name, empty in _ALWAYS.items()} | msgspec.to_builtins(trajectory)
     return msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n"
 
@@ -305,8 +317,8 @@ def encode_trajectory(trajectory: Trajectory) -> bytes:
 def _normalize(document: Any) -> Any:
     """Return a decoded file in the form of `Trajectory`.
 
-    The published saver leaves `floor_plan` empty (`scene_num` has the number), writes null for `dirty_and_empty`, and
-    an empty `long_horizon_task` if there is no final task.
+    The published saver leaves `floor_plan` empty (`scene_num` has the number), writes null for
+    `dirty_and_empty`, and an empty `long_horizon_task` if there is no final task.
     """
     if not isinstance(document, dict):
         return document  # `msgspec.convert` refuses it and says what it is
@@ -329,9 +341,11 @@ def _normalize(document: Any) -> Any:
 
 
 def folder_name(traj_id: str) -> str:
-    """Return the name of a trajectory's folder: its id, with other characters than `A-Za-z0-9_.-` replaced.
+    """Return the name of a trajectory's folder: its id, with other characters than `A-Za-z0-9_.-`
+    replaced.
 
-    A hash is appended if any is replaced (the ids of ALFRED have a slash), so that two ids never share a folder.
+    A hash is appended if any is replaced (the ids of ALFRED have a slash), so that two ids never
+    share a folder.
     """
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", traj_id).lstrip(".")[:150]
     return name if name == traj_id and name else f"{name}-{digest(traj_id, 4)}"

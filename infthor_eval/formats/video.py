@@ -1,8 +1,8 @@
 """Videos as models are given them: some frames of a film, as references like other frames.
 
-Frames are sampled as qwen-vl-utils does it, which the published evaluation used. Models need single frames, some
-repeatedly, but a film can only be decoded from its start. So the sampled frames are decoded together and stored in the
-user's cache under the film's digest.
+Frames are sampled as qwen-vl-utils does it, which the published evaluation used. Models need single
+frames, some repeatedly, but a film can only be decoded from its start. So the sampled frames are
+decoded together and stored in the user's cache under the film's digest.
 """
 
 import json
@@ -26,8 +26,8 @@ __all__ = ["FILM_FPS", "Video", "read_video", "sample_positions"]
 
 FILM_FPS = 10  # of the published films, whose frames are those of a trajectory
 
-# Silences FFmpeg, which prints errors of its own beside our one-line error. OpenCV reads the level when it first uses
-# FFmpeg, so it is set on import.
+# Silences FFmpeg, which prints errors of its own beside our one-line error. OpenCV reads the level
+# when it first uses FFmpeg, so it is set on import.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 # Limits of qwen-vl-utils (FPS_MIN_FRAMES, FPS_MAX_FRAMES, FRAME_FACTOR).
@@ -55,15 +55,18 @@ class Video:
         """Raise ValueError if there is no frame, or the rate is not above 0."""
         if not self.frames or not self.fps > 0:
             raise ValueError(
-                f"a video has frames and a rate above 0, not {len(self.frames)} frames at {self.fps} fps"
+                f"a video has frames and a rate above 0, not {len(self.frames)} frames at "
+                f"{self.fps} fps"
             )
 
 
 def sample_positions(n_frames: int, film_fps: float, fps: float) -> tuple[int, ...]:
-    """Return the positions of the frames that are sampled from a film, ascending, as qwen-vl-utils chooses them.
+    """Return the positions of the frames that are sampled from a film, ascending, as qwen-vl-utils
+    chooses them.
 
-    There are `n_frames / film_fps * fps` of them, at least 4 and at most 768, rounded down to an even number, and
-    evenly spread from the first frame to the last. Of a film of one frame, which qwen-vl-utils refuses, it is taken.
+    There are `n_frames / film_fps * fps` of them, at least 4 and at most 768, rounded down to an
+    even number, and evenly spread from the first frame to the last. Of a film of one frame, which
+    qwen-vl-utils refuses, it is taken.
 
     Args:
         n_frames: frames of the film, at least 1.
@@ -78,8 +81,8 @@ def sample_positions(n_frames: int, film_fps: float, fps: float) -> tuple[int, .
 def read_video(path: Path, fps: float) -> Video:
     """Return the frames that are sampled from a film at this rate.
 
-    OpenCV decodes the film at the first call for its content and the rate. The name of the cache folder has the digest
-    of the content, the rate and the version of the decoder.
+    OpenCV decodes the film at the first call for its content and the rate. The name of the cache
+    folder has the digest of the content, the rate and the version of the decoder.
 
     Raises:
         DataError: the film cannot be decoded to its end, or its frames cannot be stored.

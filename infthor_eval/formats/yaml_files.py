@@ -20,8 +20,8 @@ def read_yaml(path: Path, hint: str, loader: type[PlainLoader] = PlainLoader) ->
     """Return the content of a YAML file, whose custom tags the loader knows.
 
     Raises:
-        DataError: the file cannot be read, is not YAML, has duplicate keys or a recursive alias, or exceeds the limit
-            of values once its aliases are expanded.
+        DataError: the file cannot be read, is not YAML, has duplicate keys or a recursive alias, or
+            exceeds the limit of values once its aliases are expanded.
     """
     text = read_text(path, hint)
     with wrap_errors(
@@ -40,7 +40,8 @@ def read_yaml(path: Path, hint: str, loader: type[PlainLoader] = PlainLoader) ->
 
 def _check(root: yaml.Node, path: Path) -> None:
     """Check the nodes of a document before values are built of them."""
-    # Aliases make it a graph: each node is counted once, yet a few nodes can stand for billions of values.
+    # Aliases make it a graph: each node is counted once, yet a few nodes can stand for billions of
+    # values.
     sizes: dict[int, int] = {}
     above: set[int] = set()
 
@@ -64,7 +65,8 @@ def _children(node: yaml.Node, path: Path) -> list[yaml.Node]:
         "\ud800" <= letter <= "\udfff" for letter in node.value
     ):
         raise DataError(
-            f"{path}: half of a character (\\ud800 to \\udfff) in a text; write it whole, or take it out"
+            f"{path}: half of a character (\\ud800 to \\udfff) in a text; write it whole, or take "
+            "it out"
         )
     if isinstance(node, yaml.SequenceNode):
         return list(node.value)

@@ -1,7 +1,7 @@
 """Building the question sets of the package reproducibly from a manifest of scenes and seeds.
 
-The manifest has the trajectories to generate and how questions are sampled. The copy of it in the set also has the
-digest of every file, so that a test can check that the same files are built again.
+The manifest has the trajectories to generate and how questions are sampled. The copy of it in the
+set also has the digest of every file, so that a test can check that the same files are built again.
 """
 
 from collections.abc import Callable
@@ -82,7 +82,8 @@ def build_bundle(
     out: Path,
     progress: Callable[[bool], None] = lambda _: None,
 ) -> tuple[Manifest, GeneratedQuestions]:
-    """Build the set: generate and replay the trajectories, generate questions, and compress the frames.
+    """Build the set: generate and replay the trajectories, generate questions, and compress the
+    frames.
 
     Args:
         manifest: the manifest; its digests are not used.

@@ -77,7 +77,8 @@ class Draft:
 
     @property
     def n_subgoals(self) -> int:
-        """Number of sub-goals in the sense of Algorithm 1: tasks, and put-downs of what they left in the hand."""
+        """Number of sub-goals in the sense of Algorithm 1: tasks, and put-downs of what they left
+        in the hand."""
         return len(self._sub_tasks) + self._n_put_downs
 
     def add(self, trace: Trace) -> None:
@@ -95,7 +96,8 @@ class Draft:
     def add_task(self, task: SubTask, start: Length, end: Length) -> None:
         """Add a completed task, with the lengths before its first action and after its last one.
 
-        Actions after its end, which are part of the draft already, put down what it left in the hand.
+        Actions after its end, which are part of the draft already, put down what it left in the
+        hand.
         """
         number = len(self._sub_tasks)
         self._n_put_downs += self.length.low > end.low
@@ -105,7 +107,8 @@ class Draft:
         self._sub_tasks.append(task)
 
     def drop_last_task(self) -> None:
-        """Remove the last task with its actions, and those that put down what it left in the hand."""
+        """Remove the last task with its actions, and those that put down what it left in the
+        hand."""
         self._sub_tasks.pop()
         part = self._sub_trajs.pop()
         self._n_put_downs -= self.length.low > part.low_pddl_idx[1]
@@ -120,7 +123,8 @@ class Draft:
         return other
 
     def make_last_task_final(self) -> None:
-        """Make the last task the final one, which trajectories of test sets name once more beside the others."""
+        """Make the last task the final one, which trajectories of test sets name once more beside
+        the others."""
         self._final = self._sub_tasks[-1]
 
     def object_log(self) -> list[dict[str, Any]]:
@@ -128,7 +132,8 @@ class Draft:
         return [msgspec.json.decode(entry) for entry in self._log]
 
     def trajectory(self, history: dict[str, Any]) -> Trajectory:
-        """Return the trajectory, with what happened while it was generated (`AttemptStatistics.document`)."""
+        """Return the trajectory, with what happened while it was generated
+        (`AttemptStatistics.document`)."""
         return Trajectory(
             scene=self._scene,
             plan=ExpertPlan(self._low, self._high),
@@ -152,7 +157,8 @@ class Draft:
 
 
 def _image(low: LowAction) -> dict[str, Any]:
-    """Return the entry of the frame after an action, with its name in a replay; frame 0 is before the first action."""
+    """Return the entry of the frame after an action, with its name in a replay; frame 0 is before
+    the first action."""
     assert low.low_idx is not None
     return {
         "high_idx": low.high_idx,

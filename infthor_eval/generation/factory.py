@@ -1,9 +1,9 @@
 """The paper's Algorithm 1: a long trajectory of sampled, planned and simulated tasks.
 
-Failures are counted as the published generator of July 2026 does. Those of tasks of which something was executed count
-in a row; when there are too many, the last sub-goals are dropped: 1, then 2, 4, ... until a task is accepted. Those of
-tasks of which nothing was executed add up, and end the attempt. (They begin anew with the pool of tasks, which ends an
-attempt there.)
+Failures are counted as the published generator of July 2026 does. Those of tasks of which something
+was executed count in a row; when there are too many, the last sub-goals are dropped: 1, then 2, 4,
+... until a task is accepted. Those of tasks of which nothing was executed add up, and end the
+attempt. (They begin anew with the pool of tasks, which ends an attempt there.)
 """
 
 import random
@@ -42,7 +42,8 @@ _MIN_NOT_EXECUTED = 200  # tasks without any executed action that end an attempt
 
 @dataclass
 class GeneratedTrajectory:
-    """One trajectory, with the planning problem of each of its tasks as PDDL (the final one last)."""
+    """One trajectory, with the planning problem of each of its tasks as PDDL (the final one
+    last)."""
 
     trajectory: Trajectory
     statistics: AttemptStatistics
@@ -90,8 +91,8 @@ class _Factory:
         self._settings = settings
         self._name = f"scene {settings.scene}, seed {settings.seed}"
         self._simulator = simulator
-        # One stream for all random choices, seeded by a text, which Python hashes alike in every process. Another order
-        # of draws would be another trajectory.
+        # One stream for all random choices, seeded by a text, which Python hashes alike in every
+        # process. Another order of draws would be another trajectory.
         self._rng = random.Random(f"{settings.scene}/{settings.seed}")
         self._task_types = usual_tasks(settings.scene).intersection(settings.task_types)
         self._pool = TaskPool(self._rng)
@@ -112,7 +113,8 @@ class _Factory:
         grid = reachable_grid(self._simulator)
         if not grid.cells:
             raise UsageError(
-                f"scene {self._settings.scene}: the agent cannot stand anywhere; choose another scene"
+                f"scene {self._settings.scene}: the agent cannot stand anywhere; choose another "
+                "scene"
             )
         x, z = grid.position(self._rng.choice(sorted(grid.cells)))
         start = InitAction(
@@ -183,7 +185,8 @@ class _Factory:
         raise _GaveUp("no final task works; choose another scene or seed")
 
     def _add_final_task(self) -> bool:
-        """Try the tasks between the two ends of the trajectory, each once, in a direction drawn anew for each."""
+        """Try the tasks between the two ends of the trajectory, each once, in a direction drawn
+        anew for each."""
         directions = end_types(self._draft.object_log())
         pool = TaskPool(self._rng)
         while True:
@@ -202,8 +205,8 @@ class _Factory:
     # -- dead ends
 
     def _begin_pool_again(self, candidates: Sequence[Task]) -> None:
-        # The published generator would save what is there; here the same tasks are drawn again. First those that were
-        # left out, as what is known of failures may be outdated.
+        # The published generator would save what is there; here the same tasks are drawn again.
+        # First those that were left out, as what is known of failures may be outdated.
         if self._known_failures:
             self._known_failures.forget()
         elif self._pool.begin_again(candidates):
@@ -231,7 +234,8 @@ class _Factory:
             )
 
     def _roll_back(self) -> None:
-        """Drop the last sub-goals, twice as many as the last time, and go on from the state before them.
+        """Drop the last sub-goals, twice as many as the last time, and go on from the state before
+        them.
 
         Raises:
             _GaveUp: there is nothing to drop.
@@ -264,8 +268,8 @@ class _Factory:
         causes = "; ".join(f"{reason} ({count})" for reason, count in reasons)
         n_failed = statistics.reasons.total()
         return (
-            f"no further task works after {self._draft.length.low} steps and {n_failed} failed tasks "
-            f"({causes or 'no possible task'}); {hint}"
+            f"no further task works after {self._draft.length.low} steps and {n_failed} failed "
+            f"tasks ({causes or 'no possible task'}); {hint}"
         )
 
     # -- one task
@@ -274,7 +278,8 @@ class _Factory:
         return self._known_failures.room(self._simulator.view)
 
     def _candidates(self, room: SymbolicRoom) -> list[Task]:
-        """Return the tasks that are possible now: what is known to be full or out of reach is left out."""
+        """Return the tasks that are possible now: what is known to be full or out of reach is left
+        out."""
         types = {item.object_type for item in self._simulator.view.objects.values()}
         tasks = [task for task in tasks_of(room, types) if task.task_type in self._task_types]
         return [
@@ -343,7 +348,8 @@ class _Factory:
         return RolloutError(f"no receptacle has room for {room.types[held]}", held)
 
     def _execute(self, operators: list[Operator]) -> _Outcome:
-        """Run operators and add their actions; if one fails, the simulator is rewound and nothing is added."""
+        """Run operators and add their actions; if one fails, the simulator is rewound and nothing
+        is added."""
         mark = self._simulator.mark()
         trace = Trace(self._simulator, self._draft.length.high)
         try:

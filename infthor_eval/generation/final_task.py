@@ -1,7 +1,8 @@
 """The final task, whose objects must have been seen at both ends of the trajectory before it.
 
-The object to pick up is among those `pickupable` in the first fifth of the steps and the receptacle (or lamp) among
-those `visible` in the last fifth, or vice versa. So the task requires to remember what was seen long ago.
+The object to pick up is among those `pickupable` in the first fifth of the steps and the receptacle
+(or lamp) among those `visible` in the last fifth, or vice versa. So the task requires to remember
+what was seen long ago.
 """
 
 import math
@@ -19,7 +20,8 @@ SHARE = 0.2  # of the frames, at either end
 
 @dataclass(frozen=True)
 class EndTypes:
-    """Object types seen at the two ends of a trajectory, with the object at one end and the receptacle at the other.
+    """Object types seen at the two ends of a trajectory, with the object at one end and the
+    receptacle at the other.
 
     Attributes:
         pickupable: types that can be picked up, at the end with the object.
@@ -32,7 +34,8 @@ class EndTypes:
     either: frozenset[str]
 
     def allows(self, pickup: str, other: str | None, movable: str | None = None) -> bool:
-        """Return True if a task on these types satisfies the rule; a movable receptacle may be from either end."""
+        """Return True if a task on these types satisfies the rule; a movable receptacle may be from
+        either end."""
         carried = movable is None or movable in self.either
         return carried and pickup in self.pickupable and other in self.visible
 
@@ -42,7 +45,8 @@ class EndTypes:
 
 
 def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]:
-    """Return the types at the ends of an object log (an entry per frame): with the object early, and with it late."""
+    """Return the types at the ends of an object log (an entry per frame): with the object early,
+    and with it late."""
     count = max(1, math.floor(SHARE * len(object_log)))
     first, last = object_log[:count], object_log[-count:]
     either = _types(first, "visible") | _types(last, "visible")
@@ -53,7 +57,8 @@ def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]
 
 
 def violation(trajectory: Trajectory) -> str | None:
-    """Return how a trajectory's final task violates the rule, by its object log, or None if it does not."""
+    """Return how a trajectory's final task violates the rule, by its object log, or None if it does
+    not."""
     task = trajectory.long_horizon_task
     if task is None:
         return "there is no final task"

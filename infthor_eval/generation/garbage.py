@@ -11,8 +11,9 @@ __all__ = ["freeze_existing_objects"]
 def freeze_existing_objects() -> Iterator[None]:
     """Exempt all existing objects, which are mainly those of libraries, from garbage collection.
 
-    Each reply of the simulator decodes to thousands of objects, which trigger collections over all objects again and
-    again: 40 % of the processor time of a long loop of steps (`benchmarks/generation_growth.py`).
+    Each reply of the simulator decodes to thousands of objects, which trigger collections over all
+    objects again and again: 40 % of the processor time of a long loop of steps
+    (`benchmarks/generation_growth.py`).
     """
     gc.collect()
     gc.freeze()

@@ -48,7 +48,8 @@ class GenerationSummary(msgspec.Struct):
         tasks: numbers of tasks in this run, by task type.
         refusals: numbers of failed tasks in this run by reason, the most frequent first.
         not_executed: numbers of sampled tasks in this run of which nothing was executed, by reason.
-        roll_backs: sub-goals dropped at dead ends in this run, as text: "1 sub-goal at step 215, back to 203".
+        roll_backs: sub-goals dropped at dead ends in this run, as text: "1 sub-goal at step 215,
+            back to 203".
         pool_restarts: how often in this run all tasks had been drawn, and were drawn again.
         kept: number of trajectories in this run that gave up, and were kept as far as they got.
         failures: trajectories that could not be generated, one line each.
@@ -132,7 +133,8 @@ def generate_set(
     out: Path,
     progress: Callable[[bool], None] = lambda _: None,
 ) -> GeneratedSet:
-    """Generate the trajectories that `out` does not have yet: a file each, with a folder of its tasks as PDDL.
+    """Generate the trajectories that `out` does not have yet: a file each, with a folder of its
+    tasks as PDDL.
 
     Args:
         jobs: settings of the trajectories.
@@ -156,7 +158,8 @@ def generate_with_workers(
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedSet:
-    """Generate as `generate_set` does, with the same files and errors, by workers that share the folder.
+    """Generate as `generate_set` does, with the same files and errors, by workers that share the
+    folder.
 
     Args:
         jobs: see `generate_set`.
@@ -224,7 +227,8 @@ def _write(generated: GeneratedTrajectory, path: Path) -> None:
 
 
 def _check_earlier(path: Path, job: TrajectorySettings) -> int:
-    """Check that a trajectory was generated with the same settings, and return its number of actions."""
+    """Check that a trajectory was generated with the same settings, and return its number of
+    actions."""
     trajectory = next(iter_sources(path)).read()
     if (trajectory.gen_info or {}).get("settings") != job.document():
         raise UsageError(

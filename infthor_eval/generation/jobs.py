@@ -31,14 +31,16 @@ def trajectory_jobs(
         min_subgoals: minimum number of sub-goals: tasks and put-downs.
         final_task: True to end each trajectory with a final task.
         max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
-        save_floor: number of steps from which a trajectory that gives up is kept as far as it got; 0: never.
+        save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
+            0: never.
 
     Raises:
         UsageError: the number of trajectories exceeds the limit.
     """
     if count * len(scenes) > TRAJECTORIES.value:
         raise UsageError(
-            f"{count} trajectories for each of {len(scenes)} scenes are too many; {TRAJECTORIES.hint}"
+            f"{count} trajectories for each of {len(scenes)} scenes are too many; "
+            f"{TRAJECTORIES.hint}"
         )
     seeds = range(seed, seed + count)
     return [

@@ -1,4 +1,5 @@
-"""Failures of earlier tasks in a room, which are not tried again as long as the objects involved are unchanged."""
+"""Failures of earlier tasks in a room, which are not tried again as long as the objects involved
+are unchanged."""
 
 from collections.abc import Iterator
 
@@ -11,7 +12,8 @@ from infthor_eval.thor.view import SimulatorView, ThorObject
 __all__ = ["KnownFailures"]
 
 _Size = tuple[float, ...]
-_LIFETIME = 24  # tasks after which a failure is forgotten: other objects have moved and may have cleared the way
+# tasks after which a failure is forgotten: other objects have moved and may have cleared the way
+_LIFETIME = 24
 _NEAR = 0.02  # tolerance of positions and sizes, metres
 
 
@@ -22,7 +24,8 @@ class KnownFailures:
         self._n_tasks = 0
         # Number of the task at which an object failed, and its position then.
         self._blocked: dict[str, tuple[int, tuple[float, ...]]] = {}
-        # Number of the task at which an object did not fit into a receptacle, and its contents then.
+        # Number of the task at which an object did not fit into a receptacle, and its contents
+        # then.
         self._refused: dict[tuple[str, str], tuple[int, frozenset[str]]] = {}
         self._sizes: dict[str, _Size | None] = {}
 
@@ -35,7 +38,8 @@ class KnownFailures:
         Args:
             view: state before the failed task.
             item: id of the object.
-            receptacle: id of the receptacle without room; None if the object itself cannot be acted on.
+            receptacle: id of the receptacle without room; None if the object itself cannot be acted
+                on.
         """
         if receptacle is not None:
             self._refused[item, receptacle] = self._n_tasks, _contents(view, receptacle)
@@ -70,9 +74,11 @@ class KnownFailures:
         return room_of(view, self._blocked.keys(), set(self._without_room(view)))
 
     def _without_room(self, view: SimulatorView) -> Iterator[tuple[str, str]]:
-        """Yield (object, receptacle) pairs that do not fit: known ones, and those that follow from sizes.
+        """Yield (object, receptacle) pairs that do not fit: known ones, and those that follow from
+        sizes.
 
-        An object does not fit where an object of at most its size did not, nor into a receptacle of a smaller base.
+        An object does not fit where an object of at most its size did not, nor into a receptacle of
+        a smaller base.
         """
         yield from self._refused
         sizes = {

@@ -1,4 +1,5 @@
-"""Intermediate frames between two poses of the agent, for replays with several frames per action."""
+"""Intermediate frames between two poses of the agent, for replays with several frames per
+action."""
 
 from collections.abc import Iterator
 

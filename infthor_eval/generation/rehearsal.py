@@ -1,6 +1,8 @@
-"""Trying a plan before walking: its interactions are forced from where the agent stands, and taken back.
+"""Trying a plan before walking: its interactions are forced from where the agent stands, and taken
+back.
 
-So what is full, and what is not allowed where, is known before the first step. It costs a fifth of what the walks do.
+So what is full, and what is not allowed where, is known before the first step. It costs a fifth of
+what the walks do.
 """
 
 from typing import Any
@@ -42,8 +44,8 @@ class _ForcedTrace(Trace):
 def rehearse(task: Task, operators: list[Operator], simulator: Simulator) -> RolloutError | None:
     """Return why a plan fails wherever the agent stands; None if it may work.
 
-    The simulator is left as it was. One that cannot store its state is not asked, as going back would take as long as
-    the trajectory.
+    The simulator is left as it was. One that cannot store its state is not asked, as going back
+    would take as long as the trajectory.
     """
     mark = simulator.mark()
     if not simulator.stores(mark):

@@ -1,7 +1,8 @@
 """Replaying one recorded trajectory to frames and a step log.
 
-A refused action is logged with its message and the replay continues, as ALFRED's does. The log has what really
-happened, so questions on it are still correct. The trajectory counts as diverged from its first refused action on.
+A refused action is logged with its message and the replay continues, as ALFRED's does. The log has
+what really happened, so questions on it are still correct. The trajectory counts as diverged from
+its first refused action on.
 """
 
 from pathlib import Path
@@ -33,7 +34,8 @@ class Refusal(msgspec.Struct):
 
 
 class Overlap(msgspec.Struct):
-    """Overlap (IoU) of the rendered and the recorded box of an object, at the frame before the action on it."""
+    """Overlap (IoU) of the rendered and the recorded box of an object, at the frame before the
+    action on it."""
 
     step: int
     action: str
@@ -77,15 +79,16 @@ def replay(
 ) -> ReplayReport:
     """Run a trajectory and write its frames and logs into a folder.
 
-    These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the room in words after
-    each task and at the end, by index of the low-level action.
+    These are `img/`, `metadata.json`, `traj.txt`, `expert_log.json`, and `state_summary.json`: the
+    room in words after each task and at the end, by index of the low-level action.
 
     Args:
         trajectory: a trajectory of ALFRED, of ∞-THOR, or ours.
         simulator: simulator to run it in; its scene is replaced.
         folder: an existing, empty folder.
         digest: hash of the trajectory's JSON, for the report.
-        frames: number of frames of each action that moves the agent or its camera; other actions have one.
+        frames: number of frames of each action that moves the agent or its camera; other actions
+            have one.
 
     Raises:
         SimulatorError: the simulator fails, or has no such scene.
@@ -111,7 +114,8 @@ def replay(
 
 
 def box_iou(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> float:
-    """Return the intersection over union of two boxes [xmin, ymin, xmax, ymax], both ends inclusive."""
+    """Return the intersection over union of two boxes [xmin, ymin, xmax, ymax], both ends
+    inclusive."""
     width = min(one[2], other[2]) - max(one[0], other[0]) + 1
     height = min(one[3], other[3]) - max(one[1], other[1]) + 1
     shared = max(width, 0) * max(height, 0)
@@ -159,7 +163,8 @@ class _Run:
     def _call(
         self, index: int, low: LowAction, before: SimulatorView
     ) -> tuple[str | None, str | None]:
-        """Execute an action; returns the id of the object acted on, and the reason if it was refused."""
+        """Execute an action; returns the id of the object acted on, and the reason if it was
+        refused."""
         try:
             call = translate(low, self._grounding, before)
         except MissingObjectError as missing:
@@ -172,7 +177,8 @@ class _Run:
     def _compare_box(
         self, index: int, low: LowAction, target: str | None, before: SimulatorView
     ) -> None:
-        """Compare the recorded box of the object acted on with the box in the frame before the action."""
+        """Compare the recorded box of the object acted on with the box in the frame before the
+        action."""
         recorded = low.discrete_action.box if low.discrete_action is not None else None
         if recorded is None or target is None or before.instances is None:
             return

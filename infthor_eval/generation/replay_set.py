@@ -1,7 +1,8 @@
 """Replaying many trajectories into one set; an interrupted run is resumed by the same command.
 
-Each trajectory is written to a hidden folder, which is renamed when it is complete. An existing folder is therefore
-complete; if it was made from the same trajectory, it is counted and not replayed again.
+Each trajectory is written to a hidden folder, which is renamed when it is complete. An existing
+folder is therefore complete; if it was made from the same trajectory, it is counted and not
+replayed again.
 """
 
 import time
@@ -89,7 +90,8 @@ class ReplayedSet:
 def select(
     paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None
 ) -> Selection:
-    """Read the trajectories of files and folders, at most `limit`, and at most `per_floor_plan` on one floor plan.
+    """Read the trajectories of files and folders, at most `limit`, and at most `per_floor_plan` on
+    one floor plan.
 
     Raises:
         DataError: a path has no trajectory file.
@@ -137,7 +139,8 @@ def replay_set(
     progress: Callable[[bool], None] = lambda _: None,
     frames: int = 1,
 ) -> ReplayedSet:
-    """Replay the selected trajectories into `out/metadata/<traj_id>`; a failure does not stop the others.
+    """Replay the selected trajectories into `out/metadata/<traj_id>`; a failure does not stop the
+    others.
 
     Args:
         selection: the trajectories.
@@ -227,7 +230,8 @@ def _failure_outcome(item: Item, error: InfthorError) -> _ReplayOutcome:
 def _all_sources(
     paths: Iterable[Path], failures: list[ReplayFailure]
 ) -> Iterator[TrajectorySource]:
-    """Yield the trajectories of all files; among several files, one that cannot be read is added to `failures`."""
+    """Yield the trajectories of all files; among several files, one that cannot be read is added to
+    `failures`."""
     for path in paths:
         files = trajectory_files(path)
         for file in files:
@@ -282,10 +286,12 @@ def _check_earlier(folder: Path, digest: str, frames: int) -> ReplayReport:
     report = read_json(folder / _REPORT, "remove the folder to replay it again", ReplayReport)
     if report.digest != digest:
         raise DataError(
-            f"{folder}: replayed from another trajectory of this name; remove it or choose another --out"
+            f"{folder}: replayed from another trajectory of this name; remove it or choose another "
+            "--out"
         )
     if report.frames != frames:
         raise DataError(
-            f"{folder}: replayed with {report.frames} frames per move; remove it or choose another --out"
+            f"{folder}: replayed with {report.frames} frames per move; remove it or choose another "
+            "--out"
         )
     return report

@@ -1,6 +1,7 @@
 """Executing a symbolic plan in the simulator, sub-goal by sub-goal.
 
-Receptacles are opened and closed where this is needed. The first action that the simulator refuses ends the rollout.
+Receptacles are opened and closed where this is needed. The first action that the simulator refuses
+ends the rollout.
 """
 
 from collections.abc import Callable
@@ -117,7 +118,8 @@ class Rollout:
             self._interact("CloseObject", holder)
 
     def _interact(self, action: str, item: str, receptacle: str | None = None) -> None:
-        """Execute an action on an object; the stored form of PutObject has the held object and the receptacle."""
+        """Execute an action on an object; the stored form of PutObject has the held object and the
+        receptacle."""
         acted_on = item if receptacle is None else receptacle
         if acted_on not in self._view.objects:
             raise RolloutError(f"{action}: {acted_on.split('|')[0]} is gone")
@@ -130,7 +132,8 @@ class Rollout:
             place_stationary=force.get("placeStationary"),
         )  # fmt: skip
         self.trace.act(api, {"objectId": acted_on, **force})
-        self._walker.forget_grid()  # a door or an object on the floor may block cells now, or no longer
+        # a door or an object on the floor may block cells now, or no longer
+        self._walker.forget_grid()
 
     # -- objects
 
@@ -139,7 +142,8 @@ class Rollout:
         return self.trace.view
 
     def _resolve(self, item: str) -> str:
-        """Return the object id of a planned item; a planned slice gets a real one when it is first needed."""
+        """Return the object id of a planned item; a planned slice gets a real one when it is first
+        needed."""
         if "#" not in item:
             return item
         if item not in self._slices:

@@ -1,9 +1,10 @@
 """Sampling the next task, as the published generator does when it runs.
 
-A task is a tuple of a goal, the object, the movable receptacle, and the receptacle or lamp. Each value of each variable
-gets the weight 1 / (1 + n), n drawn from 0 to 10. (The published weights also have counts of uses, which stay 0 as it
-runs.) The value that leads the others of its variable by most is taken, and the same is repeated with the tuples that
-have it. A tuple that was drawn is not drawn again, whether it was accepted or not.
+A task is a tuple of a goal, the object, the movable receptacle, and the receptacle or lamp. Each
+value of each variable gets the weight 1 / (1 + n), n drawn from 0 to 10. (The published weights
+also have counts of uses, which stay 0 as it runs.) The value that leads the others of its variable
+by most is taken, and the same is repeated with the tuples that have it. A tuple that was drawn is
+not drawn again, whether it was accepted or not.
 """
 
 import random
@@ -36,19 +37,22 @@ class TaskPool:
         return tasks[0]
 
     def begin_again(self, candidates: Collection[Task]) -> bool:
-        """Let all tasks be drawn again; returns False if that does not help, as none of `candidates` was drawn."""
+        """Let all tasks be drawn again; returns False if that does not help, as none of
+        `candidates` was drawn."""
         if self._drawn.isdisjoint(candidates):
             return False
         self._drawn.clear()
         return True
 
     def _narrow(self, tasks: Sequence[Task]) -> list[Task]:
-        """Return the tasks with the value that leads by most; there are at least two tasks, and fewer afterwards."""
+        """Return the tasks with the value that leads by most; there are at least two tasks, and
+        fewer afterwards."""
         variable, value = max(self._leads(tasks))[2:]
         return [task for task in tasks if _values(task)[variable] == value]
 
     def _leads(self, tasks: Sequence[Task]) -> list[tuple[float, float, int, str]]:
-        """Return the lead of each value over the last of its variable, a tie-breaker, the variable, and the value."""
+        """Return the lead of each value over the last of its variable, a tie-breaker, the variable,
+        and the value."""
         leads = []
         for variable in range(_N_VARIABLES):
             values = sorted({_values(task)[variable] for task in tasks} - {""})
@@ -61,5 +65,6 @@ class TaskPool:
 
 
 def _values(task: Task) -> tuple[str, str, str, str]:
-    """Return the variables of a task, as published: slices are objects of their own; "" for none."""
+    """Return the variables of a task, as published: slices are objects of their own; "" for
+    none."""
     return str(task.task_type), task.target, task.movable or "", task.receptacle or task.light or ""

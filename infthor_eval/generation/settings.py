@@ -20,11 +20,13 @@ class TrajectorySettings:
         scene: name of the scene.
         seed: seed of all random choices.
         min_steps: minimum number of low-level actions.
-        min_subgoals: minimum number of sub-goals, as Algorithm 1 calls tasks and put-downs, without the final task.
+        min_subgoals: minimum number of sub-goals, as Algorithm 1 calls tasks and put-downs, without
+            the final task.
         final_task: True to end with a final task (see the module `final_task`).
         task_types: task types to sample from, if the scene's room type has them.
         max_fail: number of failed tasks in a row after which the last sub-goals are dropped.
-        save_floor: number of steps from which a trajectory that gives up is kept as far as it got; 0: never.
+        save_floor: number of steps from which a trajectory that gives up is kept as far as it got;
+            0: never.
     """
 
     scene: str

@@ -20,11 +20,13 @@ T = TypeVar("T", bound=_JobOutcome)
 
 
 class SimulatorWorker:
-    """A worker with a simulator; see `infthor_eval.workers.Worker`. A `partial` with its first arguments opens it.
+    """A worker with a simulator; see `infthor_eval.workers.Worker`. A `partial` with its first
+    arguments opens it.
 
     Args:
         open_simulator: starts the simulator; pickled as `run_job` is.
-        run_job: does one job in the simulator; it is pickled, so it must be a module's function or a `partial` of one.
+        run_job: does one job in the simulator; it is pickled, so it must be a module's function or
+            a `partial` of one.
         number: number of the worker.
     """
 

@@ -1,4 +1,5 @@
-"""What happened while trajectories were generated: tasks tried, failures, and how often generation went back."""
+"""What happened while trajectories were generated: tasks tried, failures, and how often generation
+went back."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -32,12 +33,15 @@ class AttemptStatistics:
 
     Attributes:
         tried: tasks of which at least one action was executed, by type.
-        accepted: those that were completed and validated, by type; some may have been dropped later.
+        accepted: those that were completed and validated, by type; some may have been dropped
+            later.
         reasons: failed tasks of which an action was executed, by reason.
         not_executed: sampled tasks of which nothing was executed, by reason.
         roll_backs: sub-goals that were dropped at dead ends.
-        pool_restarts: numbers of low-level actions at which all tasks had been drawn and the pool began again.
-        gave_up: True if the trajectory gave up before its lengths were reached, and was kept as far as it got.
+        pool_restarts: numbers of low-level actions at which all tasks had been drawn and the pool
+            began again.
+        gave_up: True if the trajectory gave up before its lengths were reached, and was kept as far
+            as it got.
     """
 
     tried: Counter[str] = field(default_factory=Counter)

@@ -25,7 +25,8 @@ def tasks_table(summary: GenerationSummary) -> Table:
 
 
 def generation_notes(summary: GenerationSummary) -> list[str]:
-    """Return lines on the failures of a run, its dead ends, and the pools of tasks that began again."""
+    """Return lines on the failures of a run, its dead ends, and the pools of tasks that began
+    again."""
     n_not_executed = sum(summary.not_executed.values())
     notes = [
         (
@@ -50,7 +51,8 @@ def _most_frequent(reasons: dict[str, int]) -> str:
 
 
 def refusals_table(summary: ReplaySummary) -> Table | None:
-    """Return the numbers of the actions that were refused at least once, one row per name, or None without any."""
+    """Return the numbers of the actions that were refused at least once, one row per name, or None
+    without any."""
     rows = []
     for name, counts in summary.actions.items():
         share = counts.accepted / (counts.accepted + counts.refused)
@@ -61,7 +63,8 @@ def refusals_table(summary: ReplaySummary) -> Table | None:
 
 
 def overlaps_table(summary: ReplaySummary) -> Table | None:
-    """Return the overlaps of boxes that differ from the recording, by action and object type; None without any."""
+    """Return the overlaps of boxes that differ from the recording, by action and object type; None
+    without any."""
     rows = [
         Row((name, str(overlap.count), f"{overlap.median:.2f}", f"{overlap.mean:.2f}"))
         for name, overlap in {**summary.iou_by_action, **summary.iou}.items()
@@ -75,7 +78,8 @@ def overlaps_table(summary: ReplaySummary) -> Table | None:
 
 
 def regular_numbers(summary: ReplaySummary) -> str:
-    """Return one line on the actions and boxes that the tables leave out because they are as recorded."""
+    """Return one line on the actions and boxes that the tables leave out because they are as
+    recorded."""
     accepted = [counts.accepted for counts in summary.actions.values() if not counts.refused]
     exact = [overlap.count for overlap in summary.iou_by_action.values() if _is_exact(overlap)]
     parts = (
@@ -85,9 +89,13 @@ def regular_numbers(summary: ReplaySummary) -> str:
     )
     if exact:
         parts.append(
-            f"{_all_or_other(exact, summary.iou_by_action)}{sum(exact)} boxes as recorded (IoU 1.00)"
+            f"{_all_or_other(exact, summary.iou_by_action)}{sum(exact)} boxes as recorded (IoU "
+            "1.00)"
         )
-    return f"{', '.join(parts) or 'nothing as recorded'} (--json has the numbers by action and object type)"
+    return (
+        f"{', '.join(parts) or 'nothing as recorded'} (--json has the numbers by action and object "
+        "type)"
+    )
 
 
 def _all_or_other(regular: Sized, everything: Sized) -> str:

@@ -1,4 +1,5 @@
-"""Walking to poses from which objects can be acted on, replanned when the simulator refuses a step."""
+"""Walking to poses from which objects can be acted on, replanned when the simulator refuses a
+step."""
 
 from infthor_eval.formats.trajectory import ApiAction, PlannerAction
 from infthor_eval.generation.trace import RolloutError, Trace
@@ -26,7 +27,8 @@ class Walker:
         self._grid: Grid | None = None
 
     def go(self, shown: list[str], inside: str | None = None) -> None:
-        """Walk to where objects can be acted on; this is a sub-goal, unless the agent is there already.
+        """Walk to where objects can be acted on; this is a sub-goal, unless the agent is there
+        already.
 
         Args:
             shown: ids of the objects; the agent faces the first.
@@ -66,8 +68,8 @@ class Walker:
         return viewpoint
 
     def _walk(self, viewpoint: Viewpoint, shown: list[str]) -> None:
-        # A refused step changes nothing and is not part of the trajectory. Its cell is removed from the grid, so that
-        # the next path leads around it.
+        # A refused step changes nothing and is not part of the trajectory. Its cell is removed from
+        # the grid, so that the next path leads around it.
         target = self._trace.view.objects[shown[0]].object_type
         while (moves := self._moves(viewpoint)) is not None:
             if all(self._move(action) for action in moves):
@@ -93,7 +95,8 @@ class Walker:
         return ["LookDown" if steps > 0 else "LookUp"] * abs(steps)
 
     def _move(self, action: str) -> bool:
-        """Execute one action of a walk; returns False if a step is blocked, and removes its cell from the grid."""
+        """Execute one action of a walk; returns False if a step is blocked, and removes its cell
+        from the grid."""
         if action != "MoveAhead":
             degrees = _TURN if action.startswith("Rotate") else HORIZON_STEP
             self._trace.act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))

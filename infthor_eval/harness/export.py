@@ -59,7 +59,8 @@ def convert_run(outcome: RunOutcome) -> Exported:
 
 
 def export(outcome: RunOutcome) -> Path:
-    """Write `lm_eval/<model>/results_<time>.json` and `samples_<task>_<time>.jsonl` into a run's folder.
+    """Write `lm_eval/<model>/results_<time>.json` and `samples_<task>_<time>.jsonl` into a run's
+    folder.
 
     Returns:
         The folder with both.
@@ -85,7 +86,8 @@ def export(outcome: RunOutcome) -> Path:
 
 @dataclass(frozen=True)
 class _Scored:
-    """A task with the records of its units, the scores of each, and its line in lm-eval's file without the scores."""
+    """A task with the records of its units, the scores of each, and its line in lm-eval's file
+    without the scores."""
 
     file: TaskFile
     records: list[UnitRecord[Any]] = field(default_factory=list)
@@ -118,7 +120,8 @@ def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
 
 
 def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
-    """Return a row per sample, in the task's order; one that was repeated has all replies, and its mean scores."""
+    """Return a row per sample, in the task's order; one that was repeated has all replies, and its
+    mean scores."""
     repeated: dict[int, list[tuple[dict[str, Any], Mapping[str, float]]]] = {}
     for row, scores in zip(task.rows, task.scores, strict=True):
         repeated.setdefault(row["doc_id"], []).append((row, scores))

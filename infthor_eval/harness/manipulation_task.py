@@ -1,7 +1,8 @@
-"""Manipulation in lm-eval: the functions behind the files in `tasks/manipulation/`, and the adapter of their requests.
+"""Manipulation in lm-eval: the functions behind the files in `tasks/manipulation/`, and the adapter
+of their requests.
 
-A request is an episode. lm-eval has no simulator and no policies, so only our model class can answer, with a policy as
-its adapter.
+A request is an episode. lm-eval has no simulator and no policies, so only our model class can
+answer, with a policy as its adapter.
 """
 
 import json
@@ -37,14 +38,16 @@ def dataset(**config: Any) -> dict[str, Any]:
 
     if not model_takes_references():
         raise UsageError(
-            "arms are driven in a simulator, which infthor-eval's policies alone do; use --model infthor"
+            "arms are driven in a simulator, which infthor-eval's policies alone do; use --model "
+            "infthor"
             " --model_args adapter=openvla"
         )
     doc = settings_doc("manipulation", config, ArmTaskSettings, ManipulationOptions)
     units = ManipulationEvaluation(task_request(doc, "dataset", ManipulationOptions, {}, 0)).units
     return {
         "test": Dataset.from_list([
-            {**doc, "arm_episode": unit.key.id, "instruction": unit.payload.instruction} for unit in units
+            {**doc, "arm_episode": unit.key.id,
+             "instruction": unit.payload.instruction} for unit in units
         ])
     }  # fmt: skip
 

@@ -1,4 +1,5 @@
-"""Our models under lm-eval's own command: `lm-eval run --model infthor --model_args adapter=qwen2.5-vl-tiny,...`."""
+"""Our models under lm-eval's own command: `lm-eval run --model infthor --model_args
+adapter=qwen2.5-vl-tiny,...`."""
 
 from collections.abc import Hashable, Sequence
 from contextlib import closing
@@ -31,9 +32,9 @@ _DEFAULT_DEVICE = "cuda:0"  # lm-eval's default
 class InfthorLM(LM):
     """Any model of ours, by name, under lm-eval's command.
 
-    Each request is recorded before the next one starts. lm-eval sorts requests by the length of their text, which
-    scatters the questions on one trajectory; here they are grouped again, so that they share most. Requests refer to
-    their frames through the doc; images in them are ignored.
+    Each request is recorded before the next one starts. lm-eval sorts requests by the length of
+    their text, which scatters the questions on one trajectory; here they are grouped again, so that
+    they share most. Requests refer to their frames through the doc; images in them are ignored.
     """
 
     MULTIMODAL = True  # lm-eval asks before it hands over a task with images
@@ -52,7 +53,8 @@ class InfthorLM(LM):
 
         Args:
             adapter: name of the model (`infthor-eval ls models`).
-            journal: folder of a run, resumed if it exists; None to keep the journal for this process only.
+            journal: folder of a run, resumed if it exists; None to keep the journal for this
+                process only.
             seed: seed of everything random in the model.
             batch_size: lm-eval's; passed on to models that take one.
             max_batch_size: lm-eval's; ignored.
@@ -60,7 +62,8 @@ class InfthorLM(LM):
             options: the model's options.
 
         Raises:
-            UsageError: an unknown name or option, or a baseline, which needs the answer key that lm-eval does not give.
+            UsageError: an unknown name or option, or a baseline, which needs the answer key that
+                lm-eval does not give.
             ModelError: the model cannot be loaded.
         """
         super().__init__()
@@ -99,7 +102,8 @@ class InfthorLM(LM):
         return {"model_source": NAME, "model_name": self._model.name}
 
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
-        """Return one response per request; empty if the model could not answer (the journal has the reason).
+        """Return one response per request; empty if the model could not answer (the journal has the
+        reason).
 
         Raises:
             UsageError: the model lacks what a suite needs.
@@ -160,6 +164,7 @@ def _suite_and_task(request: Instance) -> tuple[str, str]:
     suite = request.doc.get("suite") if isinstance(request.doc, dict) else None
     if request.task_name is None or not isinstance(suite, str):
         raise ModelError(
-            f"{request.task_name}: infthor-eval's models answer its own tasks (tasks/nieh) under lm-eval"
+            f"{request.task_name}: infthor-eval's models answer its own tasks (tasks/nieh) under "
+            "lm-eval"
         )
     return suite, request.task_name

@@ -1,4 +1,5 @@
-"""NIEH in lm-eval: the functions behind the task files in `tasks/nieh/`, and the adapter of their requests.
+"""NIEH in lm-eval: the functions behind the task files in `tasks/nieh/`, and the adapter of their
+requests.
 
 A request is a question. The functions are those of our own runs, in lm-eval's forms.
 """
@@ -33,21 +34,23 @@ __all__ = [
     "process_results",
 ]
 
-# lm-eval 0.4.13 reads no entry points; where it imports a task's functions before it looks for the model (a task file
-# given by its path), this lets it find ours.
+# lm-eval 0.4.13 reads no entry points; where it imports a task's functions before it looks for the
+# model (a task file given by its path), this lets it find ours.
 register()
 
 
 def dataset(**config: Any) -> dict[str, Any]:
     """Build the docs of a task, one per sample (`custom_dataset` of the task files).
 
-    Requests hold decoded images, as lm-eval's own models need them; ours decode the frames themselves.
+    Requests hold decoded images, as lm-eval's own models need them; ours decode the frames
+    themselves.
 
     Args:
         config: see `find_samples`; whatever else lm-eval passes to every task is ignored.
 
     Raises:
-        UsageError: nothing can be asked, a memory would have to ask the model, or as in `find_samples`.
+        UsageError: nothing can be asked, a memory would have to ask the model, or as in
+            `find_samples`.
         DataError: the set cannot be read.
     """
     from datasets import Dataset

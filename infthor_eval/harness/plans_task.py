@@ -1,7 +1,8 @@
-"""Plans in lm-eval: the functions behind the task files in `tasks/plans/`, and the adapter of their requests.
+"""Plans in lm-eval: the functions behind the task files in `tasks/plans/`, and the adapter of their
+requests.
 
-A request is a trajectory. lm-eval has no simulator, so only our model class can answer; its response has the outcome of
-every plan.
+A request is a trajectory. lm-eval has no simulator, so only our model class can answer; its
+response has the outcome of every plan.
 """
 
 import json
@@ -37,7 +38,8 @@ def dataset(**config: Any) -> dict[str, Any]:
 
     if not model_takes_references():
         raise UsageError(
-            "plans are carried out in a simulator, which infthor-eval's models alone do; use --model infthor"
+            "plans are carried out in a simulator, which infthor-eval's models alone do; use "
+            "--model infthor"
         )
     doc = settings_doc("plans", config, PlanTaskSettings, PlansOptions)
     texts: dict[str, list[str]] = {}
@@ -63,7 +65,8 @@ def doc_to_target(doc: Doc) -> str:
 
 
 def process_results(_doc: Doc, results: Sequence[str]) -> dict[str, float]:
-    """Return the share of completed plans, and the reward of all plans; see `PlansRequests.response`."""
+    """Return the share of completed plans, and the reward of all plans; see
+    `PlansRequests.response`."""
     plans = json.loads(results[0] or "[]")
     return {
         "success": sum(plan["done"] for plan in plans) / len(plans) if plans else 0.0,

@@ -1,7 +1,8 @@
 """The way of lm-eval's requests to a suite of any package.
 
-The functions of a task file make docs, each with the name of its suite under "suite". lm-eval hands them to our model,
-which looks up the suite's `RequestAdapter` by that name (`infthor_eval.suites.find_request_adapter`).
+The functions of a task file make docs, each with the name of its suite under "suite". lm-eval hands
+them to our model, which looks up the suite's `RequestAdapter` by that name
+(`infthor_eval.suites.find_request_adapter`).
 """
 
 from collections.abc import Hashable, Mapping, Sequence
@@ -22,7 +23,8 @@ class RequestAdapter(Protocol[U, P]):
     def prepare(
         self, task: str, docs: Sequence[Doc], generation_kwargs: Mapping[str, Any], seed: int
     ) -> Evaluation[U, P]:
-        """Set up the evaluation of a task's docs (at least one); units that belong to none of them are not done."""
+        """Set up the evaluation of a task's docs (at least one); units that belong to none of them
+        are not done."""
 
     def doc_id(self, doc: Doc) -> Hashable:
         """Return the id of a doc, unique among those of its task."""

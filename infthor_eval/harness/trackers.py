@@ -30,7 +30,8 @@ class Trackers:
         trackio_args: Arguments | None = None,
         hf_hub_log_args: Arguments | None = None,
     ) -> None:
-        """Check the arguments of `wandb.init`, `trackio.init` and lm-eval's `EvaluationTracker`; None for not used.
+        """Check the arguments of `wandb.init`, `trackio.init` and lm-eval's `EvaluationTracker`;
+        None for not used.
 
         Raises:
             UsageError: a package or a token is missing, or an argument is not known.
@@ -43,7 +44,8 @@ class Trackers:
         """Send a run to all trackers.
 
         Raises:
-            DataError: a tracker refused it; the run's own files are complete, and the same command sends them again.
+            DataError: a tracker refused it; the run's own files are complete, and the same command
+                sends them again.
         """
         trackers: dict[str, tuple[Callable[[Exported, str], None], Any]] = {
             "Weights & Biases": (self._to_wandb, self._wandb),
@@ -109,7 +111,8 @@ def _init_arguments(package: str, typed: Arguments | None) -> dict[str, Any] | N
 
 
 def _hub_arguments(typed: Arguments | None) -> dict[str, Any] | None:
-    """Return the arguments of lm-eval's tracker, with the token of the environment or of `hf auth login`."""
+    """Return the arguments of lm-eval's tracker, with the token of the environment or of `hf auth
+    login`."""
     if typed is None:
         return None
     from huggingface_hub import get_token
@@ -138,13 +141,15 @@ def _parse(option: str, typed: Arguments, names: list[str]) -> dict[str, Any]:
         if name not in names:
             near = difflib.get_close_matches(name, names, n=1)
             raise UsageError(
-                f"{option} has no {name}; {f'did you mean {near[0]}?' if near else f'there are {names}'}"
+                f"{option} has no {name}; "
+                f"{f'did you mean {near[0]}?' if near else f'there are {names}'}"
             )
     return {name: handle_arg_string(value) for name, value in typed.items()}
 
 
 def _as_evaluated(run: Exported) -> dict[str, list[dict[str, Any]]]:
-    """Return the samples as lm-eval has them before it writes them: the arguments of a request as a pair."""
+    """Return the samples as lm-eval has them before it writes them: the arguments of a request as a
+    pair."""
     return {
         task: [
             {

@@ -1,7 +1,7 @@
 """The receptacles that each object type can be put into, and the actions that apply to it.
 
-The tables are the published ones (`affordances.yaml`). They are narrower than what AI2-THOR allows, which would accept
-a statue in the sink basin. Types are those of AI2-THOR 5.x.
+The tables are the published ones (`affordances.yaml`). They are narrower than what AI2-THOR allows,
+which would accept a statue in the sink basin. Types are those of AI2-THOR 5.x.
 """
 
 from collections.abc import Iterable
@@ -40,7 +40,8 @@ _ACTIONS = {action: _types(names) for action, names in _TABLES["action_objects"]
 
 CLEANABLE, COOLABLE, HEATABLE = (_ACTIONS[name] for name in ("Cleanable", "Coolable", "Heatable"))
 STOWABLE = frozenset[str]().union(*_HOLDS.values())  # types with at least one receptacle
-# Without the egg of the published table: a sliced egg is cracked and leaves nothing that could be put anywhere.
+# Without the egg of the published table: a sliced egg is cracked and leaves nothing that could be
+# put anywhere.
 SLICEABLE = frozenset(name for name in _ACTIONS["Sliceable"] if f"{name}Sliced" in STOWABLE)
 KNIVES = frozenset({"ButterKnife", "Knife"})
 LIGHTS = _ACTIONS["Toggleable"]
@@ -70,7 +71,8 @@ _INSIDE = frozenset(
 
 
 def goes_into(item: str, receptacle: str) -> bool:
-    """Return True if the published table has object type `item` for receptacle type `receptacle`."""
+    """Return True if the published table has object type `item` for receptacle type
+    `receptacle`."""
     return item in _HOLDS.get(receptacle, frozenset())
 
 

@@ -11,7 +11,8 @@ __all__ = ["contents_of", "direct_parent", "is_in", "logged_parent"]
 
 
 def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str]:
-    """Return the ids of all objects in or on a receptacle, including those in or on its contents."""
+    """Return the ids of all objects in or on a receptacle, including those in or on its
+    contents."""
     contents: set[str] = set()
     new = {holder}
     while new:
@@ -26,8 +27,8 @@ def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str
 def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
     """Return True if an object is directly in or on a receptacle.
 
-    An object in a bowl is not directly in the cabinet around the bowl. If furniture is nested (a drawer in a dresser),
-    every piece that the simulator reports counts.
+    An object in a bowl is not directly in the cabinet around the bowl. If furniture is nested (a
+    drawer in a dresser), every piece that the simulator reports counts.
     """
     item, holder = view.objects.get(object_id), view.objects.get(receptacle_id)
     if item is None or holder is None:
@@ -41,9 +42,11 @@ def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
 
 
 def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:
-    """Return the id of the innermost receptacle that an object is in or on, possibly the floor; None if there is none.
+    """Return the id of the innermost receptacle that an object is in or on, possibly the floor;
+    None if there is none.
 
-    If several qualify, it is the smallest: planning needs one place even where the report is ambiguous.
+    If several qualify, it is the smallest: planning needs one place even where the report is
+    ambiguous.
     """
     parents = [
         objects[key]
@@ -60,8 +63,8 @@ def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | 
 def logged_parent(state: ObjectState, world: Mapping[str, ObjectState]) -> str | None:
     """Return the innermost receptacle of an object in the step log.
 
-    It is None if the object is held, lies on the floor, or its receptacle is ambiguous: questions and summaries must
-    not guess, and a log has no sizes to compare.
+    It is None if the object is held, lies on the floor, or its receptacle is ambiguous: questions
+    and summaries must not guess, and a log has no sizes to compare.
     """
     if state.held:
         return None

@@ -1,7 +1,8 @@
 """The conditions of a task's goal, one by one, for ALFRED's goal-condition success.
 
-They are those of ALFRED's `goal_conditions_met` (`env/tasks.py`, Shridhar et al., CVPR 2020): a hot potato in the
-fridge is one in the fridge, a hot one, and one that is both. The goal holds (`household.goals`) where all are met.
+They are those of ALFRED's `goal_conditions_met` (`env/tasks.py`, Shridhar et al., CVPR 2020): a hot
+potato in the fridge is one in the fridge, a hot one, and one that is both. The goal holds
+(`household.goals`) where all are met.
 """
 
 from collections import Counter
@@ -24,7 +25,8 @@ class GoalConditions(NamedTuple):
 
 
 def goal_conditions(task: Task, view: SimulatorView, treatments: Treatments) -> GoalConditions:
-    """Return the conditions of a task's goal in the current state, given what was washed, heated and cooled."""
+    """Return the conditions of a task's goal in the current state, given what was washed, heated
+    and cooled."""
     types = {key: item.object_type for key, item in view.objects.items()}
     parents = dict(room_of(view).start.where)
     items = {key for key, object_type in types.items() if object_type in task.targets}

@@ -1,4 +1,5 @@
-"""Goal conditions of tasks, and the planner's lower bound on the operators that are still needed."""
+"""Goal conditions of tasks, and the planner's lower bound on the operators that are still
+needed."""
 
 from collections import Counter
 from dataclasses import replace
@@ -27,15 +28,16 @@ def is_achieved(task: Task, room: SymbolicRoom, state: State) -> bool:
 def goal_holds(task: Task, view: SimulatorView, treatments: Treatments | None = None) -> bool:
     """Return True if the goal of a task holds in the simulator.
 
-    The conditions are ALFRED's, except that an `Apple` does not count as an `AppleSliced`, as it does in ALFRED's
-    comparison of ids. Any object of the type will do, and any slice. A lamp must be lit and visible. PUT_AWAY is the
-    published condition: the hand is empty, and an object of the type, whole or sliced, in such a receptacle.
+    The conditions are ALFRED's, except that an `Apple` does not count as an `AppleSliced`, as it
+    does in ALFRED's comparison of ids. Any object of the type will do, and any slice. A lamp must
+    be lit and visible. PUT_AWAY is the published condition: the hand is empty, and an object of the
+    type, whole or sliced, in such a receptacle.
 
     Args:
         task: the task.
         view: the current state of the simulator.
-        treatments: the washed, heated and cooled objects. If None, they are unknown: then all objects count as
-            treated, and lit lamps as visible.
+        treatments: the washed, heated and cooled objects. If None, they are unknown: then all
+            objects count as treated, and lit lamps as visible.
     """
     room = room_of(view)
     everything = frozenset(room.types)
@@ -53,7 +55,8 @@ def goal_holds(task: Task, view: SimulatorView, treatments: Treatments | None = 
 
 
 def lower_bound(task: Task, room: SymbolicRoom, state: State) -> int:
-    """Return a lower bound on the operators to the goal (admissible, for A*); it is 0 only where the goal holds."""
+    """Return a lower bound on the operators to the goal (admissible, for A*); it is 0 only where
+    the goal holds."""
     if is_achieved(task, room, state):
         return 0
     here = room.types.get(state.at or "")
@@ -74,13 +77,15 @@ def _n_to_slice(task: Task, room: SymbolicRoom, state: State, held: str | None) 
 
 
 def _n_to_treat(task: Task, state: State, here: str | None) -> int:
-    """Return the operators that washing, heating or cooling needs: going to the appliance, and using it."""
+    """Return the operators that washing, heating or cooling needs: going to the appliance, and
+    using it."""
     treated = _treated_items(task, state)
     return 0 if treated is None or treated else 1 + (here != APPLIANCE[task.task_type])
 
 
 def _n_to_carry(task: Task, room: SymbolicRoom, state: State, held: str | None) -> int:
-    """Return the pick-ups and puts that are needed; none for a sliced item, which may be sliced at its destination."""
+    """Return the pick-ups and puts that are needed; none for a sliced item, which may be sliced at
+    its destination."""
     if task.task_type == TaskType.STACK:
         where = dict(state.where)
         carriers = [item for item in where if room.types[item] == task.movable]
@@ -110,9 +115,11 @@ def _treated_items(task: Task, state: State) -> frozenset[str] | None:
 
 
 def _n_placed(task: Task, room: SymbolicRoom, state: State) -> int:
-    """Return how many objects of the required type and treatment are in one receptacle of the required type.
+    """Return how many objects of the required type and treatment are in one receptacle of the
+    required type.
 
-    They must be in the same receptacle: two objects on two side tables do not count as two on the side table.
+    They must be in the same receptacle: two objects on two side tables do not count as two on the
+    side table.
     """
     where = dict(state.where)
     treated = _treated_items(task, state)

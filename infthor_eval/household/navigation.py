@@ -29,7 +29,8 @@ class Grid:
     """The cells that the agent can reach."""
 
     def __init__(self, positions: Iterable[tuple[float, float]]) -> None:
-        """Build the grid of positions (x, z) in metres, spaced by 0.25 m; the first one gives its offset."""
+        """Build the grid of positions (x, z) in metres, spaced by 0.25 m; the first one gives its
+        offset."""
         points = sorted(positions)
         self._origin = (points[0][0] % GRID, points[0][1] % GRID) if points else (0.0, 0.0)
         self.cells = frozenset(self.cell(x, z) for x, z in points)
@@ -56,17 +57,19 @@ class Grid:
         return {stand: length for stand, (length, _) in self._search(start, None).items()}
 
     def distances_to(self, goal: GridPose) -> Mapping[GridPose, int]:
-        """Return the number of actions to a pose from every pose that leads to it; the result is cached.
+        """Return the number of actions to a pose from every pose that leads to it; the result is
+        cached.
 
-        The goal's cell counts as reachable even if the grid lacks it. Cells beside the grid are possible starts, as in
-        `path`: the agent can step from there onto the grid.
+        The goal's cell counts as reachable even if the grid lacks it. Cells beside the grid are
+        possible starts, as in `path`: the agent can step from there onto the grid.
         """
         if goal not in self._to:
             self._to[goal] = self._search_back(goal)
         return self._to[goal]
 
     def path(self, start: GridPose, goal: GridPose) -> list[str] | None:
-        """Return the shortest sequence of MoveAhead, RotateLeft and RotateRight, or None if there is none."""
+        """Return the shortest sequence of MoveAhead, RotateLeft and RotateRight, or None if there
+        is none."""
         reached = self._search(start, goal)
         if goal not in reached:
             return None
@@ -107,7 +110,8 @@ class Grid:
         return reached
 
     def _moves(self, pose: GridPose) -> list[tuple[str, GridPose]]:
-        # MoveAhead first: the order breaks ties between paths of the same length, so it is part of the generated data.
+        # MoveAhead first: the order breaks ties between paths of the same length, so it is part of
+        # the generated data.
         moves = [
             ("RotateLeft", GridPose(pose.cell, (pose.facing - 90) % 360)),
             ("RotateRight", GridPose(pose.cell, (pose.facing + 90) % 360)),

@@ -1,8 +1,10 @@
-"""The planner's operators and problems as PDDL, so that others can verify that the plans are optimal.
+"""The planner's operators and problems as PDDL, so that others can verify that the plans are
+optimal.
 
-The domain is STRIPS with types, negative preconditions and action costs: every operator costs one. PDDL goals refer to
-objects but tasks to object types, so zero-cost `finish` actions recognise each task's goal. A problem has all places of
-the room, without the planner's reductions, and the items of the task's types.
+The domain is STRIPS with types, negative preconditions and action costs: every operator costs one.
+PDDL goals refer to objects but tasks to object types, so zero-cost `finish` actions recognise each
+task's goal. A problem has all places of the room, without the planner's reductions, and the items
+of the task's types.
 """
 
 from collections.abc import Iterable
@@ -18,12 +20,16 @@ _FINISHES = {
     TaskType.PLACE: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p))",
     TaskType.PLACE_TWO: "(?i ?j - item ?p - place) (and (target ?i) (target ?j) (not (= ?i ?j))"
     " (goal-place ?p) (in ?i ?p) (in ?j ?p))",
-    TaskType.EXAMINE: "(?i - item ?p - place) (and (target ?i) (holding ?i) (at ?p) (goal-lamp ?p) (lit ?p))",
-    TaskType.CLEAN: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (clean ?i))",
+    TaskType.EXAMINE: "(?i - item ?p - place) (and (target ?i) (holding ?i) (at ?p) (goal-lamp ?p) "
+    "(lit ?p))",
+    TaskType.CLEAN: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (clean "
+    "?i))",
     TaskType.HEAT: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (hot ?i))",
     TaskType.COOL: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (cold ?i))",
-    TaskType.STACK: "(?i ?c - item ?p - place) (and (target ?i) (carrier ?c) (goal-place ?p) (in ?i ?c) (in ?c ?p))",
-    TaskType.PUT_AWAY: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) (handempty))",
+    TaskType.STACK: "(?i ?c - item ?p - place) (and (target ?i) (carrier ?c) (goal-place ?p) (in "
+    "?i ?c) (in ?c ?p))",
+    TaskType.PUT_AWAY: "(?i - item ?p - place) (and (target ?i) (goal-place ?p) (in ?i ?p) "
+    "(handempty))",
 }
 
 _OPERATORS = (
@@ -93,7 +99,8 @@ def _build_domain() -> str:
         " (:types item place - thing)",
         " (:predicates (at ?p - place) (holding ?i - item) (handempty) (in ?i - item ?t - thing)",
         "  (fits ?i - item ?t - thing) (knife ?i - item) (slices ?i ?s ?t - item)",
-        "  (basin ?p - place) (oven ?p - place) (fridge ?p - place) (lamp ?p - place) (lit ?p - place)",
+        "  (basin ?p - place) (oven ?p - place) (fridge ?p - place) (lamp ?p - place) (lit ?p - "
+        "place)",
         "  (clean ?i - item) (hot ?i - item) (cold ?i - item)",
         "  (target ?i - item) (carrier ?i - item) (goal-place ?p - place) (goal-lamp ?p - place)",
         *(f"  (asked-{_symbol(task_type)})" for task_type in TaskType),
@@ -122,7 +129,8 @@ def problem(task: Task, room: SymbolicRoom, name: str = "task") -> str:
     on_floor = [item for item in items if where[item] == FLOOR]
     names = {key: f"p{number}" for number, key in enumerate(sorted(room.places))}
     names |= {key: f"i{number}" for number, key in enumerate(items)}
-    # An item on the floor has a place of its own. "nowhere" is where the agent starts if it is at no place.
+    # An item on the floor has a place of its own. "nowhere" is where the agent starts if it is at
+    # no place.
     places = (
         [names[key] for key in sorted(room.places)]
         + [f"floor-{names[key]}" for key in on_floor]

@@ -1,8 +1,9 @@
 """Optimal plans, with the fewest sub-goals, by A* over symbolic states.
 
-The search is reduced to what can matter, and plans stay optimal. Every operator costs one, so all places are equivalent
-that are not part of the task (not the source of a needed item, not a goal, not a needed sink, microwave, fridge or
-lamp). Each item that may have to be put aside needs only one of these.
+The search is reduced to what can matter, and plans stay optimal. Every operator costs one, so all
+places are equivalent that are not part of the task (not the source of a needed item, not a goal,
+not a needed sink, microwave, fridge or lamp). Each item that may have to be put aside needs only
+one of these.
 """
 
 import heapq
@@ -23,12 +24,14 @@ _LIMIT = (
 
 
 def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
-    """Return the shortest plan for a task in a room's current state: empty if the goal holds, None if there is none."""
+    """Return the shortest plan for a task in a room's current state: empty if the goal holds, None
+    if there is none."""
     if not is_feasible(task, room):
         return None
     problem = _Problem(task, room)
     start = problem.start
-    # Ties are broken by the order of insertion: states are not ordered, and plans must not depend on hashes.
+    # Ties are broken by the order of insertion: states are not ordered, and plans must not depend
+    # on hashes.
     order = itertools.count()
     queue = [(lower_bound(task, room, start), next(order), 0, start)]
     previous: dict[State, tuple[State, Operator] | None] = {start: None}
@@ -49,7 +52,8 @@ def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
 
 
 def is_feasible(task: Task, room: SymbolicRoom) -> bool:
-    """Return False if no item fits into any goal receptacle, or into any movable one that must go there.
+    """Return False if no item fits into any goal receptacle, or into any movable one that must go
+    there.
 
     Without this check the search would run to its limit.
     """
@@ -74,7 +78,8 @@ def _any_fits(room: SymbolicRoom, items: list[str], receptacles: list[str]) -> b
 
 
 def relevant_items(task: Task, room: SymbolicRoom) -> set[str]:
-    """Return the ids of the items of the task's types, of knives if it slices, and of the items that hold these."""
+    """Return the ids of the items of the task's types, of knives if it slices, and of the items
+    that hold these."""
     types = {task.pickup, *task.targets, task.movable} | (set(KNIVES) if task.sliced else set())
     where = dict(room.start.where)
     relevant = {item for item in where if room.types[item] in types or item == room.start.held}

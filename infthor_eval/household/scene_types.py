@@ -23,7 +23,8 @@ _FLOOR_PLANS = {
 
 
 def scene_type(scene: str) -> str | None:
-    """Return the room type in the published tables' words ("LivingRoom"), or None for houses and unknown names."""
+    """Return the room type in the published tables' words ("LivingRoom"), or None for houses and
+    unknown names."""
     number = re.fullmatch(r"FloorPlan(\d+)", scene)
     if number is not None:
         return next(
@@ -33,6 +34,7 @@ def scene_type(scene: str) -> str | None:
 
 
 def usual_tasks(scene: str) -> frozenset[TaskType]:
-    """Return the task types that are drawn from in a scene's room type, or all of these if that is unknown."""
+    """Return the task types that are drawn from in a scene's room type, or all of these if that is
+    unknown."""
     room = scene_type(scene)
     return frozenset(name for name in SAMPLED if room is None or room in GOALS_BY_ROOM[name])

@@ -1,7 +1,7 @@
 """Finding poses from which an object is visible and can be acted on.
 
-Candidates come from geometry. The simulator then tests them: the agent is teleported there and back, which moves
-nothing else and is not part of the trajectory.
+Candidates come from geometry. The simulator then tests them: the agent is teleported there and
+back, which moves nothing else and is not part of the trajectory.
 """
 
 import math
@@ -57,14 +57,15 @@ def find_viewpoint(
 ) -> Viewpoint | None:
     """Return the viewpoint with the fewest actions to it from which all given objects are visible.
 
-    For an object that can be picked up, a slightly farther viewpoint is preferred if it has the object well inside the
-    frame, and not at its edge: the frame then shows what is done with it.
+    For an object that can be picked up, a slightly farther viewpoint is preferred if it has the
+    object well inside the frame, and not at its edge: the frame then shows what is done with it.
 
     Args:
         simulator: the simulator; its agent returns to its pose.
         grid: the reachable cells.
         shown: ids of the objects that must be visible; the agent faces the first.
-        inside: id of an object hidden in the first one, which must become visible when that is opened.
+        inside: id of an object hidden in the first one, which must become visible when that is
+            opened.
         min_pixels: minimum size of the first object in the frame, pixels.
 
     Returns:
@@ -118,15 +119,16 @@ def _is_well_inside(view: SimulatorView, item: str) -> bool:
 
 
 def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels: int) -> bool:
-    """Open a receptacle and close it; return True if the object in it was visible and closing succeeded."""
+    """Open a receptacle and close it; return True if the object in it was visible and closing
+    succeeded."""
     view = simulator.query("OpenObject", objectId=holder, **_NO_IMAGE)
     if not view.success:
         return False
     is_visible = _shows(view, [inside], min_pixels)
     if simulator.query("CloseObject", objectId=holder, **_NO_IMAGE).success:
         return is_visible
-    # An open drawer can be out of view, and then cannot be closed normally. It must not stay open, as the trajectory
-    # has no action that opened it.
+    # An open drawer can be out of view, and then cannot be closed normally. It must not stay open,
+    # as the trajectory has no action that opened it.
     if not simulator.query("CloseObject", objectId=holder, forceAction=True, **_NO_IMAGE).success:
         raise SimulatorError(
             f"{holder} was opened to look into it and cannot be closed again; choose another scene"
@@ -137,7 +139,8 @@ def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels:
 def _candidates(
     view: SimulatorView, grid: Grid, focus: ThorObject, distances: dict[GridPose, int]
 ) -> Iterator[Viewpoint]:
-    """Yield viewpoints from which the object should be in the frame, those with the fewest actions first."""
+    """Yield viewpoints from which the object should be in the frame, those with the fewest actions
+    first."""
     box = focus.axis_aligned_bounding_box
     target = focus.position if box is None else box.center
     eye = view.agent.position.y + CAMERA_HEIGHT
@@ -147,7 +150,8 @@ def _candidates(
         if distance > _REACH or sideways > _SIDEWAYS:
             continue
         down = math.degrees(math.atan2(eye - target.y, max(distance, 0.1)))
-        # Penalties, in numbers of actions, for standing too near and for an object off the centre of the frame.
+        # Penalties, in numbers of actions, for standing too near and for an object off the centre
+        # of the frame.
         penalty = 4 * (distance < _TOO_NEAR) + sideways / 15
         for horizon in sorted(_HORIZONS, key=lambda angle: abs(angle - down))[:2]:
             off = abs(horizon - down)
@@ -158,7 +162,8 @@ def _candidates(
 
 
 def _bearing(position: tuple[float, float], facing: int, target: Vector) -> tuple[float, float]:
-    """Return the horizontal distance to the target (metres), and its angle from the agent's heading (degrees)."""
+    """Return the horizontal distance to the target (metres), and its angle from the agent's heading
+    (degrees)."""
     dx, dz = target.x - position[0], target.z - position[1]
     angle = (math.degrees(math.atan2(dx, dz)) - facing + 180) % 360 - 180
     return math.hypot(dx, dz), abs(angle)

@@ -1,7 +1,7 @@
 """A trajectory as the text on which models are trained and prompted (`traj.txt`).
 
-Each task has `<|goal|>Your main goal: ...<|goal|>` and the frame at its start, each sub-goal `<|plan|>Plan:
-...<|plan|>`, and each action `<|act|>...<|act|><image>`.
+Each task has `<|goal|>Your main goal: ...<|goal|>` and the frame at its start, each sub-goal
+`<|plan|>Plan: ...<|plan|>`, and each action `<|act|>...<|act|><image>`.
 """
 
 from collections.abc import Callable
@@ -59,10 +59,10 @@ _OBJECT_ACTIONS = {
 def plan_text(high: HighAction, words: Words) -> str:
     """Return a sub-goal in words.
 
-    `Words.PUBLISHED` are those of the published script (`get_templated_high_pddl_desc`): names out of the ids in
-    `planner_action` ("put the Mug in the Sink"), in GotoLocation the argument; a sub-goal without a template is empty.
-    `Words.NATURAL` are the arguments ("put the mug in the sink"); a sub-goal without a template, or without arguments,
-    has its name.
+    `Words.PUBLISHED` are those of the published script (`get_templated_high_pddl_desc`): names out
+    of the ids in `planner_action` ("put the Mug in the Sink"), in GotoLocation the argument; a
+    sub-goal without a template is empty. `Words.NATURAL` are the arguments ("put the mug in the
+    sink"); a sub-goal without a template, or without arguments, has its name.
 
     Raises:
         DataError: published words lack a name.
@@ -91,14 +91,16 @@ def _published_plan(high: HighAction) -> str:
     if len(needed) < template.count("{") or None in needed:
         missing = "place" if template == _PLANS["GotoLocation"] else "object"
         raise DataError(
-            f"sub-goal {high.high_idx} ({kind:.40}) names no {missing}, which the published words need; take"
+            f"sub-goal {high.high_idx} ({kind:.40}) names no {missing}, which the published words "
+            "need; take"
             " --words natural"
         )
     return template.format(*needed)
 
 
 def _published_names(high: HighAction) -> list[str | None]:
-    """Return the names of object and receptacle; PutObject without an object takes both from its arguments."""
+    """Return the names of object and receptacle; PutObject without an object takes both from its
+    arguments."""
     action, planner = high.discrete_action, high.planner_action
     names: list[str | None] = [None, None]
     if planner.object_id is None and action.action == "PutObject":
@@ -118,8 +120,8 @@ def _published_names(high: HighAction) -> list[str | None]:
 def action_text(action: ApiAction, words: Words) -> str:
     """Return a recorded low-level action in words ("PutObject Mug Sink").
 
-    `Words.PUBLISHED` are those of the published script (`serialize_action`): what follows an underscore in the name is
-    cut, and a missing id leaves its place holder.
+    `Words.PUBLISHED` are those of the published script (`serialize_action`): what follows an
+    underscore in the name is cut, and a missing id leaves its place holder.
 
     Raises:
         DataError: published words do not know the action.
@@ -155,7 +157,8 @@ def goal_part(goal: str) -> str:
 
 
 def task_goal_part(goal: str) -> str:
-    """Return a goal in the words of the published Qwen2.5-VL trainer, which differ from those of evaluation."""
+    """Return a goal in the words of the published Qwen2.5-VL trainer, which differ from those of
+    evaluation."""
     return f"{_GOAL}Your task goal: {goal}{_GOAL}"
 
 
@@ -165,15 +168,17 @@ def plan_part(plan: str) -> str:
 
 
 def action_part(action: str) -> str:
-    """Return an action as part of the sequence; the frame after it follows. Models continue after the first mark."""
+    """Return an action as part of the sequence; the frame after it follows. Models continue after
+    the first mark."""
     return f"{ACT}{action}{ACT}"
 
 
 def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
-    """Return the whole trajectory as text, from its replay's log; of several frames of an action the last counts.
+    """Return the whole trajectory as text, from its replay's log; of several frames of an action
+    the last counts.
 
-    The words are the published ones. A sub-goal or action that has none keeps its natural words, so that a trajectory
-    is never without its text.
+    The words are the published ones. A sub-goal or action that has none keeps its natural words, so
+    that a trajectory is never without its text.
     """
     starts: dict[int, int | None] = {
         item.low_pddl_idx[0]: item.sub_traj_idx for item in trajectory.sub_trajs

@@ -1,7 +1,7 @@
 """The state of the room and the agent in words, restricted to what the agent has seen.
 
-Models that get text instead of all frames read it: the place where each seen object was seen last, what is open or
-switched on, and what the agent holds.
+Models that get text instead of all frames read it: the place where each seen object was seen last,
+what is open or switched on, and what the agent holds.
 """
 
 from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
@@ -15,7 +15,8 @@ _SURROUNDINGS = frozenset({"Floor", "Wall", "Ceiling"})
 
 
 def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
-    """Return the summaries after the low-level actions with some indices, from a log with the fields of a replay."""
+    """Return the summaries after the low-level actions with some indices, from a log with the
+    fields of a replay."""
     known: dict[str, tuple[ObjectState, str | None]] = {}
     summaries: dict[int, str] = {}
     for step, world in zip(steps, iter_object_states(steps), strict=True):

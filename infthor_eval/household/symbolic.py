@@ -1,8 +1,10 @@
-"""A room as the planner sees it: where the items are, what was done to them, and where the agent is.
+"""A room as the planner sees it: where the items are, what was done to them, and where the agent
+is.
 
-A *place* is what the agent can go to: a piece of furniture, a lamp, or an item on the floor. An *item* can be carried.
-Slices are items that start to exist when the whole is sliced; every task needs at most two. Opening and closing are not
-modelled: the rollout adds them where they are needed, as ALFRED does.
+A *place* is what the agent can go to: a piece of furniture, a lamp, or an item on the floor. An
+*item* can be carried. Slices are items that start to exist when the whole is sliced; every task
+needs at most two. Opening and closing are not modelled: the rollout adds them where they are
+needed, as ALFRED does.
 """
 
 from collections.abc import Container, Iterable
@@ -70,7 +72,8 @@ class SymbolicRoom:
     refused: frozenset[tuple[str, str]] = frozenset()
 
     def place_of(self, item: str, where: dict[str, str]) -> str | None:
-        """Return the place where an item or receptacle can be reached, or None if it is held or does not exist."""
+        """Return the place where an item or receptacle can be reached, or None if it is held or
+        does not exist."""
         seen = set()  # in case objects are reported to be inside each other
         while item not in self.places:
             if item in seen or item not in where or where[item] == ABSENT:
@@ -82,7 +85,8 @@ class SymbolicRoom:
         return item
 
     def fits(self, item: str, receptacle: str) -> bool:
-        """Return True if a receptacle is made for an item's type and is not known to have no room for it."""
+        """Return True if a receptacle is made for an item's type and is not known to have no room
+        for it."""
         usual = receptacle in self.receptacles and goes_into(
             self.types[item], self.types[receptacle]
         )
@@ -92,7 +96,8 @@ class SymbolicRoom:
 def room_of(
     view: SimulatorView, blocked: Container[str] = (), refused: Iterable[tuple[str, str]] = ()
 ) -> SymbolicRoom:
-    """Read a room from the simulator's state, with the agent at no place; `blocked` objects cannot be acted on."""
+    """Read a room from the simulator's state, with the agent at no place; `blocked` objects cannot
+    be acted on."""
     objects = {key: item for key, item in view.objects.items() if not _is_remains(item)}
     items = {key: item for key, item in objects.items() if item.pickupable and key not in blocked}
     places = {key for key, item in objects.items() if _is_place(item)}

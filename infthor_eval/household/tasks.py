@@ -1,4 +1,5 @@
-"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one of them."""
+"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one of
+them."""
 
 from enum import StrEnum
 from typing import Any
@@ -15,7 +16,8 @@ __all__ = ["SAMPLED", "Task", "TaskType", "sub_task", "task_of"]
 
 
 class TaskType(StrEnum):
-    """ALFRED's task types, and PUT_AWAY of the published generator, by their names in trajectories."""
+    """ALFRED's task types, and PUT_AWAY of the published generator, by their names in
+    trajectories."""
 
     PLACE = "pick_and_place_simple"
     PLACE_TWO = "pick_two_obj_and_place"
@@ -37,8 +39,8 @@ class Task(msgspec.Struct, frozen=True):
 
     Attributes:
         task_type: type of the task.
-        pickup: the object to pick up (the type of the whole, also if `sliced`), or for PUT_AWAY the one in the hand,
-            where the type of the whole stands for a slice as well.
+        pickup: the object to pick up (the type of the whole, also if `sliced`), or for PUT_AWAY the
+            one in the hand, where the type of the whole stands for a slice as well.
         receptacle: the receptacle to put it into; None for EXAMINE.
         movable: the receptacle that is carried with it, for STACK.
         light: the lamp, for EXAMINE.
@@ -75,7 +77,8 @@ _TEMPLATES = {
     TaskType.HEAT: "put a hot {bare} {where}",
     TaskType.COOL: "put a cold {bare} {where}",
     TaskType.STACK: "put {movable} with {item} in it {where}",
-    TaskType.PUT_AWAY: "put the {pickup} on the {receptacle}",  # published, with the types as they are
+    # published, with the types as they are
+    TaskType.PUT_AWAY: "put the {pickup} on the {receptacle}",
 }
 _ONTO = {"Plate"}  # objects are on these, not in them
 
@@ -104,15 +107,18 @@ def task_of(recorded: SubTask) -> Task:
     Object types get their AI2-THOR 5.x names. Fields that the task type does not need are ignored.
 
     Raises:
-        DataError: the goal is missing or of an unknown type, or an object type that it needs is missing.
+        DataError: the goal is missing or of an unknown type, or an object type that it needs is
+            missing.
     """
     info, params = recorded.task_info, recorded.pddl_params
     task_type = _task_type(info.goal)
     if task_type == TaskType.PUT_AWAY:
-        # Its parameters are those of the task before it; the object is the movable one, and none is picked up.
+        # Its parameters are those of the task before it; the object is the movable one, and none is
+        # picked up.
         if not (info.movable and info.receptacle):
             raise DataError(
-                f"a task of type {task_type} needs task_info's movable and receptacle; give object types"
+                f"a task of type {task_type} needs task_info's movable and receptacle; give object "
+                "types"
             )
         return Task(task_type, modern_type(info.movable), modern_type(info.receptacle))
     examines, stacks = task_type == TaskType.EXAMINE, task_type == TaskType.STACK

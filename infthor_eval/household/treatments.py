@@ -1,7 +1,7 @@
 """Tracking of what was washed, heated and cooled, which AI2-THOR's metadata does not record.
 
-The rules are ALFRED's: turning on a tap cleans what is in the basin below it, turning on a microwave heats what is in
-it, and closing a fridge cools what is in it.
+The rules are ALFRED's: turning on a tap cleans what is in the basin below it, turning on a
+microwave heats what is in it, and closing a fridge cools what is in it.
 """
 
 import math
@@ -21,9 +21,10 @@ _BASINS = {"SinkBasin", "BathtubBasin"}
 class Treatments:
     """Ids of the objects that were treated since the start of a task, at which the sets are empty.
 
-    The sets only grow, as in ALFRED: a hot potato in the fridge is both hot and, after closing the door, cold.
-    Otherwise closing the door would undo "put a hot potato in the fridge". In the planner's `State` the later treatment
-    replaces the earlier one, as there only `CoolObject` cools. Slices are separate objects and start untreated.
+    The sets only grow, as in ALFRED: a hot potato in the fridge is both hot and, after closing the
+    door, cold. Otherwise closing the door would undo "put a hot potato in the fridge". In the
+    planner's `State` the later treatment replaces the earlier one, as there only `CoolObject`
+    cools. Slices are separate objects and start untreated.
 
     Attributes:
         clean: washed objects.
@@ -62,7 +63,8 @@ class Treatments:
 def _basin_of(faucet: ThorObject, view: SimulatorView) -> ThorObject | None:
     """Return the basin nearest to a tap.
 
-    ALFRED considers only sink basins, so that there filling a bathtub washes what is in a sink across the room.
+    ALFRED considers only sink basins, so that there filling a bathtub washes what is in a sink
+    across the room.
     """
     basins = [item for item in view.objects.values() if item.object_type in _BASINS]
     at = astuple(faucet.position)

@@ -1,7 +1,7 @@
 """Object types as English words.
 
-Types are split at their capitals ("CoffeeTable" to "coffee table") and not renamed, so that the type can be recovered
-by joining the words.
+Types are split at their capitals ("CoffeeTable" to "coffee table") and not renamed, so that the
+type can be recovered by joining the words.
 """
 
 import re
@@ -33,7 +33,8 @@ def canonical_type(object_type: str) -> str:
 
 
 def noun(object_type: str) -> str:
-    """Return an object type in words: "coffee table" for "CoffeeTable", "sliced apple" for "AppleSliced"."""
+    """Return an object type in words: "coffee table" for "CoffeeTable", "sliced apple" for
+    "AppleSliced"."""
     if object_type in _LETTERS:
         return _LETTERS[object_type]
     if object_type.endswith("Sliced"):
@@ -50,7 +51,8 @@ def object_type(words: str) -> str:
 
 
 def with_article(words: str) -> str:
-    """Return the words after "a" or "an"; plurals ("boots") and uncountable nouns ("bread") get no article."""
+    """Return the words after "a" or "an"; plurals ("boots") and uncountable nouns ("bread") get no
+    article."""
     if words.removeprefix("sliced ") in _BARE:
         return words
     return f"{'an' if _VOWEL_SOUND.match(words) else 'a'} {words}"
@@ -68,5 +70,6 @@ def plural(words: str) -> str:
 
 
 def compact_name(object_type: str) -> str:
-    """Return an object type as the published data write it, in lower case as one word ("coffeetable")."""
+    """Return an object type as the published data write it, in lower case as one word
+    ("coffeetable")."""
     return object_type.lower()

@@ -26,7 +26,8 @@ _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 @dataclass(frozen=True)
 class ArmSituation:
-    """An episode that begins in an environment reset to it; `max_step` is the longest movement, metres."""
+    """An episode that begins in an environment reset to it; `max_step` is the longest movement,
+    metres."""
 
     environment: ArmEnvironment
     instruction: str
@@ -81,7 +82,8 @@ class PolicyActor:
 
 
 def _check_step(step: object) -> None:
-    """Check that a policy, which is code of others, gives three lengths, three angles and a gripper, all finite."""
+    """Check that a policy, which is code of others, gives three lengths, three angles and a
+    gripper, all finite."""
     if not isinstance(step, ArmDelta):
         raise ModelError(f"the policy gives {step!r:.60} for a step; it must be an ArmDelta")
     numbers = (*step.translation, *step.rotation, step.gripper)

@@ -1,4 +1,5 @@
-"""The part of a run's config that its summary and tables read, as `task.ManipulationTask.config` writes it."""
+"""The part of a run's config that its summary and tables read, as `task.ManipulationTask.config`
+writes it."""
 
 from infthor_eval.episodes.config_form import EpisodesConfig, EpisodeTaskForm
 

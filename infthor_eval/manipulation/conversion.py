@@ -1,9 +1,9 @@
 """From a policy's 7 degrees of freedom to calls of AI2-THOR's arm (docs/manipulation.md).
 
-A policy moves the end effector in the frame of a robot's base: x forward, y left, z up, right-handed. AI2-THOR's arm is
-moved in the frame "armBase": x right, y up, z forward, left-handed. A change of handedness reverses the sense of turns.
-So yaw changes its sign. Pitch keeps it, as its axis is reversed too, and so does roll, as AI2-THOR counts it the other
-way.
+A policy moves the end effector in the frame of a robot's base: x forward, y left, z up,
+right-handed. AI2-THOR's arm is moved in the frame "armBase": x right, y up, z forward, left-handed.
+A change of handedness reverses the sense of turns. So yaw changes its sign. Pitch keeps it, as its
+axis is reversed too, and so does roll, as AI2-THOR counts it the other way.
 """
 
 import math
@@ -26,7 +26,8 @@ class Conversion:
         translation_scale: factor of translations.
         max_step: maximum length of a translation in metres; a longer one is shortened.
         rotation: whether the wrist is turned.
-        return_to_start: whether the arm goes back after a collision (AI2-THOR's default), or stays where it collided.
+        return_to_start: whether the arm goes back after a collision (AI2-THOR's default), or stays
+            where it collided.
     """
 
     translation_scale: float = 1.0
@@ -35,7 +36,8 @@ class Conversion:
     return_to_start: bool = True
 
     def calls(self, delta: ArmDelta) -> list[Call]:
-        """Return the movements of a step in order, without the gripper; none if the arm stands still."""
+        """Return the movements of a step in order, without the gripper; none if the arm stands
+        still."""
         calls = [self._translation(delta), self._rotation(delta) if self.rotation else None]
         return [
             call | {"returnToStart": self.return_to_start} for call in calls if call is not None

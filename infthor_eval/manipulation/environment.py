@@ -1,4 +1,5 @@
-"""An environment with the episodes of one trajectory: an arm in the true state before the expert's pick-up or put."""
+"""An environment with the episodes of one trajectory: an arm in the true state before the expert's
+pick-up or put."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -50,7 +51,8 @@ class Grasp:
         closing: when a policy's hand closes in a pick-up.
         radius: radius of its sphere, metres.
         takes_all: whether it takes everything in the sphere, or the target alone.
-        at_palm: whether the object to put is held before the palm, or in the centre of the sphere if there is room.
+        at_palm: whether the object to put is held before the palm, or in the centre of the sphere
+            if there is room.
         threshold: value of a policy's gripper below which the hand closes; else it opens.
     """
 
@@ -117,10 +119,12 @@ class ArmEnvironment:
         grasp: Grasp,
         frames: FrameKeeper,
     ) -> ArmOutcome:
-        """Bring the world to the true state before an episode, with the arm at rest; for a put, with the object in it.
+        """Bring the world to the true state before an episode, with the arm at rest; for a put,
+        with the object in it.
 
         Raises:
-            InfeasibleError: the episode's objects cannot be brought to where they were, or not into the hand.
+            InfeasibleError: the episode's objects cannot be brought to where they were, or not into
+                the hand.
             SimulatorError: the simulator fails.
         """
         self.episode, self.start = episode, start
@@ -133,7 +137,8 @@ class ArmEnvironment:
             raise InfeasibleError(f"{min(map(str, missing))} cannot be brought to where it was")
         self._target = start.view.objects[start.receptacle_id or start.object_id]
         pose = start.view.agent if grasp.stand is Stand.EXPERT else start.before_the_way
-        # An agent with an arm has another height than the default one, so the expert's y is not taken over.
+        # An agent with an arm has another height than the default one, so the expert's y is not
+        # taken over.
         position = Vector(pose.position.x, view.agent.position.y, pose.position.z)
         self._require(
             teleport_call(AgentPose(position, pose.rotation, pose.horizon, view.agent.standing))
@@ -187,7 +192,8 @@ class ArmEnvironment:
         return self._simulator.view
 
     def query(self, action: str, **arguments: Any) -> Any:
-        """Return the simulator's answer to a question (`GetSpawnCoordinatesAboveReceptacle`); None if it refuses."""
+        """Return the simulator's answer to a question (`GetSpawnCoordinatesAboveReceptacle`); None
+        if it refuses."""
         answer = self._simulator.query(action, **arguments)
         return answer.result if answer.success else None
 
@@ -201,7 +207,8 @@ class ArmEnvironment:
         return done, refusals
 
     def _gripper(self, delta: ArmDelta) -> list[Call]:
-        """Return the calls of the gripper: it closes around something, or releases what it holds."""
+        """Return the calls of the gripper: it closes around something, or releases what it
+        holds."""
         arm = arm_of(self._simulator.view)
         picks_up = self.episode.kind == ManipulationKind.PICKUP
         if picks_up and self._grasp.closing is not Closing.ASKED:
@@ -216,7 +223,8 @@ class ArmEnvironment:
         return self.episode.kind == ManipulationKind.PICKUP and self._grasp.closing is Closing.END
 
     def closing_calls(self) -> list[Call]:
-        """Return the calls with which the hand closes around what is in its sphere; none if nothing is."""
+        """Return the calls with which the hand closes around what is in its sphere; none if nothing
+        is."""
         arm = arm_of(self._simulator.view)
         if self._grasp.takes_all:
             return [{"action": "PickupObject"}] if arm.pickupable else []
@@ -247,11 +255,13 @@ class ArmEnvironment:
     def _put_in_hand(self, target: str, before: SimulatorView) -> None:
         """Raise the arm to the height of the expert's hand, and have the magnet hold the object.
 
-        The object is held in the centre of the sphere, or as near to it as there is room on the way from the palm.
+        The object is held in the centre of the sphere, or as near to it as there is room on the way
+        from the palm.
         """
         height = before.objects[target].position.y
         low, high = 0.0, 1.0
-        # By bisection: `MoveArmBase` takes a share of the range of heights, which simulators do not report.
+        # By bisection: `MoveArmBase` takes a share of the range of heights, which simulators do not
+        # report.
         for _ in range(_HALVINGS):
             share = (low + high) / 2
             view = self._simulator.step("MoveArmBase", y=share)
@@ -281,14 +291,16 @@ class ArmEnvironment:
 
 
 def arm_of(view: SimulatorView) -> ArmState:
-    """Return the arm of the agent; raises InfeasibleError if the simulator was not started with agentMode "arm"."""
+    """Return the arm of the agent; raises InfeasibleError if the simulator was not started with
+    agentMode "arm"."""
     if view.arm is None:
         raise InfeasibleError("the simulator reports no arm; start it with agentMode arm")
     return view.arm
 
 
 def _teleport_to_hand(item: ThorObject, arm: ArmState, share: float) -> Call:
-    """Return the call that brings an object, turned as it is, before the palm (0) or to the sphere's centre (1)."""
+    """Return the call that brings an object, turned as it is, before the palm (0) or to the
+    sphere's centre (1)."""
     wrist, center = point_of(arm.wrist), point_of(arm.sphere_center)
     length = math.dist(wrist, center) or 1.0
     ahead = offset(wrist, center)

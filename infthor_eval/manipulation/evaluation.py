@@ -41,7 +41,8 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
         ]
 
     def bind(self, subject: Subject) -> "BoundManipulation":
-        """See `infthor_eval.runs.Evaluation.bind`; TypeError for neither a policy nor a baseline of manipulation."""
+        """See `infthor_eval.runs.Evaluation.bind`; TypeError for neither a policy nor a baseline of
+        manipulation."""
         if isinstance(subject, ArmBaseline):
             create_actor: Callable[[], ArmActor] = subject.arm_actor
         elif isinstance(subject, Policy):
@@ -61,7 +62,8 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         *,
         sees: bool,
     ) -> None:
-        """Take the work, what creates the actor of a trajectory, and whether actors look at frames."""
+        """Take the work, what creates the actor of a trajectory, and whether actors look at
+        frames."""
         self._tasks, self._create_actor, self._sees = evaluation.tasks, create_actor, sees
         self._experts = evaluation.simulators(image=False, instances=False)
         by_camera = {
@@ -71,7 +73,8 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
             camera: evaluation.simulators(image=sees, instances=False, agentMode="arm", **options)
             for camera, options in by_camera.items()
         }
-        # The episodes of all tasks by trajectory, in time order: one replay of its expert serves them all.
+        # The episodes of all tasks by trajectory, in time order: one replay of its expert serves
+        # them all.
         by_trajectory: dict[str, list[ArmUnit]] = {unit.cluster: [] for unit in evaluation.units}
         for unit in sorted(evaluation.units, key=lambda unit: (unit.episode.index, unit.key)):
             by_trajectory[unit.cluster].append(unit)

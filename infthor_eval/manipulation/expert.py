@@ -1,4 +1,5 @@
-"""The true states in which episodes of an arm begin: before each pick-up and put of a trajectory's expert."""
+"""The true states in which episodes of an arm begin: before each pick-up and put of a trajectory's
+expert."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,7 +49,8 @@ class ExpertStates:
     refusal: str = ""
 
     def before(self, episode: ArmEpisode) -> EpisodeStart:
-        """Return the state before an episode; raises InfeasibleError if the expert is refused up to its end."""
+        """Return the state before an episode; raises InfeasibleError if the expert is refused up to
+        its end."""
         start = self.starts.get(episode.index)
         if start is None:
             raise InfeasibleError(self.refusal)
@@ -56,7 +58,8 @@ class ExpertStates:
 
 
 def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
-    """Replay the expert with AI2-THOR's default agent; keep the state before each pick-up and put that succeeds.
+    """Replay the expert with AI2-THOR's default agent; keep the state before each pick-up and put
+    that succeeds.
 
     Raises:
         SceneError: the simulator has no such scene.

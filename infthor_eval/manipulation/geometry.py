@@ -22,7 +22,8 @@ Point = tuple[float, float, float]
 
 
 class Corners(NamedTuple):
-    """A box along the world's axes, by its corners with the lowest and the highest coordinates, metres."""
+    """A box along the world's axes, by its corners with the lowest and the highest coordinates,
+    metres."""
 
     low: Point
     high: Point

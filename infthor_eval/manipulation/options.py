@@ -27,7 +27,8 @@ class ManipulationOptions(SimulatorOptions):
         default=None,
         metadata={
             "choices": tuple(map(str, Stand)),
-            "help": "Where the agent stands at the start: the expert's place, or that before the way to it.",
+            "help": "Where the agent stands at the start: the expert's place, or that before the "
+            "way to it.",
         },
     )
     hand: str | None = field(
@@ -41,7 +42,8 @@ class ManipulationOptions(SimulatorOptions):
         default=None,
         metadata={
             "choices": tuple(map(str, Closing)),
-            "help": "When a policy's hand closes in a pick-up: when it says so, with each step, or once at the end.",
+            "help": "When a policy's hand closes in a pick-up: when it says so, with each step, or "
+            "once at the end.",
         },
     )
     instruction: str | None = field(
@@ -53,7 +55,8 @@ class ManipulationOptions(SimulatorOptions):
     )
 
     def __post_init__(self) -> None:
-        """Check the options; raises UsageError for unknown frames, or a radius that AI2-THOR does not allow."""
+        """Check the options; raises UsageError for unknown frames, or a radius that AI2-THOR does
+        not allow."""
         super().__post_init__()
         if self.radius_metres is not None and not RADII[0] <= self.radius_metres <= RADII[1]:
             raise UsageError(

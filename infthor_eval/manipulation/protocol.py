@@ -1,4 +1,5 @@
-"""How an episode begins and when a hand closes: what the paper does not say of its protocol (docs/manipulation.md)."""
+"""How an episode begins and when a hand closes: what the paper does not say of its protocol
+(docs/manipulation.md)."""
 
 from enum import StrEnum
 
@@ -13,7 +14,8 @@ class Stand(StrEnum):
 
 
 class Closing(StrEnum):
-    """When a policy's hand closes in a pick-up: when it says so, with each step, or once at the end."""
+    """When a policy's hand closes in a pick-up: when it says so, with each step, or once at the
+    end."""
 
     ASKED = "asked"
     ALWAYS = "always"

@@ -1,4 +1,5 @@
-"""What the suite of manipulation writes into a run's journal: episodes, each with everything that the arm did."""
+"""What the suite of manipulation writes into a run's journal: episodes, each with everything that
+the arm did."""
 
 from enum import StrEnum
 from typing import Any
@@ -31,9 +32,10 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         delta: request of a policy: translation (m), rotation (rad), gripper; None for baselines.
         calls: calls of the simulator, as JSON values.
         hand: centre of the hand's sphere after it, metres in the world.
-        distance: metres from there to the nearest point of the target's box: the object's, or the receptacle's of a
-            put.
-        refusals: messages of the simulator on calls that it refused: the arm collided, or closed around nothing.
+        distance: metres from there to the nearest point of the target's box: the object's, or the
+            receptacle's of a put.
+        refusals: messages of the simulator on calls that it refused: the arm collided, or closed
+            around nothing.
     """
 
     delta: tuple[float, ...] | None = None
@@ -51,13 +53,15 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 class ArmRecord(
     EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="arm"
 ):
-    """One pick-up or put, and what an arm did in it; `index` is that of the expert's low-level action it replaces.
+    """One pick-up or put, and what an arm did in it; `index` is that of the expert's low-level
+    action it replaces.
 
     Attributes:
         object_id: id of the object that is picked up or put, in this simulator.
         receptacle_id: id of the receptacle that it is put into; None for pick-ups.
         starts_inside: whether the object is in the hand's sphere at the start; for pick-ups alone.
-        start_distance: metres from the centre of the hand's sphere to the target's box at the start.
+        start_distance: metres from the centre of the hand's sphere to the target's box at the
+            start.
         closest: smallest such distance.
         max_reward: reward of a success.
     """

@@ -47,7 +47,8 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         sees: bool,
         seed: int,
     ) -> None:
-        """Take a trajectory, the true states that its episodes begin in, and a simulator of an agent with an arm."""
+        """Take a trajectory, the true states that its episodes begin in, and a simulator of an
+        agent with an arm."""
         super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator))
         self._states, self._actor, self._sees = states, actor, sees
         self._seed = f"{seed}/{trajectory.traj_id}"
@@ -56,7 +57,8 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         """Run an episode.
 
         Raises:
-            InfeasibleError: this simulator refuses an action of the expert before it, or cannot restore its start.
+            InfeasibleError: this simulator refuses an action of the expert before it, or cannot
+                restore its start.
             DataError: a frame cannot be written or read.
             ModelError: the policy fails.
             SimulatorError: the simulator fails.
@@ -94,7 +96,8 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
     def _act(
         self, environment: ArmEnvironment, outcome: ArmOutcome, max_steps: int
     ) -> tuple[list[ArmStep], ArmEnded]:
-        """Let the actor act until the episode is over; the steps of a chunk are executed before it is asked again."""
+        """Let the actor act until the episode is over; the steps of a chunk are executed before it
+        is asked again."""
         steps: list[ArmStep] = []
         chunk: list[Step] = []
         step: Step = ()

@@ -1,4 +1,5 @@
-"""Manipulation as a suite: an arm does the pick-ups and puts of the experts of long trajectories."""
+"""Manipulation as a suite: an arm does the pick-ups and puts of the experts of long
+trajectories."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar

@@ -28,11 +28,14 @@ class ArmTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         kind: "pickup" or "put".
         radius: radius of the hand's sphere, metres.
         success: share of successful episodes.
-        inside: share of episodes whose object is in the sphere at the start: pick-ups without a movement.
-        closest: smallest distance from the sphere's centre to the target, metres, mean over episodes.
+        inside: share of episodes whose object is in the sphere at the start: pick-ups without a
+            movement.
+        closest: smallest distance from the sphere's centre to the target, metres, mean over
+            episodes.
         steps: steps of an episode, mean.
         collisions: collisions of an episode, mean.
-        outcomes: success of each episode by its id, 1 or 0; ids begin with the trajectory. Runs are paired by them.
+        outcomes: success of each episode by its id, 1 or 0; ids begin with the trajectory. Runs are
+            paired by them.
     """
 
     kind: str

@@ -1,4 +1,5 @@
-"""Results of arms as tables: Table 6 beside the published rows, details of the episodes, and how they ended."""
+"""Results of arms as tables: Table 6 beside the published rows, details of the episodes, and how
+they ended."""
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
@@ -22,8 +23,10 @@ __all__ = ["overview_table", "result_tables"]
 _STILL = "still"  # the baseline that never moves
 _ABOVE = ("Pick-up above still", "Put above still")
 _FLOOR = (
-    "Above still: percentage points more than the baseline that never moves, in the same episodes. With a sphere of"
-    " 0.5 m it alone is above Table 6, so the paper's protocol differs from this one (docs/manipulation.md)."
+    "Above still: percentage points more than the baseline that never moves, in the same episodes. "
+    "With a sphere of"
+    " 0.5 m it alone is above Table 6, so the paper's protocol differs from this one "
+    "(docs/manipulation.md)."
 )
 _N_OVERVIEW = (
     6  # columns of the success table that the overview has: those before what was left out
@@ -82,7 +85,8 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
 def _above_floor(
     run: RunSummary, named: tuple[str, ArmTaskSummary], runs: Sequence[RunSummary]
 ) -> Rate | None:
-    """Return a task's success less that of `still` in the same episodes; None without a run of `still` like this."""
+    """Return a task's success less that of `still` in the same episodes; None without a run of
+    `still` like this."""
     name, task = named
     stills = [
         other.summary.tasks[name]
@@ -116,7 +120,8 @@ def _cells(pair: Sequence[ArmTaskSummary | None]) -> Iterator[str]:
 def _episodes_table(tasks: Sequence[tuple[str, str, ArmTaskSummary]]) -> Table:
     rows = [
         Row((
-            *names, f"{task.radius:g}", format_percent(task.inside if task.kind == ManipulationKind.PICKUP else None),
+            *names, f"{task.radius:g}",
+            format_percent(task.inside if task.kind == ManipulationKind.PICKUP else None),
             _format_mean(task.closest, 2), _format_mean(task.steps), _format_mean(task.collisions),
         ))
         for *names, task in tasks

@@ -41,13 +41,15 @@ class ArmTaskSettings:
     Attributes:
         kind: "pickup" or "put".
         bundled: name of a set of trajectories in the package.
-        instruction: instruction of a policy, with {object} and, for puts, {receptacle}; "short" is the kind alone.
+        instruction: instruction of a policy, with {object} and, for puts, {receptacle}; "short" is
+            the kind alone.
         radius: radius of the hand's sphere, metres; AI2-THOR's own is 0.06, the published one 0.5.
         max_steps: maximum number of steps of one episode.
         image_size: width and height of the frames, pixels.
         field_of_view: field of view of the camera, degrees.
         grasps: whether the hand takes the "target" alone out of its sphere, or "all" objects in it.
-        hold: where the object to put is held: in the "middle" of the sphere if there is room, or before the "palm".
+        hold: where the object to put is held: in the "middle" of the sphere if there is room, or
+            before the "palm".
         stand: where the agent stands at the start, see `Stand`.
         hand: height of its arm at the start of a pick-up, see `Hand`.
         closing: when a policy's hand closes in a pick-up, see `Closing`.
@@ -114,7 +116,8 @@ class ArmTaskSettings:
 
 
 def check_task_file(file: TaskFile) -> None:
-    """Check the settings of a task file; raises DataError if one is unknown or has a value that is not allowed."""
+    """Check the settings of a task file; raises DataError if one is unknown or has a value that is
+    not allowed."""
     file.require("dataset_kwargs")
     task_settings(file, ArmTaskSettings, {}, _CHOICES)
 
@@ -175,7 +178,8 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
         )
 
     def _check_instruction(self, name: str) -> None:
-        """Check that the instruction names the object, and has nothing in braces that cannot be filled in."""
+        """Check that the instruction names the object, and has nothing in braces that cannot be
+        filled in."""
         template = self._template
         known = {"object", "receptacle"} if self.kind == ManipulationKind.PUT else {"object"}
         try:
@@ -187,7 +191,8 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
         if template != "short" and ("object" not in fields or not fields <= known or not is_plain):
             raise UsageError(
                 f"{name}: the instruction {template!r:.60} must have {{object}}"
-                f"{' and may have {receptacle}' if len(known) > 1 else ''}, and nothing else in braces; "
+                f"{' and may have {receptacle}' if len(known) > 1 else ''}, and nothing else in "
+                "braces; "
                 f'or be "short" for {KIND_NAMES[self.kind]!r} alone'
             )
 

@@ -39,7 +39,8 @@ class ArmTrajectory(TaskTrajectory):
 
 
 def arm_episodes(trajectory: Trajectory) -> list[ArmEpisode]:
-    """Return the pick-ups and puts of a trajectory, in time order; raises DataError if one names no object."""
+    """Return the pick-ups and puts of a trajectory, in time order; raises DataError if one names no
+    object."""
     numbered = enumerate(trajectory.plan.low_actions)
     return [
         _episode(number, low) for number, low in numbered if low.api_action.action in EXPERT_ACTIONS

@@ -32,7 +32,8 @@ _CLUES = (3, 9)
 
 
 def check_memory(memory: Memory) -> Iterator[CheckResult]:
-    """Yield the result of each check: a memory observes two short trajectories of plain frames, and is asked on them.
+    """Yield the result of each check: a memory observes two short trajectories of plain frames, and
+    is asked on them.
 
     A model that it may ask answers with the number of frames it was given.
     """

@@ -63,7 +63,8 @@ class FrameMemory(ABC):
 
 
 class Last(FrameMemory):
-    """The last frames before the current view: recency alone, what a window of so many tokens holds."""
+    """The last frames before the current view: recency alone, what a window of so many tokens
+    holds."""
 
     def choose(self, query: Query, n_frames: int) -> Sequence[int]:
         """See `FrameMemory`."""
@@ -87,10 +88,11 @@ class Random(FrameMemory):
 
 
 class Oracle(FrameMemory):
-    """The clue frames, and others drawn until the frames are as many as other memories recall: the upper bound.
+    """The clue frames, and others drawn until the frames are as many as other memories recall: the
+    upper bound.
 
-    Of more clues than there is room for, those at even distances among them are shown. A question without evidence
-    (an absence) has drawn frames alone.
+    Of more clues than there is room for, those at even distances among them are shown. A question
+    without evidence (an absence) has drawn frames alone.
     """
 
     capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(privileged=True)

@@ -1,8 +1,10 @@
-"""Protocol of memories: what is kept of a trajectory while it is observed, and what of it is recalled for a question.
+"""Protocol of memories: what is kept of a trajectory while it is observed, and what of it is
+recalled for a question.
 
-A memory observes a trajectory step by step, and recalls frames and texts within a budget of tokens when it is asked.
-The harness shows these, and the current view, to the model under test. The shape is that of LongMemEval-V2's memories
-(insert a trajectory, query with a text and an image), a step at a time, so that an agent can use it as it acts.
+A memory observes a trajectory step by step, and recalls frames and texts within a budget of tokens
+when it is asked. The harness shows these, and the current view, to the model under test. The shape
+is that of LongMemEval-V2's memories (insert a trajectory, query with a text and an image), a step
+at a time, so that an agent can use it as it acts.
 """
 
 import math
@@ -25,8 +27,8 @@ __all__ = [
     "tokens_of",
 ]
 
-# Tokens of a recalled text are estimated, as no tokenizer is at hand for a model behind a server; the tables have the
-# tokens that the model itself counted.
+# Tokens of a recalled text are estimated, as no tokenizer is at hand for a model behind a server;
+# the tables have the tokens that the model itself counted.
 CHARACTERS_PER_TOKEN = 4
 
 
@@ -35,7 +37,8 @@ class MemoryCapabilities:
     """What a memory needs and is.
 
     Attributes:
-        privileged: it is given what no agent can know: the simulator's metadata of each step, and a question's clues.
+        privileged: it is given what no agent can know: the simulator's metadata of each step, and a
+            question's clues.
         writes: it asks the model under test for texts (`TrajectoryFacts.write`).
         deterministic: the same observations and query recall the same.
     """
@@ -45,8 +48,9 @@ class MemoryCapabilities:
     deterministic: bool = True
 
 
-# Asks the model under test: given texts and frames in order and the limit of the reply in tokens, returns the reply.
-# Raises DataError if a frame cannot be read, ModelError if the model cannot take so many.
+# Asks the model under test: given texts and frames in order and the limit of the reply in tokens,
+# returns the reply. Raises DataError if a frame cannot be read, ModelError if the model cannot take
+# so many.
 Write = Callable[[Sequence["str | FrameRef"], int], str]
 
 
@@ -56,7 +60,8 @@ class TrajectoryFacts:
 
     Attributes:
         name: name of the trajectory.
-        tokens_per_frame: tokens of a frame for the model under test; None if it is not known, then there is no budget.
+        tokens_per_frame: tokens of a frame for the model under test; None if it is not known, then
+            there is no budget.
         seed: seed of whatever the memory draws.
         write: asks the model under test; None unless the memory's capabilities say `writes`.
     """
@@ -74,7 +79,8 @@ class Observation:
     Attributes:
         number: position of the frame in the trajectory's time order, from 0.
         frame: the view after the action.
-        action: the low-level action before the frame ("PickupObject Mug"); None at the first frame, and if not known.
+        action: the low-level action before the frame ("PickupObject Mug"); None at the first frame,
+            and if not known.
         goal: the goal that the agent is at; None if it is not known.
         log: the simulator's metadata of the step; None unless the memory is privileged.
     """
@@ -93,7 +99,8 @@ class Query:
     Attributes:
         text: the question, or an agent's goal and plan.
         present: the current step, whose frame the model is shown beside what is recalled.
-        clues: numbers of the observations with the evidence, ascending; None unless the memory is privileged.
+        clues: numbers of the observations with the evidence, ascending; None unless the memory is
+            privileged.
     """
 
     text: str
@@ -101,13 +108,15 @@ class Query:
     clues: tuple[int, ...] | None = None
 
 
-# What is recalled, in the order in which the model is shown it: observations (their frames are shown) and texts.
+# What is recalled, in the order in which the model is shown it: observations (their frames are
+# shown) and texts.
 Recalled = Sequence[Observation | str]
 
 
 @runtime_checkable
 class Memory(Protocol):
-    """Keeps what it needs of a trajectory, and recalls some of it. One object serves one trajectory after another.
+    """Keeps what it needs of a trajectory, and recalls some of it. One object serves one trajectory
+    after another.
 
     Its class is called with the options that a user gives (`--memory-args`), each with a default.
     """
@@ -117,7 +126,8 @@ class Memory(Protocol):
         """What the memory needs and is."""
 
     def identity(self) -> Mapping[str, Any]:
-        """Return what can change a recall beside the class and its options, as JSON values: a checkpoint, say."""
+        """Return what can change a recall beside the class and its options, as JSON values: a
+        checkpoint, say."""
 
     def begin(self, facts: TrajectoryFacts) -> None:
         """Forget everything and begin a trajectory."""
@@ -130,7 +140,8 @@ class Memory(Protocol):
         """
 
     def recall(self, query: Query, budget: int | None) -> Recalled:
-        """Return what the model is shown before the current view, in order. Recalling changes nothing.
+        """Return what the model is shown before the current view, in order. Recalling changes
+        nothing.
 
         Args:
             query: what is asked, and the current step, which has not been observed.
@@ -143,7 +154,8 @@ class Memory(Protocol):
 
 
 def tokens_of(recalled: Recalled, tokens_per_frame: int) -> int:
-    """Return the tokens of what is recalled: those of its frames, and an estimate of those of its texts."""
+    """Return the tokens of what is recalled: those of its frames, and an estimate of those of its
+    texts."""
     texts = [item for item in recalled if isinstance(item, str)]
     of_texts = sum(math.ceil(len(text) / CHARACTERS_PER_TOKEN) for text in texts)
     return of_texts + tokens_per_frame * (len(recalled) - len(texts))

@@ -1,4 +1,5 @@
-"""Memories by name: those built in, those of other packages (entry points), and classes in a user's own file."""
+"""Memories by name: those built in, those of other packages (entry points), and classes in a user's
+own file."""
 
 import inspect
 import typing
@@ -56,7 +57,8 @@ def open_memory(name: str, options: MemoryOptions = ()) -> Memory:
         options: options of its class; texts are converted to the types of its constructor.
 
     Raises:
-        UsageError: there is no such memory or option, a value is not valid, or it lacks a member of the protocol.
+        UsageError: there is no such memory or option, a value is not valid, or it lacks a member of
+            the protocol.
         ModelError: the file of a memory of one's own does not define it, or cannot be imported.
     """
     return _build(name, memory_class(name), options)

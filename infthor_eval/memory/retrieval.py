@@ -1,6 +1,7 @@
 """Memories that recall the frames nearest by CLIP.
 
-The retriever is imported where it is needed: that takes seconds, which other memories need not wait.
+The retriever is imported where it is needed: that takes seconds, which other memories need not
+wait.
 """
 
 from abc import abstractmethod
@@ -29,7 +30,8 @@ class _Nearest(FrameMemory):
         retriever: str = PUBLISHED_RETRIEVER,
         retriever_revision: str | None = None,
     ) -> None:
-        """Set the number of frames where there is no budget, and the CLIP model: a hub id or a folder."""
+        """Set the number of frames where there is no budget, and the CLIP model: a hub id or a
+        folder."""
         super().__init__(k)
         self._source = retriever, retriever_revision
 
@@ -64,10 +66,11 @@ class _Nearest(FrameMemory):
 
 
 class Clip(_Nearest):
-    """The frames nearest to a text: the question (the published retrieval of NIEH, k = 10), or the goal.
+    """The frames nearest to a text: the question (the published retrieval of NIEH, k = 10), or the
+    goal.
 
-    `query=goal` with k = 20 and `openai/clip-vit-base-patch32` is the one retrieval for agents in the published code
-    (`run_interactive_eval_clip.py`).
+    `query=goal` with k = 20 and `openai/clip-vit-base-patch32` is the one retrieval for agents in
+    the published code (`run_interactive_eval_clip.py`).
     """
 
     def __init__(
@@ -77,7 +80,8 @@ class Clip(_Nearest):
         retriever_revision: str | None = None,
         query: Literal["question", "goal"] = "question",
     ) -> None:
-        """See `_Nearest`; `query` is the text that frames are compared with: an agent's question is goal and plan."""
+        """See `_Nearest`; `query` is the text that frames are compared with: an agent's question is
+        goal and plan."""
         super().__init__(k, retriever, retriever_revision)
         self._query = query
 
@@ -97,10 +101,11 @@ class Clip(_Nearest):
 
 
 class ClipView(_Nearest):
-    """The frames nearest to the current view: ours, where a trajectory does not name the frames of an image memory.
+    """The frames nearest to the current view: ours, where a trajectory does not name the frames of
+    an image memory.
 
-    The paper's image memory (k = 20) came from `retrieved_image` of the trajectories' files; what chose it is not in
-    the published code.
+    The paper's image memory (k = 20) came from `retrieved_image` of the trajectories' files; what
+    chose it is not in the published code.
     """
 
     def vector(self, query: Query) -> Any:

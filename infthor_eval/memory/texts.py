@@ -1,4 +1,5 @@
-"""Memories that recall texts: what an exact observer would write down, and the model's own notes."""
+"""Memories that recall texts: what an exact observer would write down, and the model's own
+notes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
@@ -39,10 +40,11 @@ class _Texts:
 
 
 class TextLog(_Texts):
-    """A log that an exact observer would write: each goal and action, and the objects seen, from the metadata.
+    """A log that an exact observer would write: each goal and action, and the objects seen, from
+    the metadata.
 
-    A line says what is new: the types that come into view, what is open, in the hand, and in or on what is seen. Of a
-    log beyond the budget the last lines are recalled.
+    A line says what is new: the types that come into view, what is open, in the hand, and in or on
+    what is seen. Of a log beyond the budget the last lines are recalled.
     """
 
     capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(privileged=True)
@@ -57,8 +59,9 @@ class TextLog(_Texts):
 class Notes(_Texts):
     """The model's own notes: on every window of frames it writes a short text.
 
-    A note depends on the frames of its window alone. The paper reports a memory in text (long-horizon tasks), but not
-    how the text is written. Of notes beyond the budget the last are recalled.
+    A note depends on the frames of its window alone. The paper reports a memory in text
+    (long-horizon tasks), but not how the text is written. Of notes beyond the budget the last are
+    recalled.
     """
 
     capabilities: ClassVar[MemoryCapabilities] = MemoryCapabilities(writes=True)
@@ -90,11 +93,13 @@ class Notes(_Texts):
 
 
 def note_request(steps: str) -> str:
-    """Return the text that follows the frames of a window ("Steps 0-19") and asks for a note on them."""
+    """Return the text that follows the frames of a window ("Steps 0-19") and asks for a note on
+    them."""
     return (
-        f"\n{steps} of an embodied agent's trajectory, one view per step in time order. You will be asked about them "
-        "later without seeing them. Note in a few short phrases which room it is, which objects are where, how many of "
-        "them and in which state, and what the agent does with them.\nNote: "
+        f"\n{steps} of an embodied agent's trajectory, one view per step in time order. You will "
+        "be asked about them later without seeing them. Note in a few short phrases which room it "
+        "is, which objects are where, how many of them and in which state, and what the agent does "
+        "with them.\nNote: "
     )
 
 

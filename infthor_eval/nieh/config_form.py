@@ -1,4 +1,5 @@
-"""The part of an NIEH run's config that its summary and tables read, as `task.NiehTask.config` writes it."""
+"""The part of an NIEH run's config that its summary and tables read, as `task.NiehTask.config`
+writes it."""
 
 from typing import Annotated, Any
 

@@ -1,7 +1,7 @@
 """Conversion between samples and the docs of lm-eval's task functions.
 
-A doc refers to its frames by their positions in the trajectory, and the set is opened once per process. So docs stay
-small for trajectories of thousands of frames.
+A doc refers to its frames by their positions in the trajectory, and the set is opened once per
+process. So docs stay small for trajectories of thousands of frames.
 """
 
 import json
@@ -35,7 +35,8 @@ _PLACEHOLDERS = {FrameRef: "<image>", Video: "<video>"}
 
 
 def doc_of(task_samples: TaskSamples, sample: Sample, pixels: bool = False) -> Doc:
-    """Return the doc of a task's sample; with `pixels`, requests hold decoded images, as lm-eval's own models need."""
+    """Return the doc of a task's sample; with `pixels`, requests hold decoded images, as lm-eval's
+    own models need."""
     question = sample.question
     return {
         "suite": "nieh",
@@ -98,7 +99,8 @@ def samples_of(docs: Sequence[Doc]) -> TaskSamples:
 
 
 def doc_parts(doc: Doc) -> list[ContextPart]:
-    """Return the request of a doc, with the question's text last and films as images, for lm-eval's own models."""
+    """Return the request of a doc, with the question's text last and films as images, for lm-eval's
+    own models."""
     context, text = samples_of([doc]).request(sample_of(doc))
     return [*as_images(context), text]
 
@@ -109,7 +111,8 @@ def doc_prompt(doc: Doc) -> str:
 
 
 def prompt_of(task_samples: TaskSamples, sample: Sample, *, videos: bool = False) -> str:
-    """Return the text of a sample's request, with placeholders for frames, and for videos if it has them."""
+    """Return the text of a sample's request, with placeholders for frames, and for videos if it has
+    them."""
     context, text = task_samples.request(sample)
     shown = context if videos else as_images(context)
     return "".join(

@@ -41,8 +41,8 @@ class NiehEvaluation:
         """Read the tasks and their sets.
 
         Raises:
-            UsageError: a task without its data or with nothing that can be asked, a retriever that cannot be loaded,
-                or an option that has no effect on any of the tasks.
+            UsageError: a task without its data or with nothing that can be asked, a retriever that
+                cannot be loaded, or an option that has no effect on any of the tasks.
             DataError: a task file or a set is not valid.
         """
         open_set.cache_clear()  # its files may have changed since an earlier run of this process
@@ -92,14 +92,16 @@ class NiehEvaluation:
         return BoundNieh(workload, prepared, open_answerer, model.video_input)
 
     def _tokens_per_frame(self, model: AnsweringModel) -> int | None:
-        """Return the size of a frame where a context is measured in it: the option's value, or the subject's own."""
+        """Return the size of a frame where a context is measured in it: the option's value, or the
+        subject's own."""
         measured = next((task for task in self._tasks if task.needs_size), None)
         if measured is None or self._options.tokens_per_frame is not None:
             return self._options.tokens_per_frame
         return _measure_frame(measured.data, model)
 
     def _memory(self) -> dict[str, Any]:
-        """Return the options of the memory, as far as there are any, so that other runs are what they were."""
+        """Return the options of the memory, as far as there are any, so that other runs are what
+        they were."""
         names = ("memory", "memory_args", "budget")
         return {
             name: value for name in names if (value := getattr(self._options, name)) is not None
@@ -113,26 +115,26 @@ class NiehEvaluation:
             value = getattr(self._options, name)
             if value is not None and not measured:
                 raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no context of {asked} has a size in tokens; leave it out, or "
-                    "ask nieh_haystack or nieh_truncate_head"
+                    f"--{name.replace('_', '-')} {value}: no context of {asked} has a size in "
+                    "tokens; leave it out, or ask nieh_haystack or nieh_truncate_head"
                 )
         for name, value in self._memory().items():
             if not any(task.takes_memory for task in self._tasks):
                 raise UsageError(
-                    f"--{name.replace('_', '-')} {value}: no task of {asked} leaves its memory open; "
-                    "leave it out, or ask nieh_memory"
+                    f"--{name.replace('_', '-')} {value}: no task of {asked} leaves its memory "
+                    "open; leave it out, or ask nieh_memory"
                 )
         if self._options.prompt is not None and not any(task.takes_prompt for task in self._tasks):
             raise UsageError(
-                f"--prompt {self._options.prompt}: no task of {asked} leaves its words open; "
-                "leave it out, or ask nieh_full"
+                f"--prompt {self._options.prompt}: no task of {asked} leaves its words open; leave "
+                "it out, or ask nieh_full"
             )
         if (self._options.retriever or self._options.retriever_revision) and not self._depends_on(
             "retriever"
         ):
             raise UsageError(
-                f"--retriever: no context of {asked} retrieves frames; "
-                "leave it out, or ask nieh_clip_retrieval or nieh_memory_frames, or --memory clip"
+                f"--retriever: no context of {asked} retrieves frames; leave it out, or ask "
+                "nieh_clip_retrieval or nieh_memory_frames, or --memory clip"
             )
         if self._options.trajectories and not self._depends_on("trajectories"):
             raise UsageError(
@@ -222,7 +224,8 @@ class BoundNieh:
 
 
 def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Group[NiehUnit]]:
-    """Return a group for each task and trajectory: its samples share what is encoded of the trajectory."""
+    """Return a group for each task and trajectory: its samples share what is encoded of the
+    trajectory."""
     groups = []
     for task, item in prepared.items():
         ordered = sorted(item.task_samples.samples, key=lambda sample: sample.question.traj_id)
@@ -239,7 +242,8 @@ def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Grou
 
 
 def _measure_frame(data: NiehSet, model: AnsweringModel) -> int:
-    """Return the subject's size of a frame, by the first frame of the questions that can be read."""
+    """Return the subject's size of a frame, by the first frame of the questions that can be
+    read."""
     problems: list[InfthorError] = []
     for question in data.questions:
         for frame in data.clue_frames(question):
@@ -260,7 +264,8 @@ def _refuse_without_frames(subject: Subject, tasks: Sequence[NiehTask]) -> None:
     without = next((task.data.root for task in tasks if not task.data.has_frames), None)
     if without is not None and not isinstance(subject, Baseline):
         raise UsageError(
-            f"{without}: has questions but no frames, which {subject.name} needs; give a set with metadata/"
+            f"{without}: has questions but no frames, which {subject.name} needs; give a set with "
+            "metadata/"
         )
 
 
@@ -277,7 +282,8 @@ def _refuse_without_sampling(subject: Subject, options: NiehOptions) -> None:
 
 
 def _refuse_empty(task_samples: Sequence[TaskSamples | None], tasks: Sequence[NiehTask]) -> None:
-    """Refuse tasks of which none has a question to ask; some may have none, where no window of their size fits."""
+    """Refuse tasks of which none has a question to ask; some may have none, where no window of
+    their size fits."""
     if any(samples is None or samples.samples for samples in task_samples):
         return
     reasons = {

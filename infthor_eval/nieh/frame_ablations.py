@@ -1,4 +1,5 @@
-"""Frame ablations: other frames in the places of the true ones, to measure what a model gains from seeing them."""
+"""Frame ablations: other frames in the places of the true ones, to measure what a model gains from
+seeing them."""
 
 import random
 from collections.abc import Sequence
@@ -20,8 +21,9 @@ class FrameAblation:
     """An ablation of the frames of requests; their text stays as it is.
 
     Attributes:
-        frames: "shown" (the true frames), "blank" (grey frames of the same size), "shuffled" (the true frames in
-            another order) or "other" (frames at the same positions of another trajectory of the set).
+        frames: "shown" (the true frames), "blank" (grey frames of the same size), "shuffled" (the
+            true frames in another order) or "other" (frames at the same positions of another
+            trajectory of the set).
         seed: seed of the order and of the choice of the other trajectory.
     """
 
@@ -40,7 +42,8 @@ class FrameAblation:
         """
         if self.frames == "other" and len(_trajectories(data)) < 2:
             raise UsageError(
-                f"--frames other: {data.root} has questions on one trajectory only; give another set"
+                f"--frames other: {data.root} has questions on one trajectory only; give another "
+                "set"
             )
 
     def apply(
@@ -60,7 +63,8 @@ class FrameAblation:
         return [_with_frames(part, [next(left) for _ in _frames_in(part)]) for part in parts]
 
     def _shuffle(self, frames: Sequence[FrameRef], traj_id: str) -> list[FrameRef]:
-        """Return the frames in another order if there is one; the same order for every question in a context."""
+        """Return the frames in another order if there is one; the same order for every question in
+        a context."""
         draw = random.Random(
             f"{self.seed}/{traj_id}/{'/'.join(frame.path.name for frame in frames)}"
         )
@@ -72,7 +76,8 @@ class FrameAblation:
     def _of_another(
         self, frames: Sequence[FrameRef], data: NiehSet, context: Context, sample: Sample
     ) -> list[FrameRef]:
-        """Return the frames at the same positions of another trajectory; of a shorter one, modulo its length."""
+        """Return the frames at the same positions of another trajectory; of a shorter one, modulo
+        its length."""
         traj_id = sample.question.traj_id
         others = [other for other in _trajectories(data) if other != traj_id]
         shown = context.frames(

@@ -1,7 +1,7 @@
 """The metrics of a task's replies: our scorers, or the task's own function.
 
-A task file lists under `metric_list` which of our scorers it has. It may name its own function under `process_results`,
-with its metrics under `metric_list`, as in lm-eval.
+A task file lists under `metric_list` which of our scorers it has. It may name its own function
+under `process_results`, with its metrics under `metric_list`, as in lm-eval.
 """
 
 import importlib
@@ -29,7 +29,8 @@ ProcessResults = Callable[[Doc, list[str]], Mapping[str, Any]]
 
 
 class MetricError(UserCodeError, DataError):
-    """A metrics function that is not this package's raised an exception, or its result lacks a metric."""
+    """A metrics function that is not this package's raised an exception, or its result lacks a
+    metric."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,8 @@ class Metrics:
 
     Attributes:
         process: the task's own function; None for our scorers.
-        code: what tells these metrics from others of their names: the version of the strict scorer's rules, or name and
-            digest of the function's source.
+        code: what tells these metrics from others of their names: the version of the strict
+            scorer's rules, or name and digest of the function's source.
     """
 
     names: tuple[str, ...]
@@ -62,7 +63,8 @@ class Metrics:
 
 @contextmanager
 def wrap_metric_errors(problem: str) -> Iterator[None]:
-    """Turn any exception in a metrics function into a `MetricError` of one line, with the place of the exception.
+    """Turn any exception in a metrics function into a `MetricError` of one line, with the place of
+    the exception.
 
     Args:
         problem: the function and the question that it fails on.
@@ -95,8 +97,8 @@ def metrics_of(task: TaskFile) -> Metrics:
     """Return the metrics of a task file.
 
     Raises:
-        DataError: its function cannot be imported, or a metric is not averaged, is better when lower, or is none of our
-            scorers where these score.
+        DataError: its function cannot be imported, or a metric is not averaged, is better when
+            lower, or is none of our scorers where these score.
     """
     name = task.settings["process_results"]
     listed = task.settings.get("metric_list") or []
@@ -117,7 +119,8 @@ def _our_metrics(listed: Sequence[str], place: str) -> Metrics:
     for name in listed:
         if name not in SCORERS:
             raise DataError(
-                f"{place}{name} is none of our scorers, {', '.join(SCORERS)}; name its process_results too"
+                f"{place}{name} is none of our scorers, {', '.join(SCORERS)}; name its "
+                "process_results too"
             )
     names = tuple(name for name in SCORERS if name in (listed or SCORERS))
     return replace(
@@ -139,7 +142,8 @@ def _check(item: object, place: str) -> None:
 
 
 def _import_function(task_file: Path, name: str) -> tuple[ModuleType, str]:
-    """Import a function's module as lm-eval does: from beside the file, else from the path. Return its name too."""
+    """Import a function's module as lm-eval does: from beside the file, else from the path. Return
+    its name too."""
     module, _, attribute = name.rpartition(".")
     beside = task_file.parent / f"{module.replace('.', '/')}.py"
     try:

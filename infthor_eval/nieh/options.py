@@ -17,27 +17,34 @@ class NiehOptions:
     """Options of the suite; each has its help text.
 
     Attributes:
-        k_tokens: tokens of a kilo-token in contexts of a given size; None for each context's published value.
+        k_tokens: tokens of a kilo-token in contexts of a given size; None for each context's
+            published value.
         tokens_per_frame: tokens of one frame for such contexts; None to ask the model.
-        retriever: CLIP model of contexts that retrieve frames, a hub id or a folder; None for the published one.
+        retriever: CLIP model of contexts that retrieve frames, a hub id or a folder; None for the
+            published one.
         retriever_revision: branch, tag or commit of it on the hub; None for the default branch.
-        trajectories: folder of the set's trajectories (`--traj_dir` of the published scripts); None for the set's own.
+        trajectories: folder of the set's trajectories (`--traj_dir` of the published scripts); None
+            for the set's own.
         frames: the frames that are shown: the true ones, or a frame ablation.
-        prompt: words of the question, one of `infthor_eval.nieh.prompts`; None for the task's own, else published-main.
-        memory: memory that recalls what is shown, a name or FILE.py:CLASS; for tasks that leave it open.
+        prompt: words of the question, one of `infthor_eval.nieh.prompts`; None for the task's own,
+            else published-main.
+        memory: memory that recalls what is shown, a name or FILE.py:CLASS; for tasks that leave it
+            open.
         memory_args: its options, "k=v,k=v".
         budget: most tokens of what it recalls ("4k" is 4,000); None for the memory's own limit.
         repeats: times that each question is asked, with the seeds from the run's on.
-        max_thinking_tokens: tokens for what a model thinks before its answer, beside the task's own tokens; None for no
-            further ones.
-        temperature: temperature of drawn replies; None for the tasks' own, or 1 where a greedy task is repeated.
+        max_thinking_tokens: tokens for what a model thinks before its answer, beside the task's own
+            tokens; None for no further ones.
+        temperature: temperature of drawn replies; None for the tasks' own, or 1 where a greedy task
+            is repeated.
     """
 
     k_tokens: int | None = field(
         default=None,
         metadata={
             "choices": ("1000", "1024"),
-            "help": "Tokens of a kilo-token in contexts with a size; default: each context's published value.",
+            "help": "Tokens of a kilo-token in contexts with a size; default: each context's "
+            "published value.",
         },
     )
     tokens_per_frame: int | None = field(
@@ -65,7 +72,8 @@ class NiehOptions:
     trajectories: str | None = field(
         default=None,
         metadata={
-            "help": "Folder of the set's trajectories (TRAJ_ID.json or .txt) if they are not in the set.",
+            "help": "Folder of the set's trajectories (TRAJ_ID.json or .txt) if they are not in "
+            "the set.",
             "metavar": "DIR",
             "is_place": True,
         },
@@ -73,7 +81,8 @@ class NiehOptions:
     frames: str = field(
         default=SHOWN,
         metadata={
-            "help": f"Frames to show, a run with each: {', '.join(FRAMES)} (of another trajectory).",
+            "help": f"Frames to show, a run with each: {', '.join(FRAMES)} (of another "
+            "trajectory).",
             "metavar": "HOW,...",
             "each": True,
         },
@@ -83,13 +92,15 @@ class NiehOptions:
         default=None,
         metadata={
             "choices": PROMPTS,
-            "help": f"Words of the question, for tasks that leave them open; default: {PUBLISHED_MAIN}.",
+            "help": "Words of the question, for tasks that leave them open; default: "
+            f"{PUBLISHED_MAIN}.",
         },
     )
     memory: str | None = field(
         default=None,
         metadata={
-            "help": "Memories for tasks that need one (nieh_memory), a run with each; `ls memories`, or FILE.py:CLASS.",
+            "help": "Memories for tasks that need one (nieh_memory), a run with each; `ls "
+            "memories`, or FILE.py:CLASS.",
             "metavar": "NAME,...",
             "each": True,
         },
@@ -101,7 +112,8 @@ class NiehOptions:
     budget: str | None = field(
         default=None,
         metadata={
-            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's own limit.",
+            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's "
+            "own limit.",
             "metavar": "TOKENS,...",
             "each": True,
         },
@@ -117,7 +129,8 @@ class NiehOptions:
     temperature: float | None = field(
         default=None,
         metadata={
-            "help": "Draw replies at this temperature; default: as the task says, and 1 if it is repeated.",
+            "help": "Draw replies at this temperature; default: as the task says, and 1 if it is "
+            "repeated.",
             "metavar": "T",
         },
     )

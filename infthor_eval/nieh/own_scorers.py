@@ -1,4 +1,5 @@
-"""Scorers that are not this package's: a function in a user's file, or one that another package names.
+"""Scorers that are not this package's: a function in a user's file, or one that another package
+names.
 
 A scorer is given a whole reply and the gold answers, and returns its score, or several by name.
 """
@@ -83,7 +84,8 @@ class OwnScorer:
         taken = next((name for name in names if name in reserved), None)
         if taken is not None:
             raise UsageError(
-                f"--scorer {self.name}: calls its metric {taken}, as one of ours is called; rename it"
+                f"--scorer {self.name}: calls its metric {taken}, as one of ours is called; rename "
+                "it"
             )
         return OwnScores(names, by_unit)
 
@@ -99,7 +101,8 @@ class OwnScorer:
 
 
 def find_scorer(name: str) -> OwnScorer:
-    """Return the scorer of a name: FILE.py:NAME, or an entry point `infthor_eval.scorers` of another package.
+    """Return the scorer of a name: FILE.py:NAME, or an entry point `infthor_eval.scorers` of
+    another package.
 
     Raises:
         UsageError: there is none of this name, or it cannot be called.

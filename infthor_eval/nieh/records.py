@@ -1,4 +1,5 @@
-"""Payloads of NIEH's records in the journal: replies, what memories recalled and models wrote, a judge's verdicts."""
+"""Payloads of NIEH's records in the journal: replies, what memories recalled and models wrote, a
+judge's verdicts."""
 
 from typing import Annotated, Any
 
@@ -18,7 +19,8 @@ class Guess(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         form: the question's form.
-        scores: scores by scorer of the guess at this question; of the guesser that is best at its form.
+        scores: scores by scorer of the guess at this question; of the guesser that is best at its
+            form.
         form_scores: means of these scores over the questions of that form in its file.
     """
 
@@ -38,7 +40,8 @@ class ShownClues(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         n_shown: number of clue frames among them.
         n_clues: number of different clue frames.
-        n_after: number of frames of the trajectory after the last clue; None if its length is not known.
+        n_after: number of frames of the trajectory after the last clue; None if its length is not
+            known.
     """
 
     n_shown: Count
@@ -50,7 +53,8 @@ class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
     """What a memory recalled for a question.
 
     Attributes:
-        recalled: positions of frames in the trajectory, and texts, in the order in which they are shown.
+        recalled: positions of frames in the trajectory, and texts, in the order in which they are
+            shown.
         build_s: seconds that the memory took to observe the trajectory, for all questions on it.
         recall_s: seconds that it took to recall this.
     """
@@ -72,17 +76,20 @@ class NiehAnswer(
 
     Attributes:
         question: the question's text.
-        question_type: its type; that of its words if the set names none, empty if they are of no form of Table 3.
+        question_type: its type; that of its words if the set names none, empty if they are of no
+            form of Table 3.
         n_clues: number of frames that are evidence; 0 for an absence.
         clue_column: column in the tables by number of clues (`Question.clue_column`).
         answers: the gold answers.
         file: name of its file, in a set of several; empty elsewhere.
         guess: what can be guessed of the question; None if it is not known.
-        shown_clues: clue frames among the shown ones; None if they are not known, or if no frame is evidence.
+        shown_clues: clue frames among the shown ones; None if they are not known, or if no frame is
+            evidence.
         recall: what a memory recalled; None where the context has no memory.
         reply: the reply; None if the model failed.
         scores: scores of the reply by metric; empty if there is none.
-        thinking: what the model thought before the reply, which is empty if it was cut off there; None if it did not.
+        thinking: what the model thought before the reply, which is empty if it was cut off there;
+            None if it did not.
         n_watched: different frames that a person looked at before replying; None for models.
     """
 
@@ -123,7 +130,8 @@ class NiehAnswer(
         thinking: str | None = None,
         n_watched: int | None = None,
     ) -> "NiehAnswer":
-        """Return the same question with a reply, what a model thought before it, and how much a person looked at."""
+        """Return the same question with a reply, what a model thought before it, and how much a
+        person looked at."""
         return msgspec.structs.replace(
             self, reply=reply, scores=scores, thinking=thinking, n_watched=n_watched
         )

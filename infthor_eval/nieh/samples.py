@@ -1,4 +1,5 @@
-"""The samples of a task: every question of its set in every variant of its context, and the skipped ones."""
+"""The samples of a task: every question of its set in every variant of its context, and the skipped
+ones."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -56,7 +57,8 @@ class TaskSamples:
 
     @cached_property
     def words(self) -> tuple[str, ...]:
-        """All answers in words and all words of the questions, sorted: what a person's typing is completed from."""
+        """All answers in words and all words of the questions, sorted: what a person's typing is
+        completed from."""
         questions = [sample.question for sample in self.samples]
         answers = {
             answer
@@ -68,7 +70,8 @@ class TaskSamples:
         return tuple(sorted(answers | (asked - {answer.lower() for answer in answers})))
 
     def all_frames(self, sample: Sample) -> list[FrameRef]:
-        """Return all frames of a sample's trajectory as a memory observes them: ablated, but in their order.
+        """Return all frames of a sample's trajectory as a memory observes them: ablated, but in
+        their order.
 
         Raises:
             DataError: the trajectory cannot be read.
@@ -82,14 +85,16 @@ class TaskSamples:
         return [part for part in shown if isinstance(part, FrameRef)]
 
     def request(self, sample: Sample) -> tuple[list[ContextPart], str]:
-        """Return the request of a sample: the context, and the text with the question that follows it."""
+        """Return the request of a sample: the context, and the text with the question that follows
+        it."""
         parts, text = self.context.request(self.data, sample, self.prompt)
         return self.frame_ablation.apply(parts, self.data, self.context, sample), text
 
 
 @lru_cache(maxsize=8)
 def open_set(root: str, trajectories: str | None = None) -> NiehSet:
-    """Open the set in a folder, once per process; `open_set.cache_clear()` makes it be read again."""
+    """Open the set in a folder, once per process; `open_set.cache_clear()` makes it be read
+    again."""
     return NiehSet(Path(root), Path(trajectories) if trajectories else None)
 
 
@@ -102,7 +107,8 @@ def find_set(
     """Return the set of a task.
 
     Args:
-        data: folder of an NIEH set; None for the published set where `infthor-eval fetch nieh` put it.
+        data: folder of an NIEH set; None for the published set where `infthor-eval fetch nieh` put
+            it.
         bundled: name of a set that comes with the package, which goes before `data`.
         trajectories: folder of the set's trajectories; None if they are in the set.
 
@@ -114,7 +120,8 @@ def find_set(
         return open_set(str(packaged_folder(f"sets/{bundled}")), trajectories)
     if data is None and not default_folder().is_dir():
         raise UsageError(
-            "no NIEH set to ask about; give its folder with --data, or fetch the published one: fetch nieh"
+            "no NIEH set to ask about; give its folder with --data, or fetch the published one: "
+            "fetch nieh"
         )
     return open_set(str(data or default_folder()), trajectories)
 
@@ -123,13 +130,14 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
     """Return the samples of a task.
 
     Args:
-        config: `dataset_kwargs` of the task file with the options of the run: name of the context, arguments of
-            `find_set`, and settings of the context (`infthor_eval.nieh.contexts.ContextSettings`).
+        config: `dataset_kwargs` of the task file with the options of the run: name of the context,
+            arguments of `find_set`, and settings of the context
+            (`infthor_eval.nieh.contexts.ContextSettings`).
         limit: number of questions, chosen evenly from all trajectories by the seed; None for all.
 
     Raises:
-        UsageError: there is no set, the context is unknown, lacks a setting or is asked in other words, or the set does
-            not allow the ablation.
+        UsageError: there is no set, the context is unknown, lacks a setting or is asked in other
+            words, or the set does not allow the ablation.
         DataError: the set cannot be read.
     """
     context, settings, data = (
@@ -157,7 +165,8 @@ _Items = list[Sample | SkippedQuestion]  # of one question
 def _by_question(
     data: NiehSet, context: Context, settings: ContextSettings, limit: int | None
 ) -> list[_Items]:
-    """Return the items of each question in the order of the set; with a limit, of the questions read to reach it."""
+    """Return the items of each question in the order of the set; with a limit, of the questions
+    read to reach it."""
     problems: dict[FrameRef, str | None] = {}
 
     def skip_unreadable(sample: Sample) -> Sample | SkippedQuestion:
@@ -192,7 +201,8 @@ def _samples(
 
 
 def _find_problem(frames: list[FrameRef], known: dict[FrameRef, str | None]) -> str | None:
-    """Return why one of the frames cannot be shown, or None. `known` caches the check of each frame's file."""
+    """Return why one of the frames cannot be shown, or None. `known` caches the check of each
+    frame's file."""
     for frame in frames:
         if frame not in known:
             known[frame] = frame.problem()

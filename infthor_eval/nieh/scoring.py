@@ -1,16 +1,18 @@
 """The two scorers of NIEH answers.
 
-`reference` equals the published scorer on every pair, faults included: its numbers are what the paper reports.
-`strict` keeps its idea (normalise, compare, allow near misses and synonyms) and fixes the faults:
+`reference` equals the published scorer on every pair, faults included: its numbers are what the
+paper reports. `strict` keeps its idea (normalise, compare, allow near misses and synonyms) and
+fixes the faults:
 
-* of several answers the score is F1, so that naming everything does not score: each gold answer and each answer of the
-  response is matched at most once, and seven answers of which two are the two gold ones score 0.44, not 1. "mug, mug,
-  mug" against [mug, plate] scores 0.4, not 1.5;
+* of several answers the score is F1, so that naming everything does not score: each gold answer and
+  each answer of the response is matched at most once, and seven answers of which two are the two
+  gold ones score 0.44, not 1. "mug, mug, mug" against [mug, plate] scores 0.4, not 1.5;
 * "and" separates answers only as a whole word, so "hand towel" stays one answer;
-* yes and no must be the first word said ("not sure", "none", "notebook" are not "no"; "yesterday" is not "yes"),
-  and an answer that says both counts as neither;
+* yes and no must be the first word said ("not sure", "none", "notebook" are not "no"; "yesterday"
+  is not "yes"), and an answer that says both counts as neither;
 * numbers must be equal: "100" is not nearly "10";
-* a slice is its food: "lettuce slice", "sliced lettuce", "lettucesliced" and "lettuce" are one thing, in keys too.
+* a slice is its food: "lettuce slice", "sliced lettuce", "lettucesliced" and "lettuce" are one
+  thing, in keys too.
 """
 
 import re
@@ -39,7 +41,8 @@ __all__ = [
     "scores",
 ]
 
-# Part of a run's identity: scores of other rules are another run's. 2: F1 of several answers; slices.
+# Part of a run's identity: scores of other rules are another run's. 2: F1 of several answers;
+# slices.
 STRICT_RULES = "2"
 Scorer = Literal["reference", "strict"]
 SCORERS: tuple[Scorer, ...] = ("reference", "strict")
@@ -50,7 +53,8 @@ _SLICE = re.compile(r"\b(?:slices?|sliced)\b(?: of\b)?|(?<=\w)sliced\b")
 
 
 def score(response: str, answers: Sequence[Answer], scorer: Scorer = "reference") -> float:
-    """Return how many of the gold answers a response gives, as a share or F1; 1.0 or 0.0 for a single gold answer.
+    """Return how many of the gold answers a response gives, as a share or F1; 1.0 or 0.0 for a
+    single gold answer.
 
     Only the reference scorer can exceed 1.0, when one gold answer is repeated.
 
@@ -71,7 +75,8 @@ def scores(reply: str, answers: Sequence[Answer]) -> dict[str, float]:
 
 
 def says_yes_or_no(response: str) -> str | None:
-    """Return "yes" or "no" if the strict scorer takes a response for one; None if it is neither, or both."""
+    """Return "yes" or "no" if the strict scorer takes a response for one; None if it is neither, or
+    both."""
     return next((answer for answer in _YES_NO if _matches_strict(response, answer)), None)
 
 
@@ -114,7 +119,8 @@ def _strict(response: str, answers: Sequence[Answer]) -> float:
 def _largest_matching(
     answers: Sequence[Answer], pieces: Sequence[str], match: Callable[[str, Answer], bool]
 ) -> int:
-    """Return the number of gold answers that can have a piece each (augmenting paths; both lists are short)."""
+    """Return the number of gold answers that can have a piece each (augmenting paths; both lists
+    are short)."""
     fits = [[index for index, piece in enumerate(pieces) if match(piece, gold)] for gold in answers]
     owner: dict[int, int] = {}
 
@@ -163,7 +169,8 @@ def _is_number(text: str) -> bool:
 
 
 def _normalise(text: Answer) -> str:
-    """Return the published normal form: a number in digits if the text holds one, else plain words."""
+    """Return the published normal form: a number in digits if the text holds one, else plain
+    words."""
     if not isinstance(text, str):
         return str(text)
     text = text.lower().strip()

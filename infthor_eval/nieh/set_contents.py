@@ -18,7 +18,8 @@ from infthor_eval.runs import Catalog
 
 __all__ = ["AskedTask", "SetContents", "read_asked_tasks", "read_contents"]
 
-# Contexts whose frames are chosen by a model; which questions they can be asked with is that of whole trajectories.
+# Contexts whose frames are chosen by a model; which questions they can be asked with is that of
+# whole trajectories.
 _BY_MODEL = frozenset({"clip_retrieval", "memory"})
 _QWEN_FRAME = (
     121  # tokens of a frame of 300x300 in Qwen2.5-VL, for contexts that are measured in tokens
@@ -30,7 +31,8 @@ class SetContents:
     """What a set has.
 
     Attributes:
-        questions: numbers of questions by type, by question file; rows that are no question are not among them.
+        questions: numbers of questions by type, by question file; rows that are no question are not
+            among them.
         malformed: numbers of such rows by reason.
         left_out: numbers of questions that cannot be asked whatever is shown, by reason.
         n_trajectories: number of trajectories that the questions name.
@@ -113,8 +115,8 @@ def _read_trajectory(data: NiehSet, traj_id: str, found: SetContents) -> None:
 def read_asked_tasks(root: Path, trajectories: Path | None = None) -> Iterator[AskedTask]:
     """Yield for each task of NIEH that the package has what of a set it can ask.
 
-    Contexts that are measured in tokens count a frame as Qwen2.5-VL does. Tasks whose context a model chooses, and
-    those of the bundled set, are left out.
+    Contexts that are measured in tokens count a frame as Qwen2.5-VL does. Tasks whose context a
+    model chooses, and those of the bundled set, are left out.
     """
     for name, task in sorted(Catalog.find_packaged().tasks.items()):
         settings: dict[str, Any] = task.settings.get("dataset_kwargs") or {}

@@ -37,7 +37,8 @@ _NEEDED = (
 
 @dataclass(frozen=True)
 class PreparedTask:
-    """A task with all that turns its samples into records; `generation_kwargs` are the decoding in lm-eval's words.
+    """A task with all that turns its samples into records; `generation_kwargs` are the decoding in
+    lm-eval's words.
 
     Attributes:
         stop: strings that end an answer behind thoughts; the decoding's own would end the thoughts.
@@ -106,7 +107,8 @@ class NiehTask:
         )
 
     def prepare(self, tokens_per_frame: int | None) -> PreparedTask:
-        """Prepare the task for a model, given the tokens of a frame where the samples depend on them."""
+        """Prepare the task for a model, given the tokens of a frame where the samples depend on
+        them."""
         samples = self.task_samples
         if samples is None:
             samples = find_samples(
@@ -130,7 +132,8 @@ class NiehTask:
 
         Args:
             prepared: the task, prepared for a model.
-            video_input: True if the model is given films as videos, False if as images; None if it sees nothing.
+            video_input: True if the model is given films as videos, False if as images; None if it
+                sees nothing.
         """
         samples, names = prepared.task_samples, prepared.metrics.names
         skipped = [
@@ -156,7 +159,8 @@ class NiehTask:
 
 
 def check_task_file(file: TaskFile) -> None:
-    """Check the settings under `dataset_kwargs`, so that none is without effect, as a misspelt one would be.
+    """Check the settings under `dataset_kwargs`, so that none is without effect, as a misspelt one
+    would be.
 
     Raises:
         DataError: names the file and the setting.
@@ -188,7 +192,8 @@ def check_task_file(file: TaskFile) -> None:
         raise UsageError(f"{place}: {error}") from error
     if context.needs_model and settings.ctx_size is None:
         raise UsageError(
-            f"{place}: ctx_size is missing; {given['context']} needs it, a number of kilo-tokens above 0"
+            f"{place}: ctx_size is missing; {given['context']} needs it, a number of kilo-tokens "
+            "above 0"
         )
     if "bundled" in given:
         try:
@@ -198,7 +203,8 @@ def check_task_file(file: TaskFile) -> None:
 
 
 def _drawn(generation_kwargs: Any, options: NiehOptions) -> Any:
-    """Return the generation settings of a task with drawn replies, if the run wants them or repeats its questions."""
+    """Return the generation settings of a task with drawn replies, if the run wants them or repeats
+    its questions."""
     if not isinstance(generation_kwargs, Mapping):
         return generation_kwargs  # refused where it is read
     own = generation_kwargs.get("temperature") or None

@@ -20,7 +20,8 @@ __all__ = ["NiehUnit"]
 class NiehUnit(Unit[NiehAnswer]):
     """A unit that asks the question of a sample.
 
-    What can be guessed of the question is in its records, and not in `payload`: no question waits until it is learned.
+    What can be guessed of the question is in its records, and not in `payload`: no question waits
+    until it is learned.
 
     Attributes:
         sample: the sample.

@@ -1,8 +1,8 @@
 """Who may see a page, and what a page may do.
 
-Everybody on a machine can reach its 127.0.0.1, and so can each page that is open in a browser on it. Hence the address
-holds a token, and requests under another name (a name of elsewhere that is made to point here) or from another page
-are refused.
+Everybody on a machine can reach its 127.0.0.1, and so can each page that is open in a browser on
+it. Hence the address holds a token, and requests under another name (a name of elsewhere that is
+made to point here) or from another page are refused.
 """
 
 import secrets
@@ -16,7 +16,8 @@ __all__ = ["Guard"]
 _NAMES = ("127.0.0.1", "localhost")
 # Pages run their own scripts and load nothing from elsewhere; no other page holds them in a frame.
 _HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'self'; script-src 'self'; "
+    "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'self'; "
+    "script-src 'self'; "
     "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Cross-Origin-Resource-Policy": "same-origin",
@@ -26,7 +27,8 @@ _HEADERS = {
 
 
 class Guard:
-    """An application that answers for another one: it refuses requests of others, and adds the headers of every page.
+    """An application that answers for another one: it refuses requests of others, and adds the
+    headers of every page.
 
     Args:
         application: what answers the requests that are not refused.
@@ -61,10 +63,14 @@ class Guard:
         host = headers.get("host", "")
         if host.partition(":")[0].lower() not in _NAMES:
             return f"these pages are at {_NAMES[0]}"
-        # The port is not compared with the server's: it is another one where the port is forwarded from elsewhere.
+        # The port is not compared with the server's: it is another one where the port is forwarded
+        # from elsewhere.
         if headers.get("origin", f"http://{host}") != f"http://{host}":
             return "another page asked"
         given = path.removeprefix("/").partition("/")[0]
         if not secrets.compare_digest(given.encode(), self._token):
-            return "the address does not hold the token of this server; open the address that the command printed"
+            return (
+                "the address does not hold the token of this server; open the address that the "
+                "command printed"
+            )
         return ""

@@ -1,4 +1,5 @@
-"""A server of local pages: reached from this machine alone, and only by who was given the address (`guard`)."""
+"""A server of local pages: reached from this machine alone, and only by who was given the address
+(`guard`)."""
 
 from __future__ import annotations
 
@@ -47,8 +48,8 @@ class PageServer:
 def serve_pages(routes: Sequence[BaseRoute], *, port: int = 0) -> Iterator[PageServer]:
     """Serve pages from a thread until the context ends.
 
-    Pages name their parts by relative addresses ("state.json"), which hold the token as the page's own does. Handlers
-    that are plain functions run in other threads, several at a time.
+    Pages name their parts by relative addresses ("state.json"), which hold the token as the page's
+    own does. Handlers that are plain functions run in other threads, several at a time.
 
     Args:
         routes: Starlette's routes; the one with path "/" is the first page.
@@ -73,7 +74,8 @@ def serve_pages(routes: Sequence[BaseRoute], *, port: int = 0) -> Iterator[PageS
 
 
 def file_route(path: str, package: str, name: str) -> Route:
-    """Return the route of a file that comes with a package (.html, .css or .js): its path, and where the file is.
+    """Return the route of a file that comes with a package (.html, .css or .js): its path, and
+    where the file is.
 
     Example: `file_route("/report.css", "infthor_eval.report.web", "report.css")`.
     """

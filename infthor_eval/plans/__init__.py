@@ -1,1 +1,2 @@
-"""Plan-level evaluation (Algorithm 2): an agent meets a long trajectory plan by plan, each from the true history."""
+"""Plan-level evaluation (Algorithm 2): an agent meets a long trajectory plan by plan, each from the
+true history."""

@@ -1,7 +1,7 @@
 """The contract of an environment of plans, to check one's own: on another simulator, or on a robot.
 
-It uses `reset`, `step` and the lists of plans and of the expert's actions alone. Each violated clause raises an error
-of one line.
+It uses `reset`, `step` and the lists of plans and of the expert's actions alone. Each violated
+clause raises an error of one line.
 """
 
 import math
@@ -48,7 +48,8 @@ def check_env(environment: Environment, plans: Sequence[int] | None = None) -> N
 
     Args:
         environment: new environment with the default reward rules.
-        plans: indices of the plans to check; None for the first ones. Those whose expert is refused are left out.
+        plans: indices of the plans to check; None for the first ones. Those whose expert is refused
+            are left out.
 
     Raises:
         ContractError: a clause does not hold; the message names it.

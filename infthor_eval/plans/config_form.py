@@ -1,4 +1,5 @@
-"""The part of a run's config that its summary and tables read, as `task.PlansTask.config` writes it."""
+"""The part of a run's config that its summary and tables read, as `task.PlansTask.config` writes
+it."""
 
 from typing import Any
 

@@ -1,4 +1,5 @@
-"""One trajectory as an environment like Gymnasium's: reset to any of its plans, then step until it is over."""
+"""One trajectory as an environment like Gymnasium's: reset to any of its plans, then step until it
+is over."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -68,7 +69,8 @@ class StepInfo:
         message: what was wrong with it; empty if nothing was.
         ended: how the plan ended with it; None if it goes on.
         goal_reached: whether the goal of the whole task has been reached in this plan.
-        conditions: conditions of the task's goal that are met where the plan ended; None while it goes on.
+        conditions: conditions of the task's goal that are met where the plan ended; None while it
+            goes on.
     """
 
     call: Mapping[str, Any] | None
@@ -92,8 +94,8 @@ class StepOutcome(NamedTuple):
 class PlanEnvironment:
     """One trajectory.
 
-    Once the expert has passed a plan, a reset to it restores a copy in the embedded simulator, wherever it is in the
-    trajectory. Unity repeats all actions before it.
+    Once the expert has passed a plan, a reset to it restores a copy in the embedded simulator,
+    wherever it is in the trajectory. Unity repeats all actions before it.
 
     Attributes:
         trajectory: the trajectory.
@@ -123,7 +125,8 @@ class PlanEnvironment:
             words: the words of plans and actions.
             max_steps: number of steps after which a plan is truncated.
             frames: keeps the frames; None keeps none.
-            in_words: whether the past is also described in words; the simulator must then send instance masks.
+            in_words: whether the past is also described in words; the simulator must then send
+                instance masks.
             in_one_go: whether published rewards are those of a final task that is done in one go.
 
         Raises:
@@ -157,21 +160,24 @@ class PlanEnvironment:
         """Bring the world to the true state before a plan.
 
         Returns:
-            The observation, and information: `max_reward`, the highest possible reward from here (under the published
-            rules the planner's, as there is no highest), `n_expert`, the number of the expert's actions, and
-            `expert_reward`, what the published loop adds to the expert's total (None under other rules).
+            The observation, and information: `max_reward`, the highest possible reward from here
+            (under the published rules the planner's, as there is no highest), `n_expert`, the
+            number of the expert's actions, and `expert_reward`, what the published loop adds to the
+            expert's total (None under other rules).
 
         Raises:
             IndexError: there is no such plan.
-            ExpertRefusedError: this simulator refuses an action of the expert before the plan's end.
-            InfeasibleError: the scene lacks an object of the plan, or the published rewards fail in it.
+            ExpertRefusedError: this simulator refuses an action of the expert before the plan's
+                end.
+            InfeasibleError: the scene lacks an object of the plan, or the published rewards fail in
+                it.
             SimulatorError: the simulator fails.
         """
         if not 0 <= plan < len(self.plans):
             raise IndexError(f"there is no plan {plan}; there are 0 to {len(self.plans) - 1}")
         present = self.plans[plan]
-        # The whole plan is replayed before its start is restored: a plan whose expert fails here is infeasible, and the
-        # expert's end is the goal of GotoLocation.
+        # The whole plan is replayed before its start is restored: a plan whose expert fails here is
+        # infeasible, and the expert's end is the goal of GotoLocation.
         expert_actions = self._expert.actions(plan)
         start, end = self._expert.start(plan), self._expert.start(plan + 1)
         view = self._simulator.rewind(start.mark, exactly=True)
@@ -188,12 +194,15 @@ class PlanEnvironment:
         return Observation(view, start.frame), info
 
     def go_on(self, plan: int) -> tuple[Observation, Mapping[str, Any]]:
-        """Begin a later plan of the same task where the world is, without a reset; returns what `reset` does.
+        """Begin a later plan of the same task where the world is, without a reset; returns what
+        `reset` does.
 
-        The expert must have passed it (`expert_actions`) before the reset, as it would otherwise act in this world.
+        The expert must have passed it (`expert_actions`) before the reset, as it would otherwise
+        act in this world.
 
         Raises:
-            InfeasibleError: the scene lacks an object of the plan, or the published rewards fail in it.
+            InfeasibleError: the scene lacks an object of the plan, or the published rewards fail in
+                it.
             SimulatorError: the simulator fails.
         """
         present, view = self.plans[plan], self._simulator.view
@@ -248,7 +257,8 @@ class PlanEnvironment:
         return self._execute(text, call, before)
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as `reset` does."""
+        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as
+        `reset` does."""
         return self._expert.past(plan)
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
@@ -256,7 +266,8 @@ class PlanEnvironment:
         return self._expert.actions(plan)
 
     def named_objects(self, plan: int) -> Sequence[str]:
-        """Return the ids of the objects that a plan names and that the scene has; for pictures, not for rewards.
+        """Return the ids of the objects that a plan names and that the scene has; for pictures, not
+        for rewards.
 
         Raises:
             ExpertRefusedError: as `reset`.
@@ -307,7 +318,8 @@ class PlanEnvironment:
     def _target(
         self, plan: Plan, view: SimulatorView, end: AgentPose, grid: Grid | None
     ) -> PlanTarget:
-        """Return the target of a plan; that of GotoLocation is the pose in which the expert ended."""
+        """Return the target of a plan; that of GotoLocation is the pose in which the expert
+        ended."""
         if grid is not None:
             return PlanTarget(
                 plan.kind, goal_stand=grid_pose_of(end, grid), goal_horizon=end.horizon
@@ -319,7 +331,8 @@ class PlanEnvironment:
     ) -> Grid | None:
         """Return the reachable cells for GotoLocation, None for other plans.
 
-        The expert's own cells are added: the simulator need not report all of them, yet the expert stood there.
+        The expert's own cells are added: the simulator need not report all of them, yet the expert
+        stood there.
         """
         if plan.kind != PlanKind.GOTO:
             return None
@@ -336,7 +349,8 @@ def _ending(earned: StepReward) -> Ended | None:
 
 
 def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:
-    """Return the ids that ambiguous words mean: the plan's objects, and what they are in (one of ten drawers)."""
+    """Return the ids that ambiguous words mean: the plan's objects, and what they are in (one of
+    ten drawers)."""
     named = [
         start.objects[key]
         for key in (target.object_id, target.receptacle_id)
@@ -346,7 +360,8 @@ def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:
 
 
 def _look_degrees(trajectory: Trajectory) -> float:
-    """Return the angle of most looks up or down in this trajectory: 15 degrees in ALFRED's, 30 in others."""
+    """Return the angle of most looks up or down in this trajectory: 15 degrees in ALFRED's, 30 in
+    others."""
     looks = Counter(
         degrees_of(low)
         for low in trajectory.plan.low_actions

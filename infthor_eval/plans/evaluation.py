@@ -52,10 +52,12 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
     def __init__(self, evaluation: PlansEvaluation, factory: ActorFactory) -> None:
         """Take the work, and what creates the subject's actors."""
         self._tasks, self._factory = evaluation.tasks, factory
-        # Nothing is rendered that nobody looks at, and instance masks are needed for the state in words alone.
+        # Nothing is rendered that nobody looks at, and instance masks are needed for the state in
+        # words alone.
         in_words = factory.sees and any(task.history.needs_state for task in self._tasks.values())
         self._simulators = evaluation.simulators(image=factory.sees, instances=in_words)
-        # A trajectory is a group: its plans share the expert's history, in the simulator and in the prefix cache.
+        # A trajectory is a group: its plans share the expert's history, in the simulator and in the
+        # prefix cache.
         groups = groupby(evaluation.units, lambda unit: (unit.key.task, unit.cluster))
         workload = evaluation.workload(
             (same for _, same in groups), constrained=evaluation.options.constrained
@@ -82,7 +84,8 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
             stopped = False
             for unit in group.units:
                 record = known[unit.key]
-                # A plan that was not attempted is, once an earlier one that failed by a fault is completed.
+                # A plan that was not attempted is, once an earlier one that failed by a fault is
+                # completed.
                 if record is None or (record.payload.ended == NOT_ATTEMPTED and not stopped):
                     run = partial(runner.pass_over if stopped else runner.run, unit.episode)
                     record = runner.record(unit, fingerprints[unit.key], run, session)
@@ -97,7 +100,8 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         runner: PlanRunner,
         session: Session[PlanRecord],
     ) -> Iterator[UnitRecord[PlanRecord]]:
-        """Run the plans of a final task as the published scripts do, all of them even if some have records."""
+        """Run the plans of a final task as the published scripts do, all of them even if some have
+        records."""
         fingerprints, known = self._find_records(group, session)
         tried, goes_on = 0, True
         for unit in group.units:
@@ -143,7 +147,8 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
 def _warnings(trained: str | None, tasks: Iterable[PlansTask]) -> list[str]:
     """Return a line for each task that asks a checkpoint in other words than it was trained on."""
     return [
-        f"{task.name}: the checkpoint was trained on {trained} words and is asked in {task.words} ones; give --words"
+        f"{task.name}: the checkpoint was trained on {trained} words and is asked in {task.words} "
+        "ones; give --words"
         f" {trained}"
         for task in tasks
         if trained is not None and trained != task.words

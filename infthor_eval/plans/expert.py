@@ -37,7 +37,8 @@ class ExpertAction:
 
     Attributes:
         pose: pose of the agent after it.
-        completes: whether the goal of the plan's task holds after it, and did not at the plan's start.
+        completes: whether the goal of the plan's task holds after it, and did not at the plan's
+            start.
     """
 
     call: Mapping[str, Any]
@@ -70,7 +71,8 @@ class Replayed(NamedTuple):
 
 
 class Expert:
-    """Replays the expert of a trajectory, plan by plan; `grounding` has the ids of its objects in this simulator."""
+    """Replays the expert of a trajectory, plan by plan; `grounding` has the ids of its objects in
+    this simulator."""
 
     def __init__(
         self,
@@ -120,12 +122,14 @@ class Expert:
         return self._starts[plan]
 
     def actions(self, plan: int) -> Sequence[ExpertAction]:
-        """Return the expert's actions of a plan; raises ExpertRefusedError as `start` of the next plan does."""
+        """Return the expert's actions of a plan; raises ExpertRefusedError as `start` of the next
+        plan does."""
         self.start(plan + 1)
         return self._actions[plan]
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as `start` does."""
+        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as
+        `start` does."""
         segment, present = self._open_segment(plan), self._plans[plan]
         first = present.low[0]
         return Past(
@@ -200,6 +204,7 @@ class Expert:
 
     def _refusal(self, plan: Plan, number: int, why: str) -> ExpertRefusedError:
         self._refused = ExpertRefusedError(
-            f"the expert's action {number} ({self._text(number)}, in plan {plan.index}) is refused here: {why}"
+            f"the expert's action {number} ({self._text(number)}, in plan {plan.index}) is refused "
+            f"here: {why}"
         )
         return self._refused

@@ -23,26 +23,30 @@ class PlansOptions(SimulatorOptions):
         default=None,
         metadata={
             "choices": tuple(map(str, Words)),
-            "help": "Words of plans and actions: the published ones, or plain English; the task's own if not given.",
+            "help": "Words of plans and actions: the published ones, or plain English; the task's "
+            "own if not given.",
         },
     )
     force_action: bool = field(
         default=False,
         metadata={
-            "help": "Call the simulator with forceAction, as the published script does (--rewards published)."
+            "help": "Call the simulator with forceAction, as the published script does (--rewards "
+            "published)."
         },
     )
     history: str | None = field(
         default=None,
         metadata={
-            "help": "Past of a model: full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals, plans.",
+            "help": "Past of a model: full, published, last:TOKENS, text, retrieved:K, frames:K, "
+            "memory, goals, plans.",
             "metavar": "HOW",
         },
     )
     memory: str | None = field(
         default=None,
         metadata={
-            "help": "Memories for --history memory, a run with each; `ls memories`, or FILE.py:CLASS.",
+            "help": "Memories for --history memory, a run with each; `ls memories`, or "
+            "FILE.py:CLASS.",
             "metavar": "NAME,...",
             "each": True,
         },
@@ -54,7 +58,8 @@ class PlansOptions(SimulatorOptions):
     budget: str | None = field(
         default=None,
         metadata={
-            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's own limit.",
+            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's "
+            "own limit.",
             "metavar": "TOKENS,...",
             "each": True,
         },
@@ -63,7 +68,8 @@ class PlansOptions(SimulatorOptions):
         default=None,
         metadata={
             "choices": ("default", "published"),
-            "help": "How final tasks are run: each plan from the true state, or in one go as in the published scripts.",
+            "help": "How final tasks are run: each plan from the true state, or in one go as in "
+            "the published scripts.",
         },
     )
     after_failure: str | None = field(

@@ -30,7 +30,8 @@ class PlanKind(StrEnum):
 
 @dataclass(frozen=True)
 class TrajectoryTask:
-    """One task of a trajectory: its goal in words, as recorded and as a condition; its sub-goals [first, end)."""
+    """One task of a trajectory: its goal in words, as recorded and as a condition; its sub-goals
+    [first, end)."""
 
     text: str
     info: TaskInfo
@@ -52,11 +53,13 @@ class Plan:
         high: place of its sub-goal in the trajectory.
         text: the plan in words ("pick up the mug").
         task: index of the task that it belongs to; the earlier one if it is between two tasks.
-        in_task: whether it belongs to a task, and not to the way from one to the next, as putting away what is held.
+        in_task: whether it belongs to a task, and not to the way from one to the next, as putting
+            away what is held.
         low: indices of the expert's low-level actions, [first, end).
         object_id: recorded id of its object; None if the recording names none.
         receptacle_id: recorded id of its receptacle; None if the recording names none.
-        location: pose to reach by GotoLocation, "loc|x|z|turn|horizon": cells of 0.25 m, quarter turns, degrees.
+        location: pose to reach by GotoLocation, "loc|x|z|turn|horizon": cells of 0.25 m, quarter
+            turns, degrees.
         is_final: whether it belongs to the final long-horizon task.
     """
 
@@ -99,11 +102,12 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
 
 
 def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
-    """Return the plans of a trajectory, in time order; sub-goals without an action (ALFRED's last one) are left out.
+    """Return the plans of a trajectory, in time order; sub-goals without an action (ALFRED's last
+    one) are left out.
 
     Raises:
-        DataError: a task has no goal, a sub-goal is of an unknown kind or cannot be said in these words, or actions
-            belong to no sub-goal.
+        DataError: a task has no goal, a sub-goal is of an unknown kind or cannot be said in these
+            words, or actions belong to no sub-goal.
     """
     tasks = tasks_of(trajectory)
     spans = _spans(trajectory)
@@ -136,7 +140,8 @@ def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
 
 
 def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
-    """Return a task for each part of the trajectory; some files have the final task apart from the others."""
+    """Return a task for each part of the trajectory; some files have the final task apart from the
+    others."""
     tasks, parts, final = trajectory.sub_tasks, trajectory.sub_trajs, trajectory.long_horizon_task
     if len(parts) == len(tasks) + 1 and final is not None:
         return [*tasks, final]
@@ -186,7 +191,8 @@ def _ids(
 ) -> tuple[str | None, str | None]:
     """Return the ids of a sub-goal's object and receptacle.
 
-    What is put away after a task is named by its type in the sub-goal; its ids are in the action that puts it.
+    What is put away after a task is named by its type in the sub-goal; its ids are in the action
+    that puts it.
     """
     planner = high.planner_action
     if "|" not in (planner.object_id or "|"):

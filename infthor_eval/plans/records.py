@@ -1,4 +1,5 @@
-"""What the suite of plans writes into a run's journal: plans, each with everything that the agent did."""
+"""What the suite of plans writes into a run's journal: plans, each with everything that the agent
+did."""
 
 import msgspec
 
@@ -31,10 +32,11 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 class PlanRecord(
     EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="plan"
 ):
-    """One plan, and what an agent did in it; `kind` is that of the plan ("PickupObject"), `ended` see `Ended`.
+    """One plan, and what an agent did in it; `kind` is that of the plan ("PickupObject"), `ended`
+    see `Ended`.
 
-    A plan from imported counts (`infthor_eval.plans.published.imported_counts`) has its kind and whether it was done, no more:
-    the goal is empty, and all numbers but its index are 0.
+    A plan from imported counts (`infthor_eval.plans.published.imported_counts`) has its kind and
+    whether it was done, no more: the goal is empty, and all numbers but its index are 0.
 
     Attributes:
         goal: goal of its task, in words.
@@ -42,11 +44,14 @@ class PlanRecord(
         first_step: index of the expert's first low-level action of it.
         n_expert_steps: number of the expert's actions.
         is_final: whether its task is the final long-horizon task.
-        expert_reward: what the published loop adds to the expert's total with this plan; None under other rules.
+        expert_reward: what the published loop adds to the expert's total with this plan; None under
+            other rules.
         goal_reached: whether the task's goal was reached in it.
-        conditions: conditions of the task's goal that were met at its end, and how many there are; None without a step.
-        clue_distance: of a final task's plan, the frames from where its object, or the place that it goes to, was last
-            in view to the task's first frame; None if it never was or that is not known.
+        conditions: conditions of the task's goal that were met at its end, and how many there are;
+            None without a step.
+        clue_distance: of a final task's plan, the frames from where its object, or the place that
+            it goes to, was last in view to the task's first frame; None if it never was or that is
+            not known.
         clue_tokens: the same in tokens of the whole history; None if the subject counts no tokens.
     """
 

@@ -19,8 +19,10 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         scoring: who rewards actions: "default" (`rewards`) or "published" (`published_rewards`).
-        grounding: how a name becomes an object: "strict" (`thor.actions`) or "published" (`thor.published_actions`).
-        force_action: whether calls of agents have `forceAction`, with which held objects never block a move.
+        grounding: how a name becomes an object: "strict" (`thor.actions`) or "published"
+            (`thor.published_actions`).
+        force_action: whether calls of agents have `forceAction`, with which held objects never
+            block a move.
         task_done: reward when the goal of the plan's task is reached.
         per_step: reward of GotoLocation per step of the shortest path gained.
         nearer_than: number of remaining steps below which GotoLocation is done.

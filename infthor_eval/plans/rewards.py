@@ -1,8 +1,8 @@
 """Rewards of an agent for a plan by the default rules, action by action (docs/plan-rewards.md).
 
-An action is rewarded by the plan's kind. A refused action ends the plan and earns nothing. An action that is not valid
-for the kind earns nothing and ends nothing. The reward of the whole task is added once, with the first valid action
-after which the task's goal holds.
+An action is rewarded by the plan's kind. A refused action ends the plan and earns nothing. An
+action that is not valid for the kind earns nothing and ends nothing. The reward of the whole task
+is added once, with the first valid action after which the task's goal holds.
 """
 
 import math
@@ -24,7 +24,8 @@ from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject
 
 __all__ = ["PlanReward", "StepReward", "count_actions_to_goal", "max_reward"]
 
-_SMALL_LOOK = 0.01  # share of a look below which the camera's angle is right: simulators report rounded angles
+# share of a look below which the camera's angle is right: simulators report rounded angles
+_SMALL_LOOK = 0.01
 _COOLING_STAGES = 3  # cooled, opened again, picked up again
 _TAKING_WHILE_CLOSED = {
     "Toilet"
@@ -72,7 +73,8 @@ class PlanReward:
         _require_feasible(target, start)
         self._rules, self._target, self._task, self._start = rules, target, task, start
         self.treatments = treatments
-        # The plan's own treatments are apart: an object that was washed before is to be washed again by this plan.
+        # The plan's own treatments are apart: an object that was washed before is to be washed
+        # again by this plan.
         self._in_plan = Treatments()
         self._subject = subject_of(target, start)
         self._paths = _paths_to_goal(rules, target, grid)
@@ -84,12 +86,14 @@ class PlanReward:
     def after(
         self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView
     ) -> StepReward:
-        """Return the reward of an action, as `Simulator.step(**call)` takes it; ValueError if the plan is over."""
+        """Return the reward of an action, as `Simulator.step(**call)` takes it; ValueError if the
+        plan is over."""
         if self._is_over:
             raise ValueError("the plan is over; begin the next one")
         action, object_id = call["action"], call.get("objectId")
         rules, kind = self._rules, self._target.kind
-        # Before validity is looked at: an action that is not valid can treat an object nevertheless.
+        # Before validity is looked at: an action that is not valid can treat an object
+        # nevertheless.
         self.treatments = self.treatments.after(action, object_id, after)
         self._in_plan = self._in_plan.after(action, object_id, after)
         if not after.success:
@@ -116,8 +120,8 @@ class PlanReward:
     ) -> StepReward:
         assert self._paths is not None  # as checked when the plan began
         left = self._paths.remaining(after.agent)
-        # A step that was gained, lost and gained again is rewarded once. From where there is no path nothing is gained:
-        # infinity less a finite distance would be.
+        # A step that was gained, lost and gained again is rewarded once. From where there is no
+        # path nothing is gained: infinity less a finite distance would be.
         gained = max(0.0, self._closest - left) if math.isfinite(self._closest) else 0.0
         self._closest = min(self._closest, left)
         arrived = left < self._rules.nearer_than
@@ -137,7 +141,8 @@ class PlanReward:
         is_there = is_in(self._object_id, receptacle, after)
         if action == "PutObject" and not is_there:
             return StepReward()
-        # A receptacle that was closed is to be opened and closed around the put, each with a reward of its own.
+        # A receptacle that was closed is to be opened and closed around the put, each with a reward
+        # of its own.
         was_closed = _is_closed(self._start.objects[receptacle])
         if action == "PutObject":
             return self._complete_stage("put", last=not was_closed)
@@ -184,7 +189,8 @@ class PlanReward:
     def _cool(
         self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
     ) -> StepReward:
-        """Reward three stages in their order: an object in the closed fridge is cold, but still to be taken out."""
+        """Reward three stages in their order: an object in the closed fridge is cold, but still to
+        be taken out."""
         subject = self._subject or ""
         if subject not in self._in_plan.cold:
             return StepReward()
@@ -230,7 +236,8 @@ def max_reward(
 
     Args:
         grid: reachable cells; GotoLocation needs it.
-        completes: the task if its goal can be reached in the plan; None if it cannot, or holds already.
+        completes: the task if its goal can be reached in the plan; None if it cannot, or holds
+            already.
     """
     kind, per_success = target.kind, rules.rewards[target.kind]
     most = per_success
@@ -248,7 +255,8 @@ def max_reward(
 def count_actions_to_goal(
     rules: RewardRules, target: PlanTarget, poses: Sequence[AgentPose], grid: Grid | None = None
 ) -> int:
-    """Return how many of some actions a plan takes: GotoLocation is done some steps before the end of a path.
+    """Return how many of some actions a plan takes: GotoLocation is done some steps before the end
+    of a path.
 
     Args:
         target: target of the plan; plans of other kinds than GotoLocation take all actions.
@@ -267,7 +275,8 @@ def _max_path_reward(
 ) -> float:
     """Return the reward of the shortest path up to where the plan is done, and of arriving.
 
-    At least one step has to be taken, even from where the plan is done already: rewards are given with actions.
+    At least one step has to be taken, even from where the plan is done already: rewards are given
+    with actions.
     """
     paths = _paths_to_goal(rules, target, grid)
     left = math.inf if paths is None else paths.remaining(start.agent)
@@ -285,7 +294,8 @@ class _PathsToGoal:
         self._distances = grid.distances_to(goal)
 
     def remaining(self, pose: AgentPose) -> float:
-        """Return the number of remaining actions; a partial look counts as one. Infinite if there is no path."""
+        """Return the number of remaining actions; a partial look counts as one. Infinite if there
+        is no path."""
         steps = self._distances.get(grid_pose_of(pose, self._grid), math.inf)
         looks = abs(self._horizon - pose.horizon) / self._look_degrees
         return steps + math.ceil(looks - _SMALL_LOOK)
@@ -324,7 +334,8 @@ def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:
         raise InfeasibleError(f"this {kind} plan {problem}; leave it out")
     if kind == PlanKind.PUT and target.receptacle_id not in start.objects:
         raise InfeasibleError(
-            f"the {kind} plan's receptacle is {target.receptacle_id}, which the scene does not have; leave it out"
+            f"the {kind} plan's receptacle is {target.receptacle_id}, which the scene does not "
+            "have; leave it out"
         )
 
 

@@ -55,7 +55,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         folder: Path,
         seed: int,
     ) -> None:
-        """Take a trajectory, its simulator, what creates the actor, and an empty folder for frames."""
+        """Take a trajectory, its simulator, what creates the actor, and an empty folder for
+        frames."""
         frames = FrameFolder(folder) if factory.sees else NoFrames()
         super().__init__(
             simulator,
@@ -74,7 +75,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         self._seed = f"{seed}/{task.name}/{trajectory.traj_id}"
 
     def prepare(self, plans: Sequence[Plan]) -> None:
-        """Have the expert pass plans that are to follow each other without a reset, as far as it can here.
+        """Have the expert pass plans that are to follow each other without a reset, as far as it
+        can here.
 
         Raises:
             SceneError: the simulator has no such scene.
@@ -88,8 +90,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         """Run a plan from its true start, or from where the plan before has left the world.
 
         Raises:
-            InfeasibleError: this simulator refuses an action of the expert before the plan's end, or lacks an object of
-                the plan.
+            InfeasibleError: this simulator refuses an action of the expert before the plan's end,
+                or lacks an object of the plan.
             DataError: a frame cannot be written or read.
             ModelError: the model fails.
             SceneError: the simulator has no such scene.
@@ -125,7 +127,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         return EpisodeResult(_completed_record(self.begun, acts), _tokens(replies), faults)
 
     def _with_clue_tokens(self, begun: PlanRecord, plan: Plan) -> PlanRecord:
-        """Return the record with how far back the clue of a final task's plan is, in tokens of the whole history."""
+        """Return the record with how far back the clue of a final task's plan is, in tokens of the
+        whole history."""
         clue = self._trajectory.clue(plan) if plan.is_final else None
         if clue is None or not isinstance(self._actor, CountingActor):
             return begun
@@ -135,8 +138,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
     def pass_over(self, plan: Plan) -> EpisodeResult[PlanRecord]:
         """Leave out a plan after an earlier one ended the trajectory.
 
-        The expert's actions are replayed nevertheless: an infeasible plan is excluded for every subject, attempted or
-        not, so that all have the same denominator.
+        The expert's actions are replayed nevertheless: an infeasible plan is excluded for every
+        subject, attempted or not, so that all have the same denominator.
 
         Raises:
             InfeasibleError: as `run`.
@@ -173,7 +176,8 @@ def _step_record(act: Act, outcome: StepOutcome) -> StepRecord:
 
 
 def _tokens(replies: Sequence[Reply]) -> Tokens:
-    """Return the context of the last request, which holds those before it, and the tokens of all replies."""
+    """Return the context of the last request, which holds those before it, and the tokens of all
+    replies."""
     if not replies:
         return Tokens()
     counts = [reply.n_reply_tokens for reply in replies]

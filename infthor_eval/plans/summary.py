@@ -39,19 +39,22 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
         n_tried: those of them in which the subject acted.
         success: share of completed plans, by column of the published table.
         by_kind: share of completed plans, by kind.
-        path_weighted: share of completed plans, each weighted by the expert's number of actions over the agent's where
-            that is larger (ALFRED's path-weighted success).
-        reward_share: reward of a trajectory divided by the highest possible reward of its attempted plans.
+        path_weighted: share of completed plans, each weighted by the expert's number of actions
+            over the agent's where that is larger (ALFRED's path-weighted success).
+        reward_share: reward of a trajectory divided by the highest possible reward of its attempted
+            plans.
         reward: reward of a trajectory.
         max_reward: highest possible reward of a trajectory's attempted plans.
         goals: share of tasks whose goal was reached in one of their plans.
-        goal_conditions: share of a task's goal conditions that are met at the end of its last plan that was tried
-            (ALFRED's goal-condition success).
-        by_distance: plans of final tasks done, by the frames since their clue was in view ("50-99", or `NEVER`).
+        goal_conditions: share of a task's goal conditions that are met at the end of its last plan
+            that was tried (ALFRED's goal-condition success).
+        by_distance: plans of final tasks done, by the frames since their clue was in view ("50-99",
+            or `NEVER`).
         by_tokens: the same by thousand tokens of the history since then ("2-4").
         n_actions: actions of all plans.
         rules: name of the reward rules; None for imported counts.
-        logged: totals of a trajectory as the published script logs them, by its names; empty under other rules.
+        logged: totals of a trajectory as the published script logs them, by its names; empty under
+            other rules.
     """
 
     n_plans: int
@@ -112,7 +115,8 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
 
 
 def _rules(rewards: Mapping[str, Any] | None) -> str | None:
-    """Return the name of reward rules as a run's config has them; runs of older versions do not say who scored."""
+    """Return the name of reward rules as a run's config has them; runs of older versions do not say
+    who scored."""
     return None if rewards is None else str(rewards.get("scoring", "older"))
 
 
@@ -158,7 +162,8 @@ def _goals(records: Sequence[Record]) -> Rate | None:
 
 
 def _goal_conditions(records: Sequence[Record]) -> Rate | None:
-    """Return the mean over tasks of the share of their conditions that are met where the agent left them."""
+    """Return the mean over tasks of the share of their conditions that are met where the agent left
+    them."""
     last: dict[tuple[str, int], float] = {}
     for record in sorted(records, key=lambda record: record.payload.index):
         if record.payload.conditions is not None:
@@ -193,7 +198,8 @@ def _clue_tokens(plan: PlanRecord) -> str | None:
 def _rate_of_trajectories(
     records: Sequence[Record], measure: Callable[[float, float], float]
 ) -> Rate | None:
-    """Return the mean over trajectories of a measure of their reward and highest possible reward."""
+    """Return the mean over trajectories of a measure of their reward and highest possible
+    reward."""
     sums: dict[str, tuple[float, float]] = {}
     for record in records:
         reward, most = sums.get(record.cluster, (0.0, 0.0))

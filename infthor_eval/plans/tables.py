@@ -17,12 +17,15 @@ _PATH_WEIGHTED = "path-weighted"
 _COUNTS = ("plans", "tried", "trajectories", "excluded", "skipped", "failed")
 _NEVER = "*"  # marks published cells that cannot be other than 0
 _AFTER_FAILURE = {
-    "continue": "After a failed plan the next one is tried, as in the published script (--after-failure continue).",
-    "stop": "After a failed plan the trajectory is over, as in the paper's Algorithm 2 (--after-failure stop).",
+    "continue": "After a failed plan the next one is tried, as in the published script "
+    "(--after-failure continue).",
+    "stop": "After a failed plan the trajectory is over, as in the paper's Algorithm 2 "
+    "(--after-failure stop).",
 }
 _PUBLISHED_RULES = (
-    "Under the published rules 'at most' is the planner's reward, as walking to and fro earns without end. The logged "
-    "totals are the script's, which leaves out the reward of an action that completes a plan."
+    "Under the published rules 'at most' is the planner's reward, as walking to and fro earns "
+    "without end. The logged totals are the script's, which leaves out the reward of an action "
+    "that completes a plan."
 )
 
 
@@ -87,7 +90,8 @@ def _success_table(
 
 
 def _distance_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[Table]:
-    """Return the final tasks' plans by the distance of their clues: in frames, and in tokens if they are counted."""
+    """Return the final tasks' plans by the distance of their clues: in frames, and in tokens if
+    they are counted."""
     tables = []
     for title, of_task, order in (
         (
@@ -116,7 +120,8 @@ def _rate_and_n(rate: Rate | None) -> str:
 
 
 def _conduct_notes(runs: Sequence[RunSummary]) -> list[str]:
-    """Return how the runs went on after a failed plan; Algorithm 2 of the paper and its script differ in it."""
+    """Return how the runs went on after a failed plan; Algorithm 2 of the paper and its script
+    differ in it."""
     ways = {
         task.get("after_failure") for run in runs for task in run.header.config["tasks"].values()
     }
@@ -173,7 +178,8 @@ def _has_final_task(run: RunSummary) -> bool:
 
 
 def _is_comparable(run: RunSummary) -> bool:
-    """Return whether a run has a task that was run as the published final tasks were, or comes from their logs."""
+    """Return whether a run has a task that was run as the published final tasks were, or comes from
+    their logs."""
     tasks = run.header.config["tasks"].values()
     return any(
         task["rewards"] is None or _as_published(task) for task in tasks

@@ -53,8 +53,8 @@ class PlanTaskSettings:
         rewards: name of the reward rules.
         words: the words of plans and actions, see `Words`.
         history: how much of the history a model is given.
-        protocol: whether each plan begins in the true state ("default"), or a final task is done in one go as in the
-            "published" scripts (`final_protocol`).
+        protocol: whether each plan begins in the true state ("default"), or a final task is done in
+            one go as in the "published" scripts (`final_protocol`).
         after_failure: whether to "continue" from the true state after a failed plan, or to "stop".
         max_steps: maximum number of steps of one plan.
         preamble: text before everything else that a model is given.
@@ -72,7 +72,8 @@ class PlanTaskSettings:
 
 
 def check_task_file(file: TaskFile) -> None:
-    """Check the settings of a task file; raises DataError if one is unknown or has a value that is not allowed."""
+    """Check the settings of a task file; raises DataError if one is unknown or has a value that is
+    not allowed."""
     file.require("dataset_kwargs")
     task_settings(file, PlanTaskSettings, {}, _CHOICES)
 
@@ -167,7 +168,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         )
 
     def _recalling(self) -> dict[str, Any]:
-        """Return the identity of a memory of one's own choice; the published forms have theirs in their name."""
+        """Return the identity of a memory of one's own choice; the published forms have theirs in
+        their name."""
         return (
             {"recall": self.history.identity()} if isinstance(self.history, RecalledHistory) else {}
         )

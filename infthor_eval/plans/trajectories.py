@@ -30,7 +30,8 @@ class PlanTrajectory(TaskTrajectory):
         )
 
     def clue(self, plan: Plan) -> int | None:
-        """Return the last frame, up to the first of its task, with what a plan needs in view; see `clue_step`."""
+        """Return the last frame, up to the first of its task, with what a plan needs in view; see
+        `clue_step`."""
         return clue_step(self._logs, self.data, plan, self.first_frame(plan))
 
     @cached_property

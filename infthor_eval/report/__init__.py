@@ -1,1 +1,2 @@
-"""Results for people: tables on the terminal, comparisons, pages; pure functions of typed summaries."""
+"""Results for people: tables on the terminal, comparisons, pages; pure functions of typed
+summaries."""

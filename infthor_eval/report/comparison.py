@@ -1,6 +1,8 @@
-"""Two runs of one suite on the same units: the difference of their scores, with interval and p value.
+"""Two runs of one suite on the same units: the difference of their scores, with interval and p
+value.
 
-A unit that was repeated counts with its mean scores, so that runs of different numbers of repetitions can be compared.
+A unit that was repeated counts with its mean scores, so that runs of different numbers of
+repetitions can be compared.
 """
 
 import math
@@ -34,8 +36,8 @@ class Comparison:
         second: mean score of the second run on them.
         difference: second minus first, paired by unit and clustered.
         n_unshared: number of units that only one of the runs evaluated; they are not compared.
-        drawing: half the width of the difference's 95 % interval over other drawings of both runs' replies to the same
-            units; None if not every unit was repeated in both.
+        drawing: half the width of the difference's 95 % interval over other drawings of both runs'
+            replies to the same units; None if not every unit was repeated in both.
     """
 
     task: str
@@ -109,7 +111,8 @@ def _compare_task(
 def _shared_metrics(
     scores: Sequence[tuple[Sequence[Mapping[str, float]], Sequence[Mapping[str, float]]]],
 ) -> list[str]:
-    """Return the metrics that both runs have; all of the other run's if one has no unit with a result."""
+    """Return the metrics that both runs have; all of the other run's if one has no unit with a
+    result."""
     first, second = (
         dict.fromkeys(name for of_run in runs for one in of_run for name in one)
         for runs in zip(*scores, strict=True)
@@ -161,7 +164,8 @@ def _drawing(scores: Sequence[tuple[Sequence[float], Sequence[float]]]) -> float
 
 
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
-    """Return a table with a row per task and metric, each in its own unit; `first` and `second` name the runs."""
+    """Return a table with a row per task and metric, each in its own unit; `first` and `second`
+    name the runs."""
     repeated = any(comparison.drawing is not None for comparison in comparisons)
     numbers = ["first", "second", "difference", "95 % interval", "p", "samples", "only in one"]
     numbers += ["drawing"] if repeated else []

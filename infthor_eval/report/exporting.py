@@ -30,8 +30,9 @@ def export_tables(tables: Sequence[Table], form: str) -> str:
 
     Args:
         tables: tables with at least one column each.
-        form: csv, latex or markdown. In CSV a cell holds one number: a cell with several (an interval, a count) becomes
-            several columns. The title and the notes are lines that begin with `#`; a table alone has none.
+        form: csv, latex or markdown. In CSV a cell holds one number: a cell with several (an
+            interval, a count) becomes several columns. The title and the notes are lines that begin
+            with `#`; a table alone has none.
     """
     if form == "csv":
         return "\n".join(_csv(table, with_words=len(tables) > 1) for table in tables)

@@ -18,7 +18,8 @@ __all__ = ["write_inspection_page"]
 def write_inspection_page(path: Path, items: Sequence[JudgedQuestion], data: NiehSet) -> None:
     """Write an HTML file with the questions, their clue frames, gold answers and every reply.
 
-    In a browser a person decides about them and saves the decisions as CSV. Frames are linked from the set, not copied.
+    In a browser a person decides about them and saves the decisions as CSV. Frames are linked from
+    the set, not copied.
 
     Raises:
         DataError: it cannot be written.

@@ -1,6 +1,7 @@
 """How the results of a suite are presented: on the report's page, as figures and as recordings.
 
-`infthor_eval.suites.find_presenter` finds the presenter of a suite; `PlainPresenter` serves suites that have none.
+`infthor_eval.suites.find_presenter` finds the presenter of a suite; `PlainPresenter` serves suites
+that have none.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -85,7 +86,8 @@ class FigureResult:
 
     Attributes:
         table: the numbers of the figure.
-        draw: writes the files of the figure into a folder, under a name without suffix, and returns their paths.
+        draw: writes the files of the figure into a folder, under a name without suffix, and returns
+            their paths.
         notes: remarks to print below the table, a line each.
     """
 
@@ -111,7 +113,8 @@ class Figure:
 
 @dataclass(frozen=True)
 class EpisodeSelection:
-    """The episodes of a run to replay; None stands for all, or for the only one where one is needed.
+    """The episodes of a run to replay; None stands for all, or for the only one where one is
+    needed.
 
     Attributes:
         task: name of a task of the run.
@@ -133,7 +136,8 @@ class ReplayFrame(Protocol):
 
     @property
     def observation(self) -> Any:
-        """The world at that state, with an image `frame` (uint8 RGB array); None if nobody acted in the episode."""
+        """The world at that state, with an image `frame` (uint8 RGB array); None if nobody acted in
+        the episode."""
 
     @property
     def note(self) -> str:
@@ -148,7 +152,8 @@ class OpenReplay(Protocol):
         """Number of episodes of the trajectory."""
 
     def frames(self, records: Sequence[Record], /) -> Iterator[Any]:
-        """Replay some episodes and yield their frames (`ReplayFrame`): the start of each, then a frame per step.
+        """Replay some episodes and yield their frames (`ReplayFrame`): the start of each, then a
+        frame per step.
 
         Raises:
             InfthorError: an episode cannot be replayed.
@@ -164,8 +169,8 @@ class Recording:
         tasks: names of the tasks that have episodes of it.
         records: records of the selected episodes, in time order.
         simulator: name of the run's simulator.
-        open: opens a simulator like the run's; takes the folder or file of the trajectories and the folder of recorded
-            floor plans, each None if the run did not need it.
+        open: opens a simulator like the run's; takes the folder or file of the trajectories and the
+            folder of recorded floor plans, each None if the run did not need it.
     """
 
     trajectory: str
@@ -214,8 +219,10 @@ class Presenter(Protocol):
         measure: what the primary metric measures, in words.
         target_label: what a sample's target is called.
         reply_label: what the reply to a sample is called.
-        main_metric: metric that decides whether a sample is right; None for the first one of each sample.
-        compares_scorers: whether the metrics judge the same reply, so that samples can be filtered by disagreement.
+        main_metric: metric that decides whether a sample is right; None for the first one of each
+            sample.
+        compares_scorers: whether the metrics judge the same reply, so that samples can be filtered
+            by disagreement.
         replay: replays recorded episodes; None if the suite has no episodes.
         figures: figures by name, as `report --figure` takes it.
         columns: columns of the suite in the table of samples (`infthor_eval.report.sample_table`).
@@ -232,10 +239,12 @@ class Presenter(Protocol):
     columns: Sequence[SampleColumn]
 
     def is_share(self, metric: str, scores: Sequence[float]) -> bool:
-        """Whether a metric with these scores is a share, which is shown in percent; others are shown as they are."""
+        """Whether a metric with these scores is a share, which is shown in percent; others are
+        shown as they are."""
 
     def further_scores(self, record: Record) -> Mapping[str, float]:
-        """Return scores that not every sample has, by name; runs are compared in them on the samples that have them."""
+        """Return scores that not every sample has, by name; runs are compared in them on the
+        samples that have them."""
 
     def charts(self, runs: Sequence[ReportRun]) -> Sequence[Chart]:
         """Draw the charts of the suite's section; its tables are `Suite.tables`."""
@@ -256,9 +265,11 @@ class Presenter(Protocol):
         """Return the steps of a recorded episode; empty if it has none."""
 
     def prompts(self, run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
-        """Return the requests of a run's records, equal ones as one object; `data` is as for `timelines`."""
+        """Return the requests of a run's records, equal ones as one object; `data` is as for
+        `timelines`."""
 
     def timelines(
         self, runs: Sequence[ReportRun], data: Path | None, thumbnails: ThumbnailStore
     ) -> Timelines:
-        """Find the frames that the samples are about; `data` is the set's folder, None for the one a run names."""
+        """Find the frames that the samples are about; `data` is the set's folder, None for the one
+        a run names."""

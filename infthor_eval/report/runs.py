@@ -31,10 +31,12 @@ class ReportRun:
     Attributes:
         folder: folder of the run.
         label: name of the run beside the others.
-        model: name of the model, the same for runs that differ in other settings; with what replaces the frames.
+        model: name of the model, the same for runs that differ in other settings; with what
+            replaces the frames.
         suite: suite of the run.
         presenter: presenter of the suite.
-        header: first line of the journal; its name has the options that tell runs of one name apart.
+        header: first line of the journal; its name has the options that tell runs of one name
+            apart.
         records: records of all units.
         usage: tokens and requests of the whole run.
         n_missing: number of units that were not attempted; None if unknown.
@@ -67,7 +69,8 @@ class ReportRun:
 
     @property
     def simulator(self) -> str:
-        """Name of the simulator that the frames are from, or names separated by commas; empty if it is not known."""
+        """Name of the simulator that the frames are from, or names separated by commas; empty if it
+        is not known."""
         of_tasks = {
             about.get("simulator") for about in self.tasks.values() if isinstance(about, Mapping)
         }
@@ -102,7 +105,8 @@ def read_report_runs(
     find_suite: Callable[[str], Suite],
     find_presenter: Callable[[str], "Presenter"],
 ) -> list[ReportRun]:
-    """Read runs from their folders, at least one; suites and their presenters are looked up by the suite's name.
+    """Read runs from their folders, at least one; suites and their presenters are looked up by the
+    suite's name.
 
     Raises:
         UsageError: a folder is given twice.
@@ -140,7 +144,8 @@ def _read(
 
 
 def label_report_runs(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
-    """Return a label per run: its name, with the options that tell runs of one name apart, or with its folder.
+    """Return a label per run: its name, with the options that tell runs of one name apart, or with
+    its folder.
 
     Raises:
         DataError: the `run.yaml` of a run is not what it should be.
@@ -175,7 +180,8 @@ def _with_frames(name: str, header: RunHeader) -> str:
 
 
 def choose_evenly(items: Sequence[T], n: int) -> list[T]:
-    """Return n items, evenly spaced from the first to the last; all of them if there are no more."""
+    """Return n items, evenly spaced from the first to the last; all of them if there are no
+    more."""
     if len(items) <= n:
         return list(items)
     return [items[round(number * (len(items) - 1) / max(n - 1, 1))] for number in range(n)]

@@ -62,8 +62,8 @@ ENVELOPE = (
 def sample_table(runs: Sequence[ReportRun]) -> Table:
     """Return a table with a row per sample, in the order of the runs and of their units' keys.
 
-    The columns are run, suite, `ENVELOPE`, a `score_...` for each metric, and those of the presenters. Cells of
-    columns that another suite's runs have are empty.
+    The columns are run, suite, `ENVELOPE`, a `score_...` for each metric, and those of the
+    presenters. Cells of columns that another suite's runs have are empty.
 
     Args:
         runs: at least one run.
@@ -106,15 +106,16 @@ def _score_columns(run: ReportRun) -> list[SampleColumn]:
 
 
 def _score(run: ReportRun, metric: str, record: UnitRecord[Any]) -> float | None:
-    """Return a score as the run's summary counts it: 0 for a failed unit, none for one that does not count."""
+    """Return a score as the run's summary counts it: 0 for a failed unit, none for one that does
+    not count."""
     return None if record.excluded is not None else run.suite.scores(record).get(metric, 0.0)
 
 
 def encode_samples(table: Table, form: str) -> bytes:
     """Return the bytes of a file: "csv" or "parquet".
 
-    CSV is opened in spreadsheets and printed on terminals: a text that would be a formula begins with an apostrophe,
-    and control characters are escaped. Parquet has all texts as they are.
+    CSV is opened in spreadsheets and printed on terminals: a text that would be a formula begins
+    with an apostrophe, and control characters are escaped. Parquet has all texts as they are.
     """
     import pyarrow.csv
     import pyarrow.parquet

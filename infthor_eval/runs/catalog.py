@@ -1,7 +1,9 @@
-"""The catalog of tasks that `--tasks` can name: this package's, those of other packages, and the user's own.
+"""The catalog of tasks that `--tasks` can name: this package's, those of other packages, and the
+user's own.
 
-The files are lm-eval's own format, and say which suite evaluates them (`metadata: {suite: NAME}`). lm-eval passes over
-a broken file without a word, so they are read and checked here first, without importing lm-eval.
+The files are lm-eval's own format, and say which suite evaluates them (`metadata: {suite: NAME}`).
+lm-eval passes over a broken file without a word, so they are read and checked here first, without
+importing lm-eval.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -56,7 +58,8 @@ class TaskFile:
         missing = [key for key in keys if key not in self.settings]
         if missing:
             raise DataError(
-                f"{self.path}: no {', '.join(missing)}; tasks of {self.suite} need {', '.join(keys)}"
+                f"{self.path}: no {', '.join(missing)}; tasks of {self.suite} need "
+                f"{', '.join(keys)}"
             )
 
 
@@ -65,8 +68,8 @@ class Catalog:
     """The task files below some folders.
 
     Attributes:
-        folder: folder with the task files of this package; those of other folders may include what its tasks share
-            (`include: _nieh.yaml`) as if it lay beside them.
+        folder: folder with the task files of this package; those of other folders may include what
+            its tasks share (`include: _nieh.yaml`) as if it lay beside them.
         more: other folders.
     """
 
@@ -80,7 +83,8 @@ class Catalog:
 
     @classmethod
     def find_installed(cls, include: Sequence[Path] = ()) -> "Catalog":
-        """Return the catalog of the tasks of this package, of other installed packages, and of further folders.
+        """Return the catalog of the tasks of this package, of other installed packages, and of
+        further folders.
 
         Raises:
             UsageError: an installed package lacks the folder that it names.
@@ -120,7 +124,8 @@ class Catalog:
         return list(by_name.values())
 
     def _members(self, group: str, inside: tuple[str, ...]) -> list[TaskFile]:
-        """Return the single tasks of a group and of the groups in it; `inside` has the groups around it."""
+        """Return the single tasks of a group and of the groups in it; `inside` has the groups
+        around it."""
         members: list[TaskFile] = []
         for name in self.groups[group]:
             if name in inside:
@@ -145,7 +150,8 @@ class Catalog:
             name = settings.get("group") or settings.get("task")
             if not isinstance(name, str):
                 raise DataError(
-                    f"{path}: neither a task nor a group name; a task file has a key 'task' or 'group'"
+                    f"{path}: neither a task nor a group name; a task file has a key 'task' or "
+                    "'group'"
                 )
             if name in entries:
                 raise DataError(
@@ -179,7 +185,8 @@ def _folder_of(point: EntryPoint) -> Path:
     folders = [Path(place, *inside) for place in places or () if Path(place, *inside).is_dir()]
     if not folders:
         raise UsageError(
-            f"the tasks {point.name} of another package are not in {point.value}; fix its package, or uninstall it"
+            f"the tasks {point.name} of another package are not in {point.value}; fix its package, "
+            "or uninstall it"
         )
     return folders[0]
 
@@ -188,9 +195,11 @@ def _task(name: str, path: Path, settings: Mapping[str, Any]) -> TaskFile:
     metadata = settings.get("metadata")
     if not isinstance(metadata, Mapping) or not isinstance(metadata.get("suite"), str):
         raise DataError(
-            f"{path}: no suite; write it as metadata: {{suite: NAME}} (NIEH tasks include _nieh.yaml)"
+            f"{path}: no suite; write it as metadata: {{suite: NAME}} (NIEH tasks include "
+            "_nieh.yaml)"
         )
-    # The description changes no number, so it is no part of the settings, which the run's hash depends on.
+    # The description changes no number, so it is no part of the settings, which the run's hash
+    # depends on.
     others = {key: value for key, value in metadata.items() if key != "description"}
     return TaskFile(
         name,
@@ -210,7 +219,8 @@ class _Reader:
         self._contents: dict[Path, Mapping[str, Any]] = {}
 
     def settings(self, path: Path, including: tuple[Path, ...] = ()) -> dict[str, Any]:
-        """Return a file's settings over those of what it includes; `including` has the files that include it."""
+        """Return a file's settings over those of what it includes; `including` has the files that
+        include it."""
         if path not in self._contents:
             self._contents[path] = _read(path)
         config = dict(self._contents[path])

@@ -1,7 +1,7 @@
 """The form of a run's config in a journal's header.
 
-A journal can be cut, edited, or of another suite, and its header's config is free-form JSON. Each suite checks, before
-anything is summed up, the part of it that its summary and tables read.
+A journal can be cut, edited, or of another suite, and its header's config is free-form JSON. Each
+suite checks, before anything is summed up, the part of it that its summary and tables read.
 """
 
 import msgspec

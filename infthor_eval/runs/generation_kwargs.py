@@ -66,7 +66,8 @@ def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
 
 
 def _temperature(given: Mapping[str, Any], place: str) -> float:
-    """Return the temperature as lm-eval reads it: above 0 implies sampling, and sampling alone implies 1."""
+    """Return the temperature as lm-eval reads it: above 0 implies sampling, and sampling alone
+    implies 1."""
     temperature = (
         None
         if given.get("temperature") is None

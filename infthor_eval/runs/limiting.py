@@ -12,8 +12,8 @@ T = TypeVar("T")
 def spread(items: Sequence[T], cluster_of: Callable[[T], str], seed: int) -> list[int]:
     """Return an order of positions of which any beginning is spread evenly over the trajectories.
 
-    Each round takes one item of every trajectory that has any left. The item, and the order of the trajectories, are
-    drawn. A larger limit selects all items of a smaller one.
+    Each round takes one item of every trajectory that has any left. The item, and the order of the
+    trajectories, are drawn. A larger limit selects all items of a smaller one.
     """
     places: dict[str, list[int]] = {}
     for place, item in enumerate(items):

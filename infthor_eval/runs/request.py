@@ -31,7 +31,8 @@ class RunRequest:
         recover: resume without the bad lines of an earlier journal.
         worker_settings: number and place of the workers; no result depends on it.
         include: folders with the user's own task files.
-        suite_code: package, version and digest of a suite that is not this package's, as JSON values.
+        suite_code: package, version and digest of a suite that is not this package's, as JSON
+            values.
     """
 
     model: str
@@ -63,7 +64,8 @@ def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
 
 @dataclass(frozen=True)
 class PreparedRun(Generic[U, P]):
-    """A request whose names, files and data are in order, with its suite set up; it is pickled and sent to workers."""
+    """A request whose names, files and data are in order, with its suite set up; it is pickled and
+    sent to workers."""
 
     request: RunRequest
     suite: Suite[U, P]
@@ -75,7 +77,8 @@ def prepare(request: RunRequest, suite: Suite[U, P]) -> PreparedRun[U, P]:
 
     Raises:
         UsageError: the model or an option is unknown, or the suite refuses the request.
-        DataError: the suite's data do not match their format, or the results folder cannot be written.
+        DataError: the suite's data do not match their format, or the results folder cannot be
+            written.
     """
     if request.model not in suite.baselines and not is_known(request.model):
         raise unknown_name("model", request.model, [*suite.baselines, *names()])

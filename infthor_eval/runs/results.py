@@ -32,7 +32,8 @@ _USAGE = "usage.json"
 def results_document(
     run: RunSummary, suite: Suite[Any, Any], n_missing: int | None, usage: Usage
 ) -> dict[str, Any]:
-    """Return the contents of `results.json`, see docs/formats.md; `n_missing` is None if it is not known."""
+    """Return the contents of `results.json`, see docs/formats.md; `n_missing` is None if it is not
+    known."""
     header = run.header
     return {
         "suite": header.suite,
@@ -41,7 +42,8 @@ def results_document(
         "n_missing": n_missing,
         "primary_metrics": suite.primary_metrics(run.summary),
         "summary": _reproducible(run.summary),
-        # Without cached tokens: their number differs between a run and the same run resumed, or run by workers.
+        # Without cached tokens: their number differs between a run and the same run resumed, or run
+        # by workers.
         "usage": {name: getattr(usage, name) for name in ("requests", "context", "reply", "cost")},
     }
 
@@ -71,7 +73,8 @@ def write_run_files(
 
 
 def write_results(folder: Path, document: dict[str, Any]) -> None:
-    """Write `results.json` (see `results_document`) into a run's folder; equal runs give equal bytes.
+    """Write `results.json` (see `results_document`) into a run's folder; equal runs give equal
+    bytes.
 
     Raises:
         DataError: the file cannot be written.
@@ -80,7 +83,8 @@ def write_results(folder: Path, document: dict[str, Any]) -> None:
 
 
 def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRecord[Any]]) -> None:
-    """Write the scores of every unit to `scores.jsonl`, a JSON object a line; equal runs give equal bytes.
+    """Write the scores of every unit to `scores.jsonl`, a JSON object a line; equal runs give equal
+    bytes.
 
     Raises:
         DataError: the file cannot be written.
@@ -103,7 +107,8 @@ def write_scores(folder: Path, suite: Suite[Any, Any], records: Sequence[UnitRec
 
 
 def write_usage(folder: Path, records: Sequence[UnitRecord[Any]], usage: Usage) -> None:
-    """Write requests, tokens, time and cost of a run, which differ from run to run, to `usage.json`.
+    """Write requests, tokens, time and cost of a run, which differ from run to run, to
+    `usage.json`.
 
     Raises:
         DataError: the file cannot be written.

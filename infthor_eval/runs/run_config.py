@@ -39,7 +39,8 @@ def run_config(
     Args:
         suite: name of the suite.
         model: name and identity of the evaluated model, policy or baseline.
-        code: identity of a model adapter that is not this package's (`model_adapters.adapter_identity`).
+        code: identity of a model adapter that is not this package's
+            (`model_adapters.adapter_identity`).
         workload: config of the workload.
         limit: number of items of each task; None for all.
         seed: seed of the run.

@@ -13,8 +13,8 @@ __all__ = ["StoredSamples"]
 class StoredSamples:
     """Samples in a temporary file, read as often as needed.
 
-    The evaluation that converts records to samples is closed with its run, but readers come later. In memory the
-    prompts of long trajectories would take gigabytes.
+    The evaluation that converts records to samples is closed with its run, but readers come later.
+    In memory the prompts of long trajectories would take gigabytes.
     """
 
     def __init__(self, samples: Iterable[UnitSample]) -> None:

@@ -1,11 +1,11 @@
 """The protocol between a kind of evaluation and the run that drives it.
 
-A `Suite` is the kind: it knows its options, baselines and records, and turns records into summaries and tables. Each
-further object exists only once all that it needs is known:
+A `Suite` is the kind: it knows its options, baselines and records, and turns records into summaries
+and tables. Each further object exists only once all that it needs is known:
 
-    Suite.prepare(request) -> Evaluation            what is read from files, before the subject is loaded
-    Evaluation.bind(subject) -> BoundEvaluation     the work, in groups that share what is expensive; owns simulators
-    BoundEvaluation.run(group, session)             a record per unit
+    Suite.prepare(request) -> Evaluation           what files hold, before the subject is loaded
+    Evaluation.bind(subject) -> BoundEvaluation    groups that share expensive work; simulators
+    BoundEvaluation.run(group, session)            a record per unit
 
 `U` is the suite's unit, `P` the payload of its records.
 """
@@ -62,7 +62,8 @@ class TaskRequest(Generic[O_co]):
         tasks: task files, all of this suite.
         options: instance of the suite's `options`.
         data: folder of the data set for tasks without their own.
-        limit: number of items to evaluate of each task, chosen by `infthor_eval.runs.limiting`; None for all.
+        limit: number of items to evaluate of each task, chosen by `infthor_eval.runs.limiting`;
+            None for all.
         seed: seed of everything random.
     """
 
@@ -79,7 +80,8 @@ class Group(Generic[U_co]):
 
     Attributes:
         units: at least one unit.
-        frames: number of distinct frames that the units look at; the cost of what they share grows with it.
+        frames: number of distinct frames that the units look at; the cost of what they share grows
+            with it.
     """
 
     units: Sequence[U_co]
@@ -111,7 +113,8 @@ class Workload(Generic[U_co]):
         skipped: units that cannot be evaluated.
         config: everything beside subject and seed that the numbers depend on, as JSON values.
         costs: costs of the tasks, where they are known.
-        warnings: what people should know before the first unit, such as a checkpoint that was trained otherwise.
+        warnings: what people should know before the first unit, such as a checkpoint that was
+            trained otherwise.
     """
 
     groups: Sequence[Group[U_co]]
@@ -127,13 +130,15 @@ class Workload(Generic[U_co]):
 
 
 class Session(Protocol[P]):
-    """The results of a run so far, as a suite sees them while it does a group; several threads may use it at once."""
+    """The results of a run so far, as a suite sees them while it does a group; several threads may
+    use it at once."""
 
     def find_record(self, unit: Unit[P], fingerprint: str) -> UnitRecord[P] | None:
         """Return the record of a unit that already has a result from these very inputs, or None."""
 
     def describe_failure(self, unit: Unit[P], error: Exception) -> str:
-        """Return the reason why a unit failed by an exception, and keep the traceback of an unexpected one."""
+        """Return the reason why a unit failed by an exception, and keep the traceback of an
+        unexpected one."""
 
     def find_artifact(self, fingerprint: str, kind: type[A]) -> A | None:
         """Return the cached artifact of these inputs, or None."""
@@ -164,29 +169,34 @@ class UnitSample:
 
 
 class BoundEvaluation(Protocol[U, P]):
-    """An evaluation of one subject. It owns whatever depends on the subject, its simulators among it."""
+    """An evaluation of one subject. It owns whatever depends on the subject, its simulators among
+    it."""
 
     @property
     def workload(self) -> Workload[U]:
         """All the work; the same object every time."""
 
     def run(self, group: Group[U], session: Session[P]) -> Iterator[UnitRecord[P]]:
-        """Do a group: yield a record per unit as soon as it is there; records found in the session as they are.
+        """Do a group: yield a record per unit as soon as it is there; records found in the session
+        as they are.
 
         Raises:
-            InfthorError: the units without a record cannot be done. The run records them as failed and goes on. So it
-                does with any other exception, which is a fault of the suite; only MemoryError ends the run.
+            InfthorError: the units without a record cannot be done. The run records them as failed
+                and goes on. So it does with any other exception, which is a fault of the suite;
+                only MemoryError ends the run.
         """
 
     def to_sample(self, record: UnitRecord[P]) -> UnitSample:
         """Convert a record of this workload for other readers; not after `close`."""
 
     def close(self) -> None:
-        """Release what the work needed (simulators); called once, whether the work was finished or not."""
+        """Release what the work needed (simulators); called once, whether the work was finished or
+        not."""
 
 
 class Evaluation(Protocol[U, P]):
-    """A suite set up for one run. It holds only what was read from files, and may be bound more than once."""
+    """A suite set up for one run. It holds only what was read from files, and may be bound more
+    than once."""
 
     def bind(self, subject: Subject) -> BoundEvaluation[U, P]:
         """Find all the work for a subject.
@@ -226,7 +236,8 @@ class Suite(Protocol[U, P]):
         """
 
     def prepare(self, request: TaskRequest[Any]) -> Evaluation[U, P]:
-        """Set up a run. Whatever can be refused without the subject is refused here, before it is loaded.
+        """Set up a run. Whatever can be refused without the subject is refused here, before it is
+        loaded.
 
         Raises:
             UsageError: a task or an option that does not fit.
@@ -236,18 +247,21 @@ class Suite(Protocol[U, P]):
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[P]]) -> msgspec.Struct:
         """Summarise a run: a pure function of its journal, equal for equal records.
 
-        What differs between a run and the same run resumed (times) is at most in a field `took`, which results.json
-        leaves out.
+        What differs between a run and the same run resumed (times) is at most in a field `took`,
+        which results.json leaves out.
         """
 
     def scores(self, record: UnitRecord[P]) -> Mapping[str, float]:
-        """Return the metrics of one unit by name; a missing one counts as 0, as all do where the unit failed."""
+        """Return the metrics of one unit by name; a missing one counts as 0, as all do where the
+        unit failed."""
 
     def primary_metrics(self, summary: Any) -> Mapping[str, Rate]:
-        """Return the primary metric of each task, a share from 0 to 1; none for a task of which no unit counts."""
+        """Return the primary metric of each task, a share from 0 to 1; none for a task of which no
+        unit counts."""
 
     def overview(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
-        """Return what people see first of runs of this suite, side by side, at most 100 columns wide."""
+        """Return what people see first of runs of this suite, side by side, at most 100 columns
+        wide."""
 
     def tables(self, runs: Sequence["RunSummary"]) -> Sequence[Table]:
         """Return all results of runs of this suite, with the published numbers beside them."""

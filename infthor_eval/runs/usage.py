@@ -59,7 +59,8 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
 
     @property
     def hit_rate(self) -> float | None:
-        """Share of the context's tokens that were not encoded again, 0 to 1; None if none were counted."""
+        """Share of the context's tokens that were not encoded again, 0 to 1; None if none were
+        counted."""
         return self.cached / self.context if self.context else None
 
     @property
@@ -68,8 +69,8 @@ class Usage(msgspec.Struct, frozen=True, omit_defaults=True):
         cost = "" if self.cost is None else f", {self.cost:.4f} US dollars"
         share = "" if self.hit_rate is None else f", {100 * self.hit_rate:.1f} %"
         return (
-            f"{self.requests:,} requests, {self.context:,} tokens read ({self.cached:,} of them cached{share}), "
-            f"{self.reply:,} written{cost}"
+            f"{self.requests:,} requests, {self.context:,} tokens read ({self.cached:,} of them "
+            f"cached{share}), {self.reply:,} written{cost}"
         )
 
 

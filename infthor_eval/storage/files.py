@@ -24,7 +24,8 @@ _PROBE = b"x" * 4096  # a full disk still creates an empty file, so content is w
 
 
 def prepare_folder(path: Path, option: str = "--out") -> Path:
-    """Create the folder of an option and check that it can be written to, before results would be lost otherwise.
+    """Create the folder of an option and check that it can be written to, before results would be
+    lost otherwise.
 
     Raises:
         DataError: the path is a file, or the folder cannot be created or written to.
@@ -51,7 +52,8 @@ def require_writable(path: Path, option: str = "--out") -> None:
 
 
 def _is_there(path: Path) -> bool:
-    # Not `Path.exists`, which returns False for names that the system refuses (too long, no permission).
+    # Not `Path.exists`, which returns False for names that the system refuses (too long, no
+    # permission).
     try:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -85,7 +87,8 @@ def refuse_overwrite(path: Path, content: bytes) -> None:
 
 @contextmanager
 def write_atomically(path: Path) -> Iterator[Path]:
-    """Write a file or a folder under a temporary name beside `path`, and rename it when it is complete.
+    """Write a file or a folder under a temporary name beside `path`, and rename it when it is
+    complete.
 
     Args:
         path: the final path; an existing file is replaced, a folder must not exist.
@@ -96,8 +99,8 @@ def write_atomically(path: Path) -> Iterator[Path]:
     Raises:
         OSError: the temporary path cannot be renamed.
     """
-    # The name is fixed, so that what a killed process left is found and removed by the next one. A second process
-    # that writes the same path at the same time is not provided for.
+    # The name is fixed, so that what a killed process left is found and removed by the next one. A
+    # second process that writes the same path at the same time is not provided for.
     partial = path.with_name(f".{path.name}.partial")
     _remove(partial)
     try:

@@ -1,7 +1,8 @@
 """Limits on the size of files that are read, and on the time that others may take.
 
-Input is untrusted: a small file can unpack to more than the memory, or keep a template engine busy for ever. The limits
-are far above what real data need. Each can be raised by an environment variable, which the error message names.
+Input is untrusted: a small file can unpack to more than the memory, or keep a template engine busy
+for ever. The limits are far above what real data need. Each can be raised by an environment
+variable, which the error message names.
 """
 
 import os

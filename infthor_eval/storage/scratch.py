@@ -15,9 +15,10 @@ _LOCK = ".lock"
 class ScratchFolder:
     """A temporary folder, locked as long as it is in use; as a context manager it returns its path.
 
-    A killed process cannot remove its folders. The first scratch folder of another process removes all folders whose
-    lock nobody holds any more. The system releases a lock when its process ends, in whatever way; a process id in a
-    file would not do, as containers that share the folder have the same ids.
+    A killed process cannot remove its folders. The first scratch folder of another process removes
+    all folders whose lock nobody holds any more. The system releases a lock when its process ends,
+    in whatever way; a process id in a file would not do, as containers that share the folder have
+    the same ids.
 
     Attributes:
         path: the folder, initially empty.
@@ -32,7 +33,8 @@ class ScratchFolder:
         _remove_abandoned(Path(tempfile.gettempdir()))
         self._outer = tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
         outer = Path(self._outer.name)
-        # The file is locked before it gets the name of a lock: an unlocked one means that the folder is abandoned.
+        # The file is locked before it gets the name of a lock: an unlocked one means that the
+        # folder is abandoned.
         self._lock = (outer / "new").open("wb")
         fcntl.flock(self._lock, fcntl.LOCK_EX)
         (outer / "new").rename(outer / _LOCK)

@@ -7,6 +7,7 @@ __all__ = ["user_cache"]
 
 
 def user_cache(name: str) -> Path:
-    """Return the folder of this name in the user's cache (`$XDG_CACHE_HOME`, else `~/.cache`); it may not exist yet."""
+    """Return the folder of this name in the user's cache (`$XDG_CACHE_HOME`, else `~/.cache`); it
+    may not exist yet."""
     cache = os.environ.get("XDG_CACHE_HOME")
     return (Path(cache) if cache else Path.home() / ".cache") / "infthor-eval" / name

@@ -1,8 +1,9 @@
 """Conversion between action texts and calls of AI2-THOR's 5.x API.
 
-Models read and write texts: `MoveAhead`, `PickupObject Mug`, `PutObject Mug Fridge`. Their arguments are names of
-objects (`Words`), whereas calls have object ids. A text is grounded to the nearest visible object of the name to which
-the action applies; how the published scripts ground it is in `published_actions`.
+Models read and write texts: `MoveAhead`, `PickupObject Mug`, `PutObject Mug Fridge`. Their
+arguments are names of objects (`Words`), whereas calls have object ids. A text is grounded to the
+nearest visible object of the name to which the action applies; how the published scripts ground it
+is in `published_actions`.
 """
 
 from collections.abc import Callable, Container, Mapping, Sequence
@@ -50,7 +51,8 @@ class Misuse(StrEnum):
 
 
 class UngroundedError(ValueError):
-    """A text has no known action, lacks an argument, or matches no visible object; the message says which."""
+    """A text has no known action, lacks an argument, or matches no visible object; the message says
+    which."""
 
     def __init__(self, misuse: Misuse, message: str) -> None:
         super().__init__(message)
@@ -94,7 +96,8 @@ def text_of(
     receptacle_id: str | None = None,
     words: Words = Words.NATURAL,
 ) -> ActionText:
-    """Return the text of a call; the object of PutObject is the one that is put into the receptacle."""
+    """Return the text of a call; the object of PutObject is the one that is put into the
+    receptacle."""
     ids = [item for item in (object_id, receptacle_id) if item is not None]
     return ActionText(action, tuple(words.name_of(item) for item in ids))
 
@@ -144,7 +147,8 @@ def applicable_actions(view: SimulatorView, words: Words = Words.NATURAL) -> lis
 
 
 def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> list[dict[str, Any]]:
-    """Return all calls possible now, in a fixed order: each action with each visible object, looks by `degrees`."""
+    """Return all calls possible now, in a fixed order: each action with each visible object, looks
+    by `degrees`."""
     calls = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]
     visible = sorted(
         (item.object_type, item.object_id) for item in view.objects.values() if item.visible
@@ -170,7 +174,8 @@ def text_of_call(
 
 
 def _names_of(item: ThorObject, words: Words) -> set[str]:
-    """Return the names by which an agent may call an object: its name in these words, and its type."""
+    """Return the names by which an agent may call an object: its name in these words, and its
+    type."""
     return {words.name_of(item.object_id), item.object_type}
 
 

@@ -1,7 +1,9 @@
-"""Object axes of AI2-THOR 2.1.0 and 5.x: the models of some long objects are turned by 90 or 270 degrees in 5.x.
+"""Object axes of AI2-THOR 2.1.0 and 5.x: the models of some long objects are turned by 90 or 270
+degrees in 5.x.
 
-So rotations recorded in 2.1.0 (ALFRED, the published trajectories) need a turn about the object's own vertical axis.
-The turns below are those that fit the boxes recorded in ALFRED's training trajectories best.
+So rotations recorded in 2.1.0 (ALFRED, the published trajectories) need a turn about the object's
+own vertical axis. The turns below are those that fit the boxes recorded in ALFRED's training
+trajectories best.
 """
 
 import math
@@ -17,7 +19,8 @@ _TURNS = {**dict.fromkeys(_ACROSS, 90.0), "Spatula": 270.0}  # degrees
 
 
 def modern_rotation(object_type: str, rotation: Mapping[str, float]) -> dict[str, float]:
-    """Convert Euler angles of 2.1.0 (Unity's x, y, z, degrees) to those with which the 5.x object looks the same."""
+    """Convert Euler angles of 2.1.0 (Unity's x, y, z, degrees) to those with which the 5.x object
+    looks the same."""
     turn = _TURNS.get(object_type, 0.0)
     if not turn:
         return dict(rotation)

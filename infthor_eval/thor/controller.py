@@ -16,9 +16,11 @@ _ANY_DISPLAY = "0"  # ai2thor requires some DISPLAY; a simulator without a windo
 
 
 class SafeController(ai2thor.controller.Controller):
-    """An `ai2thor.controller.Controller` that never hangs, and removes its process, pipes and files.
+    """An `ai2thor.controller.Controller` that never hangs, and removes its process, pipes and
+    files.
 
-    A simulator started from an executable has its log in a temporary folder instead of `~/.ai2thor`.
+    A simulator started from an executable has its log in a temporary folder instead of
+    `~/.ai2thor`.
     """
 
     def __init__(self, launch: Launch, scene: str | dict[str, Any], **options: Any) -> None:
@@ -61,8 +63,8 @@ class SafeController(ai2thor.controller.Controller):
                 "no build exists" in message
             ):  # its message also if the download server cannot be reached
                 raise SimulatorError(
-                    "AI2-THOR's Unity build is not installed and cannot be downloaded; go online once, "
-                    "or name an executable"
+                    "AI2-THOR's Unity build is not installed and cannot be downloaded; go online "
+                    "once, or name an executable"
                 ) from error
             name = scene if isinstance(scene, str) else "(a house)"
             raise SceneError(f"scene {name}: {message}") from error
@@ -76,29 +78,34 @@ class SafeController(ai2thor.controller.Controller):
         return super().base_dir if self._folder is None else str(self._folder.path)
 
     def reset(self, scene: str | dict[str, Any] | None = None, **init_params: Any) -> Any:
-        """Load a scene as ai2thor's method does, but raise SimulatorError if the simulator fails."""
+        """Load a scene as ai2thor's method does, but raise SimulatorError if the simulator
+        fails."""
         try:
             return super().reset(scene, **init_params)
         except PeerFault as fault:
             raise self._with_log(fault) from fault
 
     def step(self, action: str | dict[str, Any] | None = None, **action_args: Any) -> Any:
-        """Run one action as ai2thor's method does, but raise SimulatorError if the simulator fails."""
+        """Run one action as ai2thor's method does, but raise SimulatorError if the simulator
+        fails."""
         try:
             return super().step(action, **action_args)
         except PeerFault as fault:
             raise self._with_log(fault) from fault
         except (RuntimeError, TimeoutError) as error:
-            # ai2thor wraps the errors of `receive` in one of these two, so the fault is taken from the server.
+            # ai2thor wraps the errors of `receive` in one of these two, so the fault is taken from
+            # the server.
             if self.server is None or self.server.fault is None:
                 raise
             raise self._with_log(self.server.fault) from error
 
     def stop(self) -> None:
-        """Kill and reap the simulator, and remove its pipes and temporary files. Calling it again does nothing."""
+        """Kill and reap the simulator, and remove its pipes and temporary files. Calling it again
+        does nothing."""
         if self.server is not None:
             self.server.stop()
-        # ai2thor registers an exit handler that keeps this object alive, so the large event is released here.
+        # ai2thor registers an exit handler that keeps this object alive, so the large event is
+        # released here.
         self.last_event = None
         build = getattr(self, "_build", None)
         if build is not None:

@@ -1,7 +1,9 @@
-"""Mapping object ids that another AI2-THOR version recorded, or of a restored scene, to ids of this simulator.
+"""Mapping object ids that another AI2-THOR version recorded, or of a restored scene, to ids of this
+simulator.
 
-An id has the object's type and its position when the scene was loaded. It is mapped to the object of this type that was
-nearest to this position when the episode began. The choice is made once per episode, as objects move and ids do not.
+An id has the object's type and its position when the scene was loaded. It is mapped to the object
+of this type that was nearest to this position when the episode began. The choice is made once per
+episode, as objects move and ids do not.
 """
 
 import math
@@ -26,10 +28,12 @@ def id_position(object_id: str) -> tuple[float, float, float] | None:
 
 
 class Grounding:
-    """The id mapping of one episode; `distances` has the metres from recorded positions, by recorded id."""
+    """The id mapping of one episode; `distances` has the metres from recorded positions, by
+    recorded id."""
 
     def __init__(self, view: SimulatorView) -> None:
-        """Store the positions of all objects at the start of the episode, after the scene was restored."""
+        """Store the positions of all objects at the start of the episode, after the scene was
+        restored."""
         self._initial_positions = {
             key: astuple(item.position) for key, item in view.objects.items()
         }
@@ -37,7 +41,8 @@ class Grounding:
         self.distances: dict[str, float] = {}
 
     def ground(self, object_id: str, view: SimulatorView) -> str | None:
-        """Return the simulator's id for a recorded one, or None if the scene has no object of the type."""
+        """Return the simulator's id for a recorded one, or None if the scene has no object of the
+        type."""
         chosen = self._chosen.get(object_id)
         if chosen in view.objects:
             return chosen
@@ -47,8 +52,8 @@ class Grounding:
         object_type = modern_type(object_type_of(object_id))
         taken = set(self._chosen.values())
         candidates = [item for item in view.objects.values() if item.object_type == object_type]
-        # Two recorded objects of a type are mapped to two objects, unless the scene has too few. Furniture is not
-        # restricted: versions differ in how many parts a piece has.
+        # Two recorded objects of a type are mapped to two objects, unless the scene has too few.
+        # Furniture is not restricted: versions differ in how many parts a piece has.
         free = [item for item in candidates if not item.pickupable or item.object_id not in taken]
         return self._choose(object_id, free or candidates)
 
@@ -61,10 +66,12 @@ class Grounding:
         return ranked[0][1]
 
     def _distance(self, item: ThorObject, target: tuple[float, float, float] | None) -> float:
-        """Return the distance of a recorded position from the object's initial position, or from that in its id."""
+        """Return the distance of a recorded position from the object's initial position, or from
+        that in its id."""
         if target is None:
             return 0.0
-        # The id has the position at which the scene file has the object; restoring the scene may have moved it.
+        # The id has the position at which the scene file has the object; restoring the scene may
+        # have moved it.
         positions = [
             self._initial_positions.get(item.object_id, astuple(item.position)),
             id_position(item.object_id),

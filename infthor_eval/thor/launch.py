@@ -1,4 +1,5 @@
-"""Command lines of simulators: the embedded one, a local Unity executable, or the build that ai2thor downloads."""
+"""Command lines of simulators: the embedded one, a local Unity executable, or the build that
+ai2thor downloads."""
 
 import shlex
 import sys
@@ -39,9 +40,10 @@ def embedded_launch(
     Args:
         data: folder of recorded floor plans; without it there are only procedural scenes.
         supplement: file with additions to the floor plans from trajectories (see `supplement`).
-        start_timeout: time limit of the first message, seconds. The first start of an installation compiles the
-            renderer, which takes ten seconds of a processor. Several at once on a busy machine take minutes, and one
-            that is stopped in the middle would have to restart from the beginning.
+        start_timeout: time limit of the first message, seconds. The first start of an installation
+            compiles the renderer, which takes ten seconds of a processor. Several at once on a busy
+            machine take minutes, and one that is stopped in the middle would have to restart from
+            the beginning.
 
     Raises:
         UsageError: the time limit of an action, `limits.ACTION_SECONDS`, is set to no number.
@@ -61,7 +63,8 @@ def embedded_launch(
 
 
 def unity_launch(executable: Path | None = None, *, platform: str | None = None) -> Launch:
-    """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor downloads.
+    """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor
+    downloads.
 
     Raises:
         UsageError: the time limit of an action, `limits.UNITY_ACTION_SECONDS`, is set to no number.

@@ -1,8 +1,10 @@
-"""From an agent's text to a call, as the published script goes (`interact_with_env`, `post_processing_action`).
+"""From an agent's text to a call, as the published script goes (`interact_with_env`,
+`post_processing_action`).
 
-A name is sought as a part of the objects' names, case apart, and the first visible object that has the property is
-taken, whatever its state. What cannot be grounded is sent nevertheless: without an id, or as an action of that name.
-Where the metadata of an object that is looked at lack the property, the script drops the action with the error.
+A name is sought as a part of the objects' names, case apart, and the first visible object that has
+the property is taken, whatever its state. What cannot be grounded is sent nevertheless: without an
+id, or as an action of that name. Where the metadata of an object that is looked at lack the
+property, the script drops the action with the error.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -31,7 +33,8 @@ _PUT, _TOGGLE = "PutObject", "ToggleObject"
 
 
 def ground_published(text: str, objects: Iterable[ThorObject]) -> tuple[str | None, str | None]:
-    """Return the action and the object's id that a text with "Object" in it stands for; None where there is none.
+    """Return the action and the object's id that a text with "Object" in it stands for; None where
+    there is none.
 
     Args:
         text: what the agent said.
@@ -95,8 +98,9 @@ def _first(objects: Iterable[ThorObject], name: str, has: _Has) -> str | None:
 def current_call(text: str, view: SimulatorView) -> dict[str, Any]:
     """Return the published call for a text in the form of AI2-THOR 5.x.
 
-    A text that is no action of an agent is not sent: the published script would send it as a command to the simulator,
-    which refuses what it does not know, and would also take `Reset` from an agent.
+    A text that is no action of an agent is not sent: the published script would send it as a
+    command to the simulator, which refuses what it does not know, and would also take `Reset` from
+    an agent.
 
     Raises:
         UngroundedError: there is nothing to send.

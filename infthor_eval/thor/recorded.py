@@ -1,4 +1,5 @@
-"""Conversion of recorded low-level actions (AI2-THOR 2.1.0, as in ALFRED and ∞-THOR) to calls of the 5.x API."""
+"""Conversion of recorded low-level actions (AI2-THOR 2.1.0, as in ALFRED and ∞-THOR) to calls of
+the 5.x API."""
 
 from typing import Any
 
@@ -49,7 +50,8 @@ def translate(low: LowAction, grounding: Grounding, view: SimulatorView) -> dict
 
 
 def degrees_of(low: LowAction) -> float:
-    """Return the angle of a recorded turn: its argument, the number in its name ("LookDown_15"), or 2.1.0's default."""
+    """Return the angle of a recorded turn: its argument, the number in its name ("LookDown_15"), or
+    2.1.0's default."""
     if low.api_action.degrees is not None:
         return low.api_action.degrees
     name = low.discrete_action.action if low.discrete_action is not None else ""

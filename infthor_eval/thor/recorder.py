@@ -15,10 +15,12 @@ _PNG_LEVEL = 4  # higher levels take several times as long and hardly shrink ren
 
 
 class Recorder:
-    """Turns simulator states into log entries (`steps`, one per frame), and into images if a folder is given."""
+    """Turns simulator states into log entries (`steps`, one per frame), and into images if a folder
+    is given."""
 
     def __init__(self, images: Path | None = None) -> None:
-        """Start without a frame; `images` is an existing folder for the frames, None keeps only the log."""
+        """Start without a frame; `images` is an existing folder for the frames, None keeps only the
+        log."""
         self._images = images
         self._states: dict[str, ObjectState] = {}
         self.steps: list[Step] = []
@@ -84,7 +86,8 @@ class Recorder:
 
 
 def object_log(view: SimulatorView) -> ObjectLog:
-    """Return the published fields of a log entry: object types, each once, in alphabetical order."""
+    """Return the published fields of a log entry: object types, each once, in alphabetical
+    order."""
     visible = [item for item in view.objects.values() if item.visible]
     inside: dict[str, set[str]] = {}
     for item in visible:
@@ -102,7 +105,8 @@ def object_log(view: SimulatorView) -> ObjectLog:
 
 
 def state_of(item: ThorObject) -> ObjectState:
-    """Return the part of an object's metadata that is logged, with the position to the millimetre."""
+    """Return the part of an object's metadata that is logged, with the position to the
+    millimetre."""
     at = item.position
     return ObjectState(
         type=item.object_type,

@@ -1,7 +1,8 @@
 """Restoring the recorded initial state of a trajectory.
 
-The order is ALFRED's: toggles, dirt and liquids, object poses, then the agent. Recorded poses have names of Unity
-objects, which differ between AI2-THOR versions. An unknown name is replaced by that of an object of the same type.
+The order is ALFRED's: toggles, dirt and liquids, object poses, then the agent. Recorded poses have
+names of Unity objects, which differ between AI2-THOR versions. An unknown name is replaced by that
+of an object of the same type.
 """
 
 from collections import defaultdict
@@ -85,7 +86,8 @@ def _poses(
         if name not in known and name not in renamed:
             names = spare[_type_of(name, spare)]
             if names:
-                # Round-robin, so that two recorded names of one type get two objects if there are two.
+                # Round-robin, so that two recorded names of one type get two objects if there are
+                # two.
                 renamed[name] = names[0]
                 names.append(names.pop(0))
         target = name if name in known else renamed.get(name)

@@ -1,4 +1,5 @@
-"""Where to stand to see a room: of the places that can be reached, the one that shows most of what is in it."""
+"""Where to stand to see a room: of the places that can be reached, the one that shows most of what
+is in it."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +28,8 @@ _HIDDEN = 40  # objects that a frame's whole area would show
 def find_room_view(simulator: Simulator, positions: Sequence[Vector], n_pixels: int) -> AgentPose:
     """Return the pose that shows most objects; the agent returns to its own.
 
-    Places far from each other are tried, at each the headings with the most objects before the agent.
+    Places far from each other are tried, at each the headings with the most objects before the
+    agent.
 
     Args:
         simulator: the simulator, with a scene; it renders instances.
@@ -47,7 +49,8 @@ def find_room_view(simulator: Simulator, positions: Sequence[Vector], n_pixels: 
 
 
 def _far_apart(positions: Sequence[Vector]) -> list[Vector]:
-    """Choose places one by one, each as far as possible from those before it: corners come first."""
+    """Choose places one by one, each as far as possible from those before it: corners come
+    first."""
     if not positions:
         return []
     points = np.array([(place.x, place.z) for place in positions])
@@ -77,7 +80,8 @@ def _n_before(view: SimulatorView, place: Vector, heading: float) -> int:
 
 
 def _score(simulator: Simulator, pose: AgentPose, n_pixels: int) -> float:
-    """Return how many objects a frame shows, less those that large ones hide; -1 where nobody can stand."""
+    """Return how many objects a frame shows, less those that large ones hide; -1 where nobody can
+    stand."""
     view = simulator.query(**teleport_call(pose, force=False), renderImage=False)
     if not view.success or not view.instances:
         return -1.0

@@ -1,8 +1,10 @@
-"""The simulator that all other packages use: scenes, actions, typed states, and recovery from crashes.
+"""The simulator that all other packages use: scenes, actions, typed states, and recovery from
+crashes.
 
-All actions since the last scene change are recorded. If the process dies, hangs or breaks the protocol, a new one is
-started and the episode is repeated action by action, so that callers notice only the delay. This requires a
-deterministic simulator: each repeated action must succeed or fail as it did before, or the episode ends in an error.
+All actions since the last scene change are recorded. If the process dies, hangs or breaks the
+protocol, a new one is started and the episode is repeated action by action, so that callers notice
+only the delay. This requires a deterministic simulator: each repeated action must succeed or fail
+as it did before, or the episode ends in an error.
 """
 
 import logging
@@ -41,14 +43,16 @@ _WALKING = {
 
 @dataclass(frozen=True, eq=False)
 class SimulatorMark:
-    """A point of an episode to which the simulator can return: the actions up to it, and the state there."""
+    """A point of an episode to which the simulator can return: the actions up to it, and the state
+    there."""
 
     episode: tuple["_CallResult", ...]
     view: SimulatorView
 
 
 class Simulator:
-    """One simulator process, which is restarted if it fails (`restarts` so far). Use it as a context manager."""
+    """One simulator process, which is restarted if it fails (`restarts` so far). Use it as a
+    context manager."""
 
     def __init__(
         self,
@@ -72,7 +76,8 @@ class Simulator:
             instances: True to render which object each pixel shows.
             max_restarts: maximum number of restarts from one mark to the next.
             max_copies: number of marks whose state the embedded simulator stores (0.2 MB each).
-            options: further initialisation parameters of AI2-THOR (`fieldOfView`, `agentMode`, ...).
+            options: further initialisation parameters of AI2-THOR (`fieldOfView`, `agentMode`,
+                ...).
         """
         self._launch = launch
         self._options = {
@@ -120,7 +125,8 @@ class Simulator:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Raw metadata of the last reply, which `view` has typed; raises SimulatorError if no scene is loaded."""
+        """Raw metadata of the last reply, which `view` has typed; raises SimulatorError if no scene
+        is loaded."""
         if self._controller is None or self._controller.last_event is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         return dict(self._controller.last_event.metadata)
@@ -129,8 +135,8 @@ class Simulator:
         """Load a scene and begin an episode.
 
         Args:
-            scene: name of the scene (`FloorPlan10`, `kitchen-3`), description of a ProcTHOR house, or None for the
-                current scene.
+            scene: name of the scene (`FloorPlan10`, `kitchen-3`), description of a ProcTHOR house,
+                or None for the current scene.
 
         Raises:
             SceneError: the simulator refuses the scene.
@@ -146,11 +152,12 @@ class Simulator:
                 self._recover_from(fault)
 
     def step(self, action: str, **arguments: Any) -> SimulatorView:
-        """Run one action and return the state after it, whose `success` and `error` tell whether it was refused.
+        """Run one action and return the state after it, whose `success` and `error` tell whether it
+        was refused.
 
         Raises:
-            SimulatorError: the simulator failed more often than `max_restarts`, or an action of the repeated episode
-                ended differently.
+            SimulatorError: the simulator failed more often than `max_restarts`, or an action of the
+                repeated episode ended differently.
         """
         call = {"action": action, **arguments}
         while True:
@@ -166,7 +173,8 @@ class Simulator:
                 return view
 
     def query(self, action: str, **arguments: Any) -> SimulatorView:
-        """Run an action without lasting effect (`GetReachablePositions`) outside the episode; raises as `step` does."""
+        """Run an action without lasting effect (`GetReachablePositions`) outside the episode;
+        raises as `step` does."""
         view, length = self._view, len(self._episode)
         reply = self.step(action, **arguments)
         del self._episode[length:]
@@ -176,8 +184,8 @@ class Simulator:
     def mark(self) -> SimulatorMark:
         """Mark the current state for `rewind`.
 
-        The embedded simulator stores its state, for the `max_copies` marks that were used last. Unity cannot, so that
-        `rewind` may have to repeat the episode there.
+        The embedded simulator stores its state, for the `max_copies` marks that were used last.
+        Unity cannot, so that `rewind` may have to repeat the episode there.
         """
         latest = next(reversed(self._copies), None)
         if latest is not None and self._is_at(latest):
@@ -188,16 +196,19 @@ class Simulator:
         return mark
 
     def stores(self, mark: SimulatorMark) -> bool:
-        """Return True if the state at a mark is stored, so that `rewind` need not repeat the episode."""
+        """Return True if the state at a mark is stored, so that `rewind` need not repeat the
+        episode."""
         return mark in self._copies
 
     def rewind(self, mark: SimulatorMark, *, exactly: bool = False) -> SimulatorView:
-        """Return to the state at a mark of the current scene, whether or not it is in the current episode's past.
+        """Return to the state at a mark of the current scene, whether or not it is in the current
+        episode's past.
 
         Args:
             mark: the mark.
-            exactly: True to restore the state bit by bit. If False, an agent that only walked since the mark is
-                teleported back, which is faster, but can differ by rounding errors and hence by single pixels.
+            exactly: True to restore the state bit by bit. If False, an agent that only walked since
+                the mark is teleported back, which is faster, but can differ by rounding errors and
+                hence by single pixels.
 
         Raises:
             SimulatorError: as `step`.
@@ -267,7 +278,8 @@ class Simulator:
         try:
             return view_of(self._controller.step({**self._rendering, **call}))
         except ValueError:
-            # ai2thor raises this for unknown actions and arguments, after it stored the reply that refuses them.
+            # ai2thor raises this for unknown actions and arguments, after it stored the reply that
+            # refuses them.
             return view_of(self._controller.last_event)
 
     def _repeat_episode(self) -> None:
@@ -275,8 +287,9 @@ class Simulator:
         for index, (call, success) in enumerate(self._episode):
             if self._call(call).success != success:
                 raise SimulatorError(
-                    f"after a restart action {index} ({call['action']}) of the episode in {self._scene} "
-                    "ended differently than before; run the episode again from its start"
+                    f"after a restart action {index} ({call['action']}) of the episode in "
+                    f"{self._scene} ended differently than before; run the episode again from its "
+                    "start"
                 )
 
     def _recover_from(self, fault: PeerFault) -> None:

@@ -1,7 +1,8 @@
 """Additions to recorded floor plans, taken from the trajectories that are replayed in them.
 
-Scene data may be recorded by another AI2-THOR version than the trajectories, and their navigation grid has gaps. Where
-the expert walked there must be floor, and what it opened, switched or put things into must exist.
+Scene data may be recorded by another AI2-THOR version than the trajectories, and their navigation
+grid has gaps. Where the expert walked there must be floor, and what it opened, switched or put
+things into must exist.
 """
 
 import math
@@ -33,8 +34,9 @@ class _FloorPlan:
 def write_supplement(trajectories: Iterable[Trajectory], path: Path) -> None:
     """Write the additions to each floor plan as JSON.
 
-    The content is `{floor plan: {"cells": [[x, z], ...], "floor_y": y, "objects": [id, ...]}}`: positions (metres)
-    where the agent stood, the agent's height, and ids of the fixed objects that it acted on.
+    The content is `{floor plan: {"cells": [[x, z], ...], "floor_y": y, "objects": [id, ...]}}`:
+    positions (metres) where the agent stood, the agent's height, and ids of the fixed objects that
+    it acted on.
     """
     plans: dict[str, _FloorPlan] = {}
     for trajectory in trajectories:
@@ -63,7 +65,8 @@ def supplement_file(trajectories: Iterable[Trajectory]) -> Iterator[Path]:
 
 
 def agent_path(trajectory: Trajectory) -> list[tuple[float, float]]:
-    """Return the (x, z) positions, metres, of the agent if all actions succeed, including the first."""
+    """Return the (x, z) positions, metres, of the agent if all actions succeed, including the
+    first."""
     start = trajectory.scene.init_action
     x, z, yaw = start.x, start.z, start.yaw
     path = [(_round(x), _round(z))]

@@ -10,7 +10,8 @@ __all__ = ["teleport_call"]
 
 
 def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:
-    """Return the 5.x call that teleports the agent to a pose; unless forced, it may be refused for a collision."""
+    """Return the 5.x call that teleports the agent to a pose; unless forced, it may be refused for
+    a collision."""
     call: dict[str, Any] = {
         "action": "TeleportFull",
         "position": asdict(pose.position),

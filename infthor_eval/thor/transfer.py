@@ -1,8 +1,8 @@
 """Copying the object states of one simulator to another in the same scene.
 
-Experts act with AI2-THOR's default agent, arms in a simulator of the arm's agent mode. Both start from the same
-restored scene, so their objects have the same ids. What was opened, switched, sliced, dirtied and moved since then is
-repeated by calls that every back end and agent mode supports.
+Experts act with AI2-THOR's default agent, arms in a simulator of the arm's agent mode. Both start
+from the same restored scene, so their objects have the same ids. What was opened, switched, sliced,
+dirtied and moved since then is repeated by calls that every back end and agent mode supports.
 """
 
 import math
@@ -22,7 +22,8 @@ _ROUNDS = 3  # passes over all objects: moving a receptacle also moves what is i
 
 
 class _State(NamedTuple):
-    """A state of objects that calls can change; `on` and `off` set and unset it, empty if no call does."""
+    """A state of objects that calls can change; `on` and `off` set and unset it, empty if no call
+    does."""
 
     read: Callable[[ThorObject], Any]
     on: dict[str, Any]
@@ -45,7 +46,8 @@ _STATES = (
 
 
 def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
-    """Give all objects the states and poses that they have in another simulator; the agent stays where it is.
+    """Give all objects the states and poses that they have in another simulator; the agent stays
+    where it is.
 
     An object held by the other agent floats where that agent holds it.
 

@@ -1,8 +1,8 @@
 """ai2thor's FIFO server, safe against a simulator that dies, hangs or breaks the protocol.
 
-The original server opens its pipes with blocking calls and reads without watching the child process, so it waits for
-ever for a simulator that died. This one opens the pipes non-blocking, watches the child while it waits, and raises a
-`PeerFault` that says what failed.
+The original server opens its pipes with blocking calls and reads without watching the child
+process, so it waits for ever for a simulator that died. This one opens the pipes non-blocking,
+watches the child while it waits, and raises a `PeerFault` that says what failed.
 """
 
 import contextlib
@@ -148,7 +148,8 @@ class SafeFifoServer(FifoServer):
                 raise self._fail(
                     "died", self._exit_message()
                 )  # end of file: the simulator closed its end
-            # No writer yet (0), or nothing to read (-1). Without a writer `select` would return at once, so sleep.
+            # No writer yet (0), or nothing to read (-1). Without a writer `select` would return at
+            # once, so sleep.
             self._check()
             if count == 0:
                 time.sleep(0.005)

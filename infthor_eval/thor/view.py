@@ -43,8 +43,8 @@ class Box(msgspec.Struct, frozen=True):
 class ThorObject(msgspec.Struct, rename="camel", frozen=True):
     """One object of `metadata["objects"]`; names and meanings are AI2-THOR's.
 
-    What an agent's action looks at is UNSET, which counts as false, where a simulator does not report it: the published
-    script tells it from false.
+    What an agent's action looks at is UNSET, which counts as false, where a simulator does not
+    report it: the published script tells it from false.
     """
 
     object_id: str
@@ -106,8 +106,9 @@ class AxisAngle(msgspec.Struct, frozen=True):
 class ArmJoint(msgspec.Struct, rename="camel", frozen=True):
     """One joint of an arm.
 
-    `root_relative_position` and `root_relative_rotation` are in the frame of the arm's base, `local_rotation` in that
-    of the joint before. AI2-THOR reports `arm_base_height` and `elbow_orientation` only for the first joint.
+    `root_relative_position` and `root_relative_rotation` are in the frame of the arm's base,
+    `local_rotation` in that of the joint before. AI2-THOR reports `arm_base_height` and
+    `elbow_orientation` only for the first joint.
     """
 
     name: str
@@ -152,7 +153,8 @@ class ArmState(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Instance:
-    """The pixels that show one object: their number and [xmin, ymin, xmax, ymax], both ends inclusive."""
+    """The pixels that show one object: their number and [xmin, ymin, xmax, ymax], both ends
+    inclusive."""
 
     pixels: int
     box: tuple[int, int, int, int]
@@ -204,7 +206,8 @@ class _Outcome(msgspec.Struct):
 
 
 def view_of(event: Any) -> SimulatorView:
-    """Convert an `ai2thor.server.Event`; raises SimulatorError if a field of the metadata is missing or malformed."""
+    """Convert an `ai2thor.server.Event`; raises SimulatorError if a field of the metadata is
+    missing or malformed."""
     metadata = event.metadata
     try:
         objects = msgspec.convert(metadata["objects"], list[ThorObject])
@@ -218,7 +221,8 @@ def view_of(event: Any) -> SimulatorView:
         outcome = msgspec.convert(metadata, _Outcome)
     except (ValueError, KeyError, TypeError) as error:  # msgspec's errors are ValueErrors
         raise SimulatorError(
-            f"metadata of {metadata.get('lastAction')!r:.40}: {in_one_line(error)}; use AI2-THOR 5.x"
+            f"metadata of {metadata.get('lastAction')!r:.40}: {in_one_line(error)}; use AI2-THOR "
+            "5.x"
         ) from error
     return SimulatorView(
         frame=None if event.frame is None else np.ascontiguousarray(event.frame),
@@ -237,9 +241,11 @@ def view_of(event: Any) -> SimulatorView:
 
 
 def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
-    """Return the number of pixels and the box of each code, given one code per pixel [height, width]."""
+    """Return the number of pixels and the box of each code, given one code per pixel [height,
+    width]."""
     width = codes.shape[1]
-    # This works on runs of equal pixels within a row, of which there are a few thousand instead of 90,000 pixels.
+    # This works on runs of equal pixels within a row, of which there are a few thousand instead of
+    # 90,000 pixels.
     starts = np.empty(codes.shape, dtype=bool)
     starts[:, 0] = True
     np.not_equal(codes[:, 1:], codes[:, :-1], out=starts[:, 1:])

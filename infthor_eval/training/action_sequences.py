@@ -1,7 +1,7 @@
 """Training sequences for acting: a trajectory's true history, cut into windows of whole plans.
 
-Every window has the form of an agent's truncated history (`--history last:N`): the current goal, the frame at the
-beginning of the window, then plans.
+Every window has the form of an agent's truncated history (`--history last:N`): the current goal,
+the frame at the beginning of the window, then plans.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,13 +27,14 @@ def recorded_segments(
 
     Args:
         trajectory: trajectory with goals and plans.
-        steps: steps of the replayed log in time order; of several frames of one action the last is used.
+        steps: steps of the replayed log in time order; of several frames of one action the last is
+            used.
         frames: frame of each step.
         words: words of plans and actions.
 
     Raises:
-        DataError: a task has no goal, a plan is of an unknown kind or cannot be said in these words, or an action has
-            no frame.
+        DataError: a task has no goal, a plan is of an unknown kind or cannot be said in these
+            words, or an action has no frame.
     """
     plans, tasks = plans_of(trajectory, words), tasks_of(trajectory)
     before: FrameRef | None = None
@@ -72,13 +73,15 @@ def recorded_segments(
 def windows(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Cut a history into sequences, each with as many whole plans as fit; every plan is in one of them.
+    """Cut a history into sequences, each with as many whole plans as fit; every plan is in one of
+    them.
 
     Args:
         encoder: builds the sequences.
         name: name of the trajectory.
         segments: history of the trajectory.
-        limit: most tokens of a sequence, frames expanded; plans that exceed it alone are skipped items.
+        limit: most tokens of a sequence, frames expanded; plans that exceed it alone are skipped
+            items.
 
     Raises:
         DataError: a frame cannot be read, or a text of the history contains a mark.
@@ -99,7 +102,8 @@ def windows(
 def single_plans(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment]
 ) -> Iterator[TrainingSequence]:
-    """Cut a history into sequences of one plan each, with its goal and the frame that it begins with.
+    """Cut a history into sequences of one plan each, with its goal and the frame that it begins
+    with.
 
     Raises:
         DataError: a frame cannot be read, or a text of the history contains a mark.
@@ -115,7 +119,8 @@ def single_plans(
 def _window_end(encoder: Encoder, segments: Sequence[PlanSegment], first: int, limit: int) -> int:
     """Return the end of the largest window that fits.
 
-    It is found by doubling and bisection, because counting tokens needs a rendering of the whole window.
+    It is found by doubling and bisection, because counting tokens needs a rendering of the whole
+    window.
     """
 
     def fits(end: int) -> bool:

@@ -21,9 +21,11 @@ class Batch(TypedDict):
 
     Attributes:
         input_ids: token ids, (batch, tokens), frames expanded, padded at the end.
-        position_ids: position ids, (batch, tokens), or (3, batch, tokens) for positions with three axes.
-        attention_mask: 0 for padding and 1 for tokens, (batch, tokens). None without padding, because attention kernels
-            with a built-in causal mask are faster than those that read one.
+        position_ids: position ids, (batch, tokens), or (3, batch, tokens) for positions with three
+            axes.
+        attention_mask: 0 for padding and 1 for tokens, (batch, tokens). None without padding,
+            because attention kernels with a built-in causal mask are faster than those that read
+            one.
         labels: the token where loss is computed on it, else -100, (batch, tokens).
         slots: true for slots of frames' features, (batch, tokens).
         frames: frames of the whole batch, in the order of their slots.
@@ -41,7 +43,8 @@ def collate(sequences: Sequence[TrainingSequence], family: Family, pad_id: int) 
     """Combine one or more sequences to a batch.
 
     Raises:
-        DataError: a sequence has no token with loss; the first token never has any, because nothing predicts it.
+        DataError: a sequence has no token with loss; the first token never has any, because nothing
+            predicts it.
     """
     ids = [torch.tensor(list(token_ids(sequence.pieces))) for sequence in sequences]
     labels = [_labels(sequence, own) for sequence, own in zip(sequences, ids, strict=True)]
@@ -77,7 +80,8 @@ def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
 def _positions(
     sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family
 ) -> torch.Tensor:
-    """Return the positions of whole sequences, each from 0; padding has position 0, which never lengthens RoPE."""
+    """Return the positions of whole sequences, each from 0; padding has position 0, which never
+    lengthens RoPE."""
     rows = [
         family.positions(own, [frame.size for frame in sequence.frames], 0)
         for sequence, own in zip(sequences, ids, strict=True)

@@ -21,9 +21,11 @@ _HINT = "restore it, or remove the folder to restart"
 
 @dataclass(frozen=True)
 class Checkpoints:
-    """The last state of a run, in a folder `step-NUMBER`: weights, the optimizer's moments, and the run's settings.
+    """The last state of a run, in a folder `step-NUMBER`: weights, the optimizer's moments, and the
+    run's settings.
 
-    Nothing else is stored: order of sequences, learning rate and random numbers follow from settings and step.
+    Nothing else is stored: order of sequences, learning rate and random numbers follow from
+    settings and step.
 
     Attributes:
         folder: folder of the run.
@@ -85,8 +87,8 @@ class Checkpoints:
         for name in sorted({*self.about, *about}):
             if self.about.get(name) != about.get(name):
                 raise UsageError(
-                    f"{last}: is of a run with {name}={about.get(name)}, not {self.about.get(name)}; use its settings, "
-                    "or give another folder"
+                    f"{last}: is of a run with {name}={about.get(name)}, not "
+                    f"{self.about.get(name)}; use its settings, or give another folder"
                 )
 
 

@@ -1,10 +1,12 @@
-"""Context parallelism: sequences that are too long for one process, split over the ranks of a process group.
+"""Context parallelism: sequences that are too long for one process, split over the ranks of a
+process group.
 
-Positions are computed for the whole sequence and features are put into their slots before it is split. So every family
-that can be trained can be split, including Qwen2.5-VL with its three-axis positions. Each sequence is split into 2N
-chunks for N ranks, and rank r has chunks r and 2N - 1 - r: attention of a chunk costs more the later it is, so this
-gives every rank the same work. In each layer keys and values of the whole sequence are gathered; queries, and all other
-activations that are kept for the gradient, stay split.
+Positions are computed for the whole sequence and features are put into their slots before it is
+split. So every family that can be trained can be split, including Qwen2.5-VL with its three-axis
+positions. Each sequence is split into 2N chunks for N ranks, and rank r has chunks r and 2N - 1 -
+r: attention of a chunk costs more the later it is, so this gives every rank the same work. In each
+layer keys and values of the whole sequence are gathered; queries, and all other activations that
+are kept for the gradient, stay split.
 """
 
 from collections.abc import Iterator, Sequence
@@ -66,10 +68,11 @@ class ContextParallel:
         self._split = SequenceSplit(self._rank, self._n_ranks)
 
     def loss(self, batch: Batch, n_items: Tensor | int) -> Tensor:
-        """Return this rank's part of the loss; the gradients of all ranks have to be added (`sum_gradients`).
+        """Return this rank's part of the loss; the gradients of all ranks have to be added
+        (`sum_gradients`).
 
-        Every rank of the group has to call this, and `backward` of the result, for the same batches in the same order:
-        both communicate.
+        Every rank of the group has to call this, and `backward` of the result, for the same batches
+        in the same order: both communicate.
 
         Args:
             batch: one sequence.
@@ -80,14 +83,15 @@ class ContextParallel:
 
         Raises:
             DataError: a frame cannot be read.
-            ModelError: processor and model disagree on the number of a frame's tokens, or the model uses sliding-window
-                attention.
+            ModelError: processor and model disagree on the number of a frame's tokens, or the model
+                uses sliding-window attention.
         """
         if len(batch["input_ids"]) != 1:
             raise ValueError("ranks share one sequence at a time")
         embeds = self._embed(batch)
         positions = self._split.local_part(batch["position_ids"])
-        # The label of a chunk's last token is the first token of another chunk, so labels are shifted before the split.
+        # The label of a chunk's last token is the first token of another chunk, so labels are
+        # shifted before the split.
         targets = self._split.local_part(next_labels(batch["labels"]), IGNORED)
         total = self._model.loss_sum(self._model.decode(embeds, positions, None), targets)
         return total / torch.as_tensor(n_items, device=total.device)
@@ -100,11 +104,13 @@ class ContextParallel:
             return self._model.embed(ids, own_slots, [])
         rows = self._split.local_part(slots.cumsum(-1) - 1)[own_slots]
         features = torch.cat(self._features(batch["frames"]))
-        # A rank without slots uses no row, but its backward pass has to take part in the gathering of gradients.
+        # A rank without slots uses no row, but its backward pass has to take part in the gathering
+        # of gradients.
         return self._model.embed(ids, own_slots, [features[rows.to(features.device)]])
 
     def _features(self, frames: Sequence[Frame]) -> list[Tensor]:
-        """Return the features of each frame, (slots, hidden); every rank runs the vision tower on some frames."""
+        """Return the features of each frame, (slots, hidden); every rank runs the vision tower on
+        some frames."""
         distinct = list(dict.fromkeys(frames))
         shares = [distinct[rank :: self._n_ranks] for rank in range(self._n_ranks)]
         sizes = [[self._model.n_slots(frame) for frame in share] for share in shares]
@@ -123,7 +129,8 @@ class ContextParallel:
         features = [piece.to(weight) for piece in self._model.features(frames)]
         own = torch.cat([weight.new_empty(0, weight.shape[1]), *features])
         own = pad(own, (0, 0, 0, n_rows - len(own)))
-        # If any rank has gradients to gather, all have to take part, including those without frames.
+        # If any rank has gradients to gather, all have to take part, including those without
+        # frames.
         return own.requires_grad_() if self._model.trains_vision and not own.requires_grad else own
 
     def attention(
@@ -138,7 +145,8 @@ class ContextParallel:
         sliding_window: int | None = None,
         **_: Any,
     ) -> tuple[Tensor, None]:
-        """Compute causal attention of this rank's queries to the whole sequence, as a transformers attention function.
+        """Compute causal attention of this rank's queries to the whole sequence, as a transformers
+        attention function.
 
         Args:
             module: attention module of the layer.
@@ -158,8 +166,8 @@ class ContextParallel:
         """
         if sliding_window is not None:
             raise ModelError(
-                f"the model attends in windows of {sliding_window} tokens; context parallelism needs full attention: "
-                "set parallel.context to 1"
+                f"the model attends in windows of {sliding_window} tokens; context parallelism "
+                "needs full attention: set parallel.context to 1"
             )
         keys, values = _GatherTokens.apply(torch.stack([key, value]), self._group)
         n_tokens = query.shape[-2] // 2
@@ -180,13 +188,15 @@ class ContextParallel:
 
 @contextmanager
 def context_parallel(model: SequenceModel, group: dist.ProcessGroup) -> Iterator[ContextParallel]:
-    """Split sequences over the ranks of a group, with the same model on each; run the backward pass within, too."""
+    """Split sequences over the ranks of a group, with the same model on each; run the backward pass
+    within, too."""
     parallel = ContextParallel(model, group)
     name = f"context_parallel_{id(parallel)}"
     config = model.decoder.config
     before = config._attn_implementation
-    # transformers creates no mask for an unknown attention name; a mask would have all tokens by all tokens. The
-    # function is put into the dictionary directly, because a registered one cannot be removed.
+    # transformers creates no mask for an unknown attention name; a mask would have all tokens by
+    # all tokens. The function is put into the dictionary directly, because a registered one cannot
+    # be removed.
     ALL_ATTENTION_FUNCTIONS[name] = parallel.attention
     config._attn_implementation = name
     try:
@@ -199,7 +209,8 @@ def context_parallel(model: SequenceModel, group: dist.ProcessGroup) -> Iterator
 def causal_attention(
     query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None
 ) -> Tensor:
-    """Return causal attention of the last tokens of a sequence to the whole sequence, in the shape of the queries.
+    """Return causal attention of the last tokens of a sequence to the whole sequence, in the shape
+    of the queries.
 
     Args:
         query: queries of the last tokens, (batch, heads, last tokens, head size).
@@ -210,7 +221,8 @@ def causal_attention(
     """
     if query.is_cuda and query.dtype in _HALF:
         return _flash_attention(query, key, value, dropout, scaling)
-    # Other kernels need an explicit mask. It is created for some rows at a time, and again for the gradient.
+    # Other kernels need an explicit mask. It is created for some rows at a time, and again for the
+    # gradient.
     n_keys = key.shape[-2] - query.shape[-2]
     outputs = []
     for rows in query.split(_MASK_ROWS, dim=-2):
@@ -246,7 +258,8 @@ def _masked_attention(
 
 
 class _GatherTokens(torch.autograd.Function):
-    """Gathers all ranks' chunks in the order of the sequence: (..., own tokens, size) to (..., tokens, size)."""
+    """Gathers all ranks' chunks in the order of the sequence: (..., own tokens, size) to (...,
+    tokens, size)."""
 
     @staticmethod
     def forward(ctx: Any, own: Tensor, group: dist.ProcessGroup) -> Tensor:

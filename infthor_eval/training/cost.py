@@ -27,7 +27,8 @@ class TrainingCost:
         weights: memory of the weights.
         gradients: memory of the gradients of trained weights.
         optimizer: memory of both moments.
-        activations: memory of the activations that are kept for the gradient of the longest sequence.
+        activations: memory of the activations that are kept for the gradient of the longest
+            sequence.
     """
 
     flop: float
@@ -42,7 +43,8 @@ class TrainingCost:
         return self.weights + self.gradients + self.optimizer + self.activations
 
     def hours(self, tflops: float) -> float:
-        """Return the hours that the run takes at this speed of all processes together, in TFLOP per second."""
+        """Return the hours that the run takes at this speed of all processes together, in TFLOP per
+        second."""
         return self.flop / (tflops * 1e12) / 3600
 
 
@@ -72,7 +74,8 @@ def estimate_cost(
 def _flop(
     recipe: Recipe, network: SequenceModel, data: TrainingData, parts: dict[str, Any]
 ) -> float:
-    """Return the operations of one epoch: forward, backward through layers and to weights, and recomputation."""
+    """Return the operations of one epoch: forward, backward through layers and to weights, and
+    recomputation."""
     config = network.decoder.config
     n_weights = sum(parameter.numel() for parameter in parts["decoder"])
     width = config.num_attention_heads * getattr(
@@ -102,11 +105,13 @@ def _flop_of_frame(network: SequenceModel) -> float:
 
 
 def _activations(recipe: Recipe, network: SequenceModel, n_tokens: float) -> float:
-    """Return the activations of one sequence: each layer's input and one layer's activations, or all layers'."""
+    """Return the activations of one sequence: each layer's input and one layer's activations, or
+    all layers'."""
     config = network.decoder.config
     size = network.model.dtype.itemsize
     heads = config.num_key_value_heads / config.num_attention_heads
-    # Norm, queries, keys, values, attention, projection, norm; gate, up, product, activation; and the residual sums.
+    # Norm, queries, keys, values, attention, projection, norm; gate, up, product, activation; and
+    # the residual sums.
     within = (6 + 2 * heads) * config.hidden_size + 4 * config.intermediate_size
     layers = config.num_hidden_layers
     per_token = (

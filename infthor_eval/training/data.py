@@ -57,12 +57,14 @@ class TrainingData:
 
 
 def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]) -> TrainingData:
-    """Build the sequences of a recipe from replayed sets; trajectories and questions that cannot be used are skipped.
+    """Build the sequences of a recipe from replayed sets; trajectories and questions that cannot be
+    used are skipped.
 
     Args:
         recipe: recipe with the kinds of sequences.
         encoder: builds the sequences.
-        folders: folders of the sets, in the form of NIEH sets; sequences of questions need a question file.
+        folders: folders of the sets, in the form of NIEH sets; sequences of questions need a
+            question file.
 
     Raises:
         UsageError: a setting of a context is not valid.
@@ -119,9 +121,11 @@ def _action_items(
 def action_sequences(
     data: NiehSet, encoder: Encoder, limit: int, words: Words
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield the windows of every trajectory of a set, and the items that could not become a sequence.
+    """Yield the windows of every trajectory of a set, and the items that could not become a
+    sequence.
 
-    The set has to contain the trajectories; `limit` is the most tokens of a sequence, frames expanded.
+    The set has to contain the trajectories; `limit` is the most tokens of a sequence, frames
+    expanded.
     """
     for name in trajectory_names(data):
         try:

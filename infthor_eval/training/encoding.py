@@ -1,6 +1,7 @@
 """Training sequences: token ids and frames, and which of them have loss.
 
-They are encoded by the prompter of evaluation from the same texts, so training and evaluation have the same prompts.
+They are encoded by the prompter of evaluation from the same texts, so training and evaluation have
+the same prompts.
 """
 
 from collections.abc import Iterator, Sequence
@@ -62,7 +63,8 @@ class SkippedItem:
 
 
 def within(sequence: TrainingSequence, limit: int) -> TrainingSequence | SkippedItem:
-    """Return the sequence, or a skipped item if it has more tokens than the limit, frames expanded."""
+    """Return the sequence, or a skipped item if it has more tokens than the limit, frames
+    expanded."""
     return (
         SkippedItem(sequence.name, f"longer than {limit} tokens")
         if sequence.n_tokens > limit
@@ -104,7 +106,8 @@ class Encoder:
         )
 
     def chat_actions(self, name: str, system: str, parts: Sequence[Part]) -> TrainingSequence:
-        """Encode a user's turn of goals, actions and frames after a system prompt, with loss as in a history.
+        """Encode a user's turn of goals, actions and frames after a system prompt, with loss as in
+        a history.
 
         Raises:
             DataError: a frame cannot be read, or a text but the actions contains a mark.
@@ -145,7 +148,8 @@ class Encoder:
     def answer(
         self, name: str, parts: Sequence[Part], answer: str, system: str | None = None
     ) -> TrainingSequence:
-        """Encode a question and its answer, with loss on the answer and the token that ends the turn.
+        """Encode a question and its answer, with loss on the answer and the token that ends the
+        turn.
 
         Raises:
             DataError: a frame cannot be read.

@@ -22,7 +22,8 @@ library_name: transformers
 ---
 # {{title}}
 
-Trained with infthor-eval, on plans and actions in the {{words}} words (`--words {{words}}` in evaluation).
+Trained with infthor-eval, on plans and actions in the {{words}} words (`--words {{words}}` in \
+evaluation).
 """
 
 
@@ -48,10 +49,12 @@ def export(
     words: Words,
     weights: Mapping[str, torch.Tensor] | None = None,
 ) -> None:
-    """Write weights by their published names (safetensors), configs, tokenizer with template, image processor, card.
+    """Write weights by their published names (safetensors), configs, tokenizer with template, image
+    processor, card.
 
-    The template is that of training, so that evaluation renders the same prompts. The card has the title of the recipe
-    and the words of plans and actions. The folder is created. `weights` are the gathered ones of a sharded model.
+    The template is that of training, so that evaluation renders the same prompts. The card has the
+    title of the recipe and the words of plans and actions. The folder is created. `weights` are the
+    gathered ones of a sharded model.
 
     Raises:
         DataError: the checkpoint cannot be written.

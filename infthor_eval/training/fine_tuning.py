@@ -93,7 +93,8 @@ def fine_tune(run: TrainingRun, out: Path, on_step: StepCallback) -> Path:
         The folder of the checkpoint.
 
     Raises:
-        UsageError: the folder belongs to another run, or the number of processes does not suit the recipe.
+        UsageError: the folder belongs to another run, or the number of processes does not suit the
+            recipe.
         DataError: a file cannot be read or written.
         ModelError: the model cannot be trained in this way.
     """
@@ -166,7 +167,8 @@ def _processes() -> Iterator[None]:
 
 
 def _claim_folder(out: Path, document: dict[str, Any]) -> None:
-    """Write the description of the run into its folder, or check that the folder belongs to this run."""
+    """Write the description of the run into its folder, or check that the folder belongs to this
+    run."""
     path = out / _DESCRIPTION
     if not path.exists():
         with write_atomically(path) as partial_file:

@@ -1,7 +1,9 @@
-"""Sequences of goals, actions and frames in one turn: what the Qwen2.5-VL behind the final tasks was trained on.
+"""Sequences of goals, actions and frames in one turn: what the Qwen2.5-VL behind the final tasks
+was trained on.
 
-They are those of `infini_thor_dataset.py` (branch `dev`), in text, frames and ends: no text of a plan, a system prompt,
-one turn of the user. Later windows begin with the goal and the last frame of the window before.
+They are those of `infini_thor_dataset.py` (branch `dev`), in text, frames and ends: no text of a
+plan, a system prompt, one turn of the user. Later windows begin with the goal and the last frame of
+the window before.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +18,8 @@ from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequenc
 
 __all__ = ["goal_windows", "goals_of_actions"]
 
-_FEWER = 9  # tokens that the trainer keeps free: its count of the system prompt (1), and 8 of the template's
+# tokens that the trainer keeps free: its count of the system prompt (1), and 8 of the template's
+_FEWER = 9
 
 
 @dataclass
@@ -34,14 +37,15 @@ class _Window:
 def goal_windows(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Cut a history into sequences of goals, actions and frames; plans outside every task are left out, as published.
+    """Cut a history into sequences of goals, actions and frames; plans outside every task are left
+    out, as published.
 
     Args:
         encoder: builds the sequences.
         name: name of the trajectory.
         segments: history of the trajectory.
-        limit: most tokens of a sequence as the trainer counts: a text is one, so that the true number is up to a
-            twentieth above. A plan that exceeds it alone ends where it does.
+        limit: most tokens of a sequence as the trainer counts: a text is one, so that the true
+            number is up to a twentieth above. A plan that exceeds it alone ends where it does.
 
     Raises:
         DataError: a frame cannot be read, or a text contains a mark.

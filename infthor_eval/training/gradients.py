@@ -12,8 +12,8 @@ __all__ = ["sum_gradients"]
 def sum_gradients(parameters: Iterable[Parameter], group: dist.ProcessGroup | None = None) -> None:
     """Replace every rank's gradients by the sum over all ranks.
 
-    A parameter without a gradient on any rank stays without one, as in a single process: the optimizer then skips it,
-    including its weight decay.
+    A parameter without a gradient on any rank stays without one, as in a single process: the
+    optimizer then skips it, including its weight decay.
 
     Args:
         parameters: the parameters, in the same order on every rank.

@@ -1,7 +1,8 @@
-"""Training on one process or many, with sequences distributed over data groups and split within them.
+"""Training on one process or many, with sequences distributed over data groups and split within
+them.
 
-The loss of a step is the mean over all tokens with loss of all its sequences, so the number of processes changes
-nothing but rounding.
+The loss of a step is the mean over all tokens with loss of all its sequences, so the number of
+processes changes nothing but rounding.
 """
 
 import time
@@ -97,12 +98,12 @@ class Loop:
     def run(self) -> None:
         """Train to the end, from the folder's last state if there is one.
 
-        All processes have to call this, with the same folder. With an unchanged number of processes, the final weights
-        are bit for bit those of a run that was never interrupted.
+        All processes have to call this, with the same folder. With an unchanged number of
+        processes, the final weights are bit for bit those of a run that was never interrupted.
 
         Raises:
-            DataError: a frame cannot be read, a sequence has no token with loss, or a state is damaged or cannot be
-                written.
+            DataError: a frame cannot be read, a sequence has no token with loss, or a state is
+                damaged or cannot be written.
             ModelError: the gradient is not finite, or the model cannot be trained in this way.
             UsageError: the state is of another run.
         """
@@ -137,7 +138,8 @@ class Loop:
         norm = clip_grad_norm_(self._trained, self._settings.clip)
         if not norm.isfinite():
             raise ModelError(
-                f"step {step + 1}: the gradient is not finite; lower the learning rate, or train in bfloat16"
+                f"step {step + 1}: the gradient is not finite; lower the learning rate, or train "
+                "in bfloat16"
             )
         learning_rate = self._settings.learning_rate_of(step, self._n_steps)
         for group in self._optimizer.param_groups:
@@ -194,7 +196,8 @@ class Loop:
             dist.barrier()
 
     def _run_settings(self) -> dict[str, object]:
-        """Return the settings that identify a run; saving and the number of processes do not count."""
+        """Return the settings that identify a run; saving and the number of processes do not
+        count."""
         settings = asdict(self._settings)
         del settings["save_every"]
         names = digest(

@@ -1,7 +1,9 @@
-"""Sequences of one action behind a memory: what the published memories for final tasks were trained on.
+"""Sequences of one action behind a memory: what the published memories for final tasks were trained
+on.
 
-They are those of `infini_dataset_history.py` and `infini_dataset_clip.py` (branch `dev`): the goal, the state in words
-or the retrieved frames that the trajectory's file has for the action, the current frame, and the action as the reply.
+They are those of `infini_dataset_history.py` and `infini_dataset_clip.py` (branch `dev`): the goal,
+the state in words or the retrieved frames that the trajectory's file has for the action, the
+current frame, and the action as the reply.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -44,7 +46,8 @@ def memory_sequences(
     form: MemoryForm,
     limit: int,
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield a sequence for each action that the trajectory's file has a memory for, in the file's order.
+    """Yield a sequence for each action that the trajectory's file has a memory for, in the file's
+    order.
 
     Args:
         encoder: builds the sequences.
@@ -97,7 +100,8 @@ class _State:
 
 
 class _Retrieved:
-    """The frames that were retrieved; where the list is empty, those of all actions before, first and last of each."""
+    """The frames that were retrieved; where the list is empty, those of all actions before, first
+    and last of each."""
 
     def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
         place, hint = f"trajectory {trajectory.traj_id}", "restore the file"

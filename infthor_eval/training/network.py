@@ -26,9 +26,9 @@ _LOGIT_ROWS = 1024  # rows of logits at once; each has as many values as the voc
 class SequenceModel(torch.nn.Module):
     """The loss of sequences of text and frames.
 
-    The parts of the transformers model are called one by one: features of frames, embeddings, decoder, output head. So
-    all families are trained by the same code, logits are computed only where there are labels, and a sequence can be
-    split between embedding and decoding.
+    The parts of the transformers model are called one by one: features of frames, embeddings,
+    decoder, output head. So all families are trained by the same code, logits are computed only
+    where there are labels, and a sequence can be split between embedding and decoding.
 
     Args:
         loaded: the checkpoint.
@@ -38,7 +38,8 @@ class SequenceModel(torch.nn.Module):
         family: family of the model.
     """
 
-    # Tells transformers' Trainer that the loss is a sum over tokens divided by `num_items_in_batch`.
+    # Tells transformers' Trainer that the loss is a sum over tokens divided by
+    # `num_items_in_batch`.
     accepts_loss_kwargs = True
 
     def __init__(self, loaded: LoadedCheckpoint) -> None:
@@ -69,7 +70,8 @@ class SequenceModel(torch.nn.Module):
         """Return the loss of a `Batch`; all arguments but the last are its fields.
 
         Args:
-            num_items_in_batch: divisor of the sum of the tokens' losses; the labels of this batch where None.
+            num_items_in_batch: divisor of the sum of the tokens' losses; the labels of this batch
+                where None.
 
         Returns:
             "loss": cross entropy in nats, a float32 scalar.
@@ -101,8 +103,8 @@ class SequenceModel(torch.nn.Module):
         for frame, features in zip(distinct, computed, strict=True):
             if len(features) != self.n_slots(frame):
                 raise ModelError(
-                    f"the processor makes {self.n_slots(frame)} image tokens of a frame and the model {len(features)} "
-                    "features; they do not belong to one checkpoint"
+                    f"the processor makes {self.n_slots(frame)} image tokens of a frame and the "
+                    f"model {len(features)} features; they do not belong to one checkpoint"
                 )
         by_frame = dict(zip(distinct, computed, strict=True))
         return [by_frame[frame] for frame in frames]
@@ -142,10 +144,11 @@ class SequenceModel(torch.nn.Module):
         return output.last_hidden_state
 
     def loss_sum(self, hidden: Tensor, targets: Tensor) -> Tensor:
-        """Return the sum of the cross entropies of all tokens with a target, in nats; a float32 scalar.
+        """Return the sum of the cross entropies of all tokens with a target, in nats; a float32
+        scalar.
 
-        Logits are computed only for targets and in chunks, which are recomputed for the gradient: all logits of a long
-        sequence would need more memory than the model.
+        Logits are computed only for targets and in chunks, which are recomputed for the gradient:
+        all logits of a long sequence would need more memory than the model.
 
         Args:
             hidden: hidden states, (batch, tokens, hidden).
@@ -154,7 +157,8 @@ class SequenceModel(torch.nn.Module):
         targets = targets.to(hidden.device)
         has_target = targets != IGNORED
         total = hidden.new_zeros((), dtype=torch.float32)
-        # Without targets there is still one, empty, chunk: every rank of a split sequence needs a backward pass.
+        # Without targets there is still one, empty, chunk: every rank of a split sequence needs a
+        # backward pass.
         chunks = (values[has_target].split(_LOGIT_ROWS) for values in (hidden, targets))
         for states, chunk_targets in zip(*chunks, strict=True):
             total = total + checkpoint(
@@ -169,17 +173,18 @@ class SequenceModel(torch.nn.Module):
     def gradient_checkpointing_enable(
         self, gradient_checkpointing_kwargs: Mapping[str, Any] | None = None, **settings: Any
     ) -> None:
-        """Keep only the inputs of each layer and recompute the rest for the gradient, in training mode.
+        """Keep only the inputs of each layer and recompute the rest for the gradient, in training
+        mode.
 
         Args:
-            gradient_checkpointing_kwargs: arguments of `torch.utils.checkpoint.checkpoint`; `use_reentrant` is always
-                False.
+            gradient_checkpointing_kwargs: arguments of `torch.utils.checkpoint.checkpoint`;
+                `use_reentrant` is always False.
             settings: further arguments of the transformers model's method of this name.
         """
         kwargs = {**(gradient_checkpointing_kwargs or {}), "use_reentrant": False}
         self.model.gradient_checkpointing_enable(gradient_checkpointing_kwargs=kwargs, **settings)
-        # transformers lets embeddings require gradients, which only reentrant checkpoints need: gradients of frozen
-        # embeddings and of the vision tower would be computed for nothing.
+        # transformers lets embeddings require gradients, which only reentrant checkpoints need:
+        # gradients of frozen embeddings and of the vision tower would be computed for nothing.
         self.model.disable_input_require_grads()
 
     def gradient_checkpointing_disable(self) -> None:
@@ -195,8 +200,8 @@ def next_labels(labels: Tensor) -> Tensor:
 def parameters_by_part(model: SequenceModel) -> dict[str, list[Parameter]]:
     """Return a model's parameters by the names of `PARTS`.
 
-    "vision" is everything outside the language model: the tower and the projector. A head that is tied to the
-    embeddings is in both parts.
+    "vision" is everything outside the language model: the tower and the projector. A head that is
+    tied to the embeddings is in both parts.
     """
     embeddings = list(model.model.get_input_embeddings().parameters())
     head = list(model.model.get_output_embeddings().parameters())
@@ -232,8 +237,8 @@ def freeze(model: SequenceModel, parts: Collection[str]) -> None:
         parts: names of `PARTS`.
 
     Raises:
-        UsageError: a part is unknown, only one of two parts with shared weights would be frozen, or nothing would be
-            left to train.
+        UsageError: a part is unknown, only one of two parts with shared weights would be frozen, or
+            nothing would be left to train.
     """
     for name in parts:
         if name not in PARTS:

@@ -1,7 +1,8 @@
-"""Import of the published trainer's checkpoints: torch's distributed checkpoints of a model from the hub.
+"""Import of the published trainer's checkpoints: torch's distributed checkpoints of a model from
+the hub.
 
-Of the published code, branch `dev` alone exports them, and Qwen2.5-VL alone. Here their weights are put into the model
-that training started from, which is then written like any other checkpoint.
+Of the published code, branch `dev` alone exports them, and Qwen2.5-VL alone. Here their weights are
+put into the model that training started from, which is then written like any other checkpoint.
 """
 
 from collections import Counter
@@ -30,7 +31,8 @@ class ImportedWeights:
 
     Attributes:
         n_imported: weights that the folder has.
-        n_kept: weights of the model that the folder does not have; they stay those of the initial checkpoint.
+        n_kept: weights of the model that the folder does not have; they stay those of the initial
+            checkpoint.
         n_ignored: tensors of the folder that are not weights (an optimizer's).
     """
 
@@ -42,8 +44,8 @@ class ImportedWeights:
 def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     """Load the weights of a distributed checkpoint into a model.
 
-    The keys of all weights may have one common prefix ("model.", "app.model."), and the names that weights have in the
-    hub's files, as in transformers 4.49.
+    The keys of all weights may have one common prefix ("model.", "app.model."), and the names that
+    weights have in the hub's files, as in transformers 4.49.
 
     Args:
         loaded: the model that training started from, with the marks of sequences as tokens.
@@ -65,8 +67,9 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
     for name, key in stored_names.items():
         if sizes[key] != weights[name].shape:
             raise DataError(
-                f"{folder}: {key} is {tuple(sizes[key])}, the model's {tuple(weights[name].shape)}; training started "
-                "from another checkpoint, or with other tokens"
+                f"{folder}: {key} is {tuple(sizes[key])}, the model's "
+                f"{tuple(weights[name].shape)}; training started from another checkpoint, or with "
+                "other tokens"
             )
     tensors = {key: torch.empty_like(weights[name]) for name, key in stored_names.items()}
     with wrap_errors(f"{folder}: cannot be read", "restore its files", catch=Exception):
@@ -81,8 +84,8 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
 def _stored_names(sizes: Mapping[str, Any], model: Any, folder: Path) -> Mapping[str, str]:
     """Return the keys in the folder of the model's weights, by the weights' names.
 
-    The published trainer had transformers 4.49, in which models name their weights as the hub's files do; later ones
-    name them otherwise. The names that more keys have are taken.
+    The published trainer had transformers 4.49, in which models name their weights as the hub's
+    files do; later ones name them otherwise. The names that more keys have are taken.
     """
     weights = model.state_dict()
     of_hub = {
@@ -100,7 +103,8 @@ def _stored_names(sizes: Mapping[str, Any], model: Any, folder: Path) -> Mapping
 
 
 def _with_prefix(sizes: Mapping[str, Any], names: Mapping[str, str]) -> Mapping[str, str]:
-    """Return the keys of weights that have the prefix that most keys agree with; `names` are those that it precedes."""
+    """Return the keys of weights that have the prefix that most keys agree with; `names` are those
+    that it precedes."""
     counts: Counter[str] = Counter()
     for key in sizes:
         parts = key.split(".")

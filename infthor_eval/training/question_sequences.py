@@ -1,4 +1,5 @@
-"""Training sequences for answering: NIEH questions as in evaluation, with their reference answers."""
+"""Training sequences for answering: NIEH questions as in evaluation, with their reference
+answers."""
 
 from collections.abc import Iterator
 
@@ -15,7 +16,8 @@ __all__ = ["question_sequences"]
 def question_sequences(
     encoder: Encoder, task: TaskSamples, limit: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield a sequence for each sample of a task in one context, or a skipped item if it cannot be used.
+    """Yield a sequence for each sample of a task in one context, or a skipped item if it cannot be
+    used.
 
     Args:
         encoder: builds the sequences.

@@ -1,4 +1,5 @@
-"""Recipes: data and settings of training, as YAML files; `infthor_eval/training/recipes/` has the paper's."""
+"""Recipes: data and settings of training, as YAML files; `infthor_eval/training/recipes/` has the
+paper's."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -30,8 +31,9 @@ class ActionData(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Sequences of trajectories.
 
     Attributes:
-        form: "plans" for histories of whole plans (appendix B); of the published models for final tasks, "goals" for
-            histories without the text of a plan, "text" and "frames" for single actions behind a memory.
+        form: "plans" for histories of whole plans (appendix B); of the published models for final
+            tasks, "goals" for histories without the text of a plan, "text" and "frames" for single
+            actions behind a memory.
         share: share of the sequences that is used.
     """
 
@@ -115,8 +117,8 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         source: source of the settings; empty for our own.
         model: name of the model's adapter.
         model_args: options of the adapter (`pretrained`, `dtype`, ...).
-        prompt: "plain" for bare sequences of texts and frames, "chat" for the checkpoint's template; sequences of
-            plans are plain, other forms of actions are chats.
+        prompt: "plain" for bare sequences of texts and frames, "chat" for the checkpoint's
+            template; sequences of plans are plain, other forms of actions are chats.
         max_tokens: most tokens of a sequence.
         actions: sequences of trajectories, or None.
         words: words of their plans and actions.
@@ -207,8 +209,9 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe |
 
     Args:
         name: one of `recipe_names()`, or a path that ends in .yaml.
-        changes: settings that replace those of the file, with dots for nested ones (`optimizer.lr`). Another model does
-            not get the `model_args` of the file, which are options of the file's model.
+        changes: settings that replace those of the file, with dots for nested ones
+            (`optimizer.lr`). Another model does not get the `model_args` of the file, which are
+            options of the file's model.
 
     Raises:
         UsageError: the recipe does not exist, or a setting is unknown or not valid.
@@ -220,7 +223,8 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe |
     document = read_yaml(path, "see infthor_eval/training/recipes for examples")
     if not isinstance(document, dict):
         raise DataError(
-            f"{path}: not a recipe (no mapping of settings); see infthor_eval/training/recipes for examples"
+            f"{path}: not a recipe (no mapping of settings); see infthor_eval/training/recipes for "
+            "examples"
         )
     wrong, settings = (msgspec.ValidationError, TypeError), changes or {}
     with wrap_errors(f"{path}: not a recipe", "fix the setting", catch=wrong, raise_as=UsageError):

@@ -12,9 +12,11 @@ __all__ = ["LoopSettings", "linear_share"]
 
 
 def linear_share(step: int, n_steps: int, warmup_ratio: float) -> float:
-    """Return the share of the highest learning rate in a step, by the published trainer's linear schedule.
+    """Return the share of the highest learning rate in a step, by the published trainer's linear
+    schedule.
 
-    Steps count from 0. The first step of a warm-up has a part of the rate already, unlike in transformers' schedule.
+    Steps count from 0. The first step of a warm-up has a part of the rate already, unlike in
+    transformers' schedule.
     """
     n_warm = math.ceil(warmup_ratio * n_steps)
     if step < n_warm:
@@ -27,14 +29,16 @@ class LoopSettings:
     """Settings of a training run, with the defaults of the published trainer.
 
     Attributes:
-        learning_rate: highest learning rate, reached linearly at the end of the warm-up; it then falls linearly to 0.
+        learning_rate: highest learning rate, reached linearly at the end of the warm-up; it then
+            falls linearly to 0.
         betas: betas of AdamW.
         weight_decay: weight decay of AdamW, for all trained weights, biases and norms too.
         clip: largest norm of a step's gradient.
         warmup_ratio: share of the steps in which the learning rate rises.
         epochs: number of epochs.
         max_steps: number of steps instead of epochs, or None.
-        sequences_per_step: sequences of a step, of all processes together; the last step of an epoch may have fewer.
+        sequences_per_step: sequences of a step, of all processes together; the last step of an
+            epoch may have fewer.
         seed: seed of the order of the sequences and of dropout.
         save_every: steps between states; None for one at the end only.
 
@@ -83,7 +87,8 @@ class LoopSettings:
         )
 
     def sequences_of(self, step: int, n_sequences: int) -> list[int]:
-        """Return the numbers of a step's sequences; steps count from 0. Each epoch has its own random order."""
+        """Return the numbers of a step's sequences; steps count from 0. Each epoch has its own
+        random order."""
         epoch, at = divmod(step, self._epoch_steps(n_sequences))
         generator = torch.Generator().manual_seed(seed_of(f"{self.seed} epoch {epoch}") % 2**63)
         order: list[int] = torch.randperm(n_sequences, generator=generator).tolist()

@@ -23,8 +23,9 @@ def load_starting_model(
         options: options of the model as typed.
         prompt: template of the sequences, "plain" or "chat".
         seed: seed of the weights of a tiny model.
-        max_tokens: most tokens of a sequence of the training. Where rotary frequencies depend on the length, all
-            sequences have those of this length, as in the published trainer; None for a model that is not trained.
+        max_tokens: most tokens of a sequence of the training. Where rotary frequencies depend on
+            the length, all sequences have those of this length, as in the published trainer; None
+            for a model that is not trained.
 
     Raises:
         UsageError: a name or an option is unknown, or the model cannot be trained here.
@@ -44,8 +45,8 @@ def load_starting_model(
 def _add_marks(loaded: LoadedCheckpoint) -> None:
     """Make every mark of a sequence a single token, in a fixed order.
 
-    The embedding of a new token is the mean of all others: the published training freezes input embeddings, so an
-    arbitrary row would never be trained.
+    The embedding of a new token is the mean of all others: the published training freezes input
+    embeddings, so an arbitrary row would never be trained.
     """
     known = set(loaded.tokenizer.get_vocab())
     new = [mark for mark in MARKS if mark not in known]

@@ -1,6 +1,7 @@
 """Training by transformers' Trainer: one device, DDP, or weights sharded over processes (FSDP2).
 
-The Trainer is given what it does not know: batches of sequences, the format of saved weights, and a loss per token.
+The Trainer is given what it does not know: batches of sequences, the format of saved weights, and a
+loss per token.
 """
 
 import json
@@ -27,9 +28,11 @@ _WEIGHTS = "model.safetensors"
 
 
 class _SequenceTrainer(transformers.Trainer):
-    """Saves the weights of the transformers model only, with tied weights stored once, as transformers does.
+    """Saves the weights of the transformers model only, with tied weights stored once, as
+    transformers does.
 
-    Weight decay and schedule are those of the published trainer: all weights decay, and `linear_share`.
+    Weight decay and schedule are those of the published trainer: all weights decay, and
+    `linear_share`.
     """
 
     def get_decay_parameter_names(self, model: torch.nn.Module) -> list[str]:
@@ -126,10 +129,11 @@ def train_with_trainer(
 
 
 def _last_complete_checkpoint(out: Path) -> str | None:
-    """Return the last checkpoint that was written completely; a run may be killed while writing one.
+    """Return the last checkpoint that was written completely; a run may be killed while writing
+    one.
 
-    The Trainer itself would use the last folder, whatever it contains, and continue without the optimizer if that is
-    missing. The state file is the last to be written.
+    The Trainer itself would use the last folder, whatever it contains, and continue without the
+    optimizer if that is missing. The state file is the last to be written.
     """
     for place in sorted(
         out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True
@@ -177,15 +181,16 @@ def _arguments(recipe: Recipe, out: Path, network: SequenceModel) -> transformer
     if recipe.sequences_per_step % n_processes:
         least = math.ceil(recipe.sequences_per_step / n_processes) * n_processes
         raise UsageError(
-            f"sequences_per_step={recipe.sequences_per_step} is not a multiple of the {n_processes} processes; "
-            f"set it to {least}"
+            f"sequences_per_step={recipe.sequences_per_step} is not a multiple of the "
+            f"{n_processes} processes; set it to {least}"
         )
     arguments.gradient_accumulation_steps = recipe.sequences_per_step // n_processes
     return arguments
 
 
 def _sharding(recipe: Recipe, network: SequenceModel) -> dict[str, Any]:
-    """Return the settings that shard weights, gradients and optimizer by layers, which accelerate does on GPUs only."""
+    """Return the settings that shard weights, gradients and optimizer by layers, which accelerate
+    does on GPUs only."""
     if not (recipe.parallel.shard and torch.distributed.is_initialized()):
         return {}
     layers = sorted(getattr(network.model, "_no_split_modules", None) or ())

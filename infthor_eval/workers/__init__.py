@@ -1,4 +1,5 @@
-"""Workers that share jobs: processes of this machine, or actors of a Ray cluster. Nothing here knows evaluations."""
+"""Workers that share jobs: processes of this machine, or actors of a Ray cluster. Nothing here
+knows evaluations."""
 
 from infthor_eval.workers.host import WorkerHost
 from infthor_eval.workers.jobs import run_jobs

@@ -11,7 +11,8 @@ _DRIVER = Path("/proc/driver/nvidia/gpus")
 
 
 def visible_gpus() -> list[str]:
-    """Return the GPUs that this process may use, as CUDA names them, without torch, which would occupy them."""
+    """Return the GPUs that this process may use, as CUDA names them, without torch, which would
+    occupy them."""
     visible = os.environ.get(_VISIBLE)
     if visible is not None:
         return [name.strip() for name in visible.split(",") if name.strip()]
@@ -21,7 +22,8 @@ def visible_gpus() -> list[str]:
 
 
 def limit_devices(number: int, count: int) -> None:
-    """Limit this process to the share of a worker (from 1) of `count`; a number of threads already set is kept."""
+    """Limit this process to the share of a worker (from 1) of `count`; a number of threads already
+    set is kept."""
     os.environ.setdefault(_THREADS, str(max(1, (os.cpu_count() or 1) // count)))
     all_gpus = visible_gpus()
     if all_gpus and count > 1:

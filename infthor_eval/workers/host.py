@@ -41,7 +41,8 @@ class WorkerHost:
 
 
 def to_portable_error(error: BaseException) -> Exception:
-    """Return an error that the driver can unpickle: our own and the system's as they are, others as a description."""
+    """Return an error that the driver can unpickle: our own and the system's as they are, others as
+    a description."""
     if isinstance(error, InfthorError):
         return type(error)(str(error))
     if isinstance(error, MemoryError):

@@ -17,11 +17,13 @@ def run_jobs(
     worker_settings: WorkerSettings,
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, Any | InfthorError]]:
-    """Yield the number of each job with its result, or with an error if worker after worker was lost at it.
+    """Yield the number of each job with its result, or with an error if worker after worker was
+    lost at it.
 
     Args:
         open_worker: creates a worker, which gives one result for each job.
-        worker_settings: number and place of the workers; a local one does the jobs in this process, in order.
+        worker_settings: number and place of the workers; a local one does the jobs in this process,
+            in order.
         report: called with a line when a worker is lost or cannot be started.
 
     Raises:

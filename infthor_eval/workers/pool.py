@@ -1,4 +1,5 @@
-"""Jobs done by several workers: a job goes to whoever is free, and again to another if its worker is lost."""
+"""Jobs done by several workers: a job goes to whoever is free, and again to another if its worker
+is lost."""
 
 import contextlib
 from collections import Counter, deque
@@ -102,13 +103,14 @@ class _JobQueue:
 class Pool:
     """Workers, each behind a thread of the driver that gives it jobs.
 
-    Each worker opens at its own pace: one that is ready works, and one that comes late (a node that joins a cluster)
-    joins in.
+    Each worker opens at its own pace: one that is ready works, and one that comes late (a node that
+    joins a cluster) joins in.
 
     Args:
         connect: returns the link to a worker.
         count: number of workers.
-        accept: called with each worker's greeting before its first job; an InfthorError that it raises ends the pool.
+        accept: called with each worker's greeting before its first job; an InfthorError that it
+            raises ends the pool.
     """
 
     def __init__(
@@ -156,9 +158,10 @@ class Pool:
         Args:
             n_jobs: number of jobs, which are numbered from 0.
             create: creates what a worker is sent for a job, when a worker is free for it.
-            should_stop: asked all the time; once it returns True, the present jobs are stopped after their next
-                result, and no further one is started.
-            max_losses: losses in a row of a job, without a further result between them, before it is given up.
+            should_stop: asked all the time; once it returns True, the present jobs are stopped
+                after their next result, and no further one is started.
+            max_losses: losses in a row of a job, without a further result between them, before it
+                is given up.
 
         Raises:
             Exception: a worker raised it on a job, or the last worker withdrew for this reason.
@@ -179,7 +182,9 @@ class Pool:
             if isinstance(event, WorkerLost):
                 if stopped:
                     n_left -= 1
-                else:  # first in the queue: its results so far are fresh in the journal, and its group is half done
+                # first in the queue: its results so far are fresh in the journal, and its group is
+                # half done
+                else:
                     self._jobs.add(event.job, lambda job=event.job: create(job), first=True)  # type: ignore[misc]
             n_left -= isinstance(event, _JobEnded | JobFailed)
             if isinstance(event, Event):
@@ -218,7 +223,8 @@ class Pool:
             self._events.put(error)
 
     def _open_worker(self, number: int, link: Link) -> bool:
-        """Open a worker, several times if it is lost meanwhile; return whether it is ready for jobs."""
+        """Open a worker, several times if it is lost meanwhile; return whether it is ready for
+        jobs."""
         reason: InfthorError = WorkerLostError("the pool is closed")
         for _ in range(_MAX_LOSSES):
             if self._jobs.closed:
@@ -245,7 +251,8 @@ class Pool:
         return False
 
     def _do_jobs(self, number: int, link: Link) -> bool:
-        """Have a worker do jobs; return True when there are no more, False when the worker was lost."""
+        """Have a worker do jobs; return True when there are no more, False when the worker was
+        lost."""
         while (taken := self._jobs.take()) is not None:
             job, create = taken
             try:

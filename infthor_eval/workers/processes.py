@@ -62,7 +62,8 @@ class ProcessLink:
             self._send(_STOP)
 
     def close(self) -> None:
-        """See `Link`. The connection stays open: a thread may be reading it, and must see its end."""
+        """See `Link`. The connection stays open: a thread may be reading it, and must see its
+        end."""
         with self._changing:
             if self._process is None:
                 return
@@ -91,7 +92,8 @@ class ProcessLink:
             raise self._lost_error() from error
 
     def _receive(self) -> tuple[bool, Any]:
-        """Return True while the job goes on, and what the worker sent; raise what the worker raised."""
+        """Return True while the job goes on, and what the worker sent; raise what the worker
+        raised."""
         assert self._connection is not None
         try:
             message = self._connection.recv()
@@ -108,7 +110,8 @@ class ProcessLink:
 
 
 def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
-    """Run a worker's process: create the worker that it is sent, and do jobs until the driver is gone."""
+    """Run a worker's process: create the worker that it is sent, and do jobs until the driver is
+    gone."""
     signal.signal(
         signal.SIGINT, signal.SIG_IGN
     )  # a terminal sends Ctrl-C to all processes; the driver decides
@@ -160,7 +163,8 @@ def _send(connection: "Connection[Any, Any]", message: Any) -> None:
 
 
 def _end_with_driver() -> None:
-    """End this process with its driver: a killed driver sends nothing, and its worker would go on for nobody."""
+    """End this process with its driver: a killed driver sends nothing, and its worker would go on
+    for nobody."""
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])

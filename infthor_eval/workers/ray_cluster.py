@@ -16,7 +16,8 @@ _CLOSE_WAIT_S = 5.0  # for an actor to release its resources
 def ray_actors(open_worker: OpenWorker, address: str, gpus_per_worker: float | None) -> Connect:
     """Return links to actors of a cluster.
 
-    The package must be installed on every node, and the folders of data and results must be the same on all of them.
+    The package must be installed on every node, and the folders of data and results must be the
+    same on all of them.
 
     Args:
         open_worker: creates a worker.

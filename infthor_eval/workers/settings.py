@@ -14,8 +14,10 @@ class WorkerSettings:
 
     Attributes:
         workers: number of workers; 1 without a cluster is this process itself.
-        ray_address: address of a Ray cluster ("auto" for this machine's); None for processes of this machine.
-        gpus_per_worker: GPUs that Ray reserves for each worker; None for one if the cluster has any.
+        ray_address: address of a Ray cluster ("auto" for this machine's); None for processes of
+            this machine.
+        gpus_per_worker: GPUs that Ray reserves for each worker; None for one if the cluster has
+            any.
     """
 
     workers: int = 1

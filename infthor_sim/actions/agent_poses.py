@@ -23,10 +23,12 @@ def get_reachable_positions(
     directionsRelativeAgent: bool = False,
     gridSize: float | None = None,
 ) -> list[dict[str, float]]:
-    """Return positions that the agent can reach by steps of `gridSize` along the axes, or along its own.
+    """Return positions that the agent can reach by steps of `gridSize` along the axes, or along its
+    own.
 
     Raises:
-        ActionError: the grid is too fine, or there are more than `maxStepCount` positions per square metre of a step.
+        ActionError: the grid is too fine, or there are more than `maxStepCount` positions per
+            square metre of a step.
     """
     step = sim.settings.grid_size if gridSize is None else gridSize
     if step < _FINEST:
@@ -50,7 +52,8 @@ def get_interactable_poses(
     maxDistance: float | None = None,
     maxPoses: int = 2**31 - 1,
 ) -> list[dict[str, Any]]:
-    """Return poses, as TeleportFull takes them, from which the agent sees an object within its reach."""
+    """Return poses, as TeleportFull takes them, from which the agent sees an object within its
+    reach."""
     if maxPoses <= 0:
         raise ActionError("maxPoses must be greater than 0")
     item = sim.world.get(objectId)
@@ -70,7 +73,8 @@ def _seeing_poses(
     item: SimObject,
     poses: Iterable[tuple[Mapping[str, float], float, float, bool]],
 ) -> Iterator[dict[str, Any]]:
-    """Yield those of some poses (position, horizon, rotation, standing) from which the agent sees an object."""
+    """Yield those of some poses (position, horizon, rotation, standing) from which the agent sees
+    an object."""
     probe = sim.vision.probe(item)
     for position, tilt, turn, standing in poses:
         if sim.vision.sees_from(

@@ -79,12 +79,14 @@ def randomize_lighting(
     hue: list[float] | None = None,
     saturation: list[float] | None = None,
 ) -> None:
-    """Draw the brightness of the daylight and its colour from ranges; there is one light, so none to synchronize."""
+    """Draw the brightness of the daylight and its colour from ranges; there is one light, so none
+    to synchronize."""
     if not randomizeColor and (hue is not None or saturation is not None):
         raise ActionError(
             "Cannot pass in randomizeColor=False while also providing hue or saturation."
         )
-    # All three are drawn whatever is used, so that the draws after this action do not depend on `randomizeColor`.
+    # All three are drawn whatever is used, so that the draws after this action do not depend on
+    # `randomizeColor`.
     factor = _draw(sim, "brightness", brightness or [0.5, 1.5], 100.0)
     tone = _draw(sim, "hue", hue or [0.0, 1.0], 1.0)
     depth = _draw(sim, "saturation", saturation or [0.5, 1.0], 1.0)
@@ -137,7 +139,8 @@ def _material_sets(
 
 
 def _split(scene: str) -> str:
-    """Return AI2-THOR's split of a scene: of 30 rooms of a type, 20 to train, 5 to validate, 5 to test."""
+    """Return AI2-THOR's split of a scene: of 30 rooms of a type, 20 to train, 5 to validate, 5 to
+    test."""
     ithor = _ITHOR.fullmatch(scene)
     if ithor is None:
         return (

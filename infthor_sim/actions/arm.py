@@ -71,22 +71,25 @@ def _reach(
     restricted: bool,
     return_to_start: bool,
 ) -> None:
-    """Move the wrist straight towards a point (3,) of the world; beyond its reach the arm is stretched out towards it.
+    """Move the wrist straight towards a point (3,) of the world; beyond its reach the arm is
+    stretched out towards it.
 
-    `requested` is that point as the message names it, and its space; `restricted` refuses points that are behind the
-    shoulder or out of reach.
+    `requested` is that point as the message names it, and its space; `restricted` refuses points
+    that are behind the shoulder or out of reach.
     """
     base = arm.base(sim.world.agent)
     target = base.local(point)
     if restricted and not arm.rig.allows(target):
         place, space = requested
         raise ActionError(
-            f"Invalid target: Position '{position_text(place)}' in space '{space}' is behind shoulder."
+            f"Invalid target: Position '{position_text(place)}' in space '{space}' is behind "
+            "shoulder."
         )
     start = arm.pose.wrist
     distance = float(np.linalg.norm(target - start))
     ahead = (target - start) / max(distance, 1e-9)
-    # The target itself ends the path, and not start + distance * ahead, which differs from it by rounding.
+    # The target itself ends the path, and not start + distance * ahead, which differs from it by
+    # rounding.
     targets = np.vstack([start + ahead * path_distances(distance)[:-1, None], target])
     poses = arm.rig.reach([arm.pose] * len(targets), targets)
     _bend(sim, arm, poses, position_text(point), return_to_start)
@@ -161,7 +164,8 @@ def rotate_wrist_relative(
     returnToStart: bool = True,
     disableRendering: bool = True,
 ) -> None:
-    """Turn the wrist about its own axes, degrees, the shortest way; the stretch robot's about the vertical alone."""
+    """Turn the wrist about its own axes, degrees, the shortest way; the stretch robot's about the
+    vertical alone."""
     if sim.settings.agent_mode == "stretch" and (pitch or roll):
         raise ActionError("Pitch and roll are not supported for the stretch agent.")
     arm = agent_arm(sim)
@@ -186,7 +190,8 @@ def rotate_wrist_around_held_object(
     held = list(agent_arm(sim).held)
     if len(held) != 1:
         raise ActionError(
-            f"Cannot RotateWristAroundHeldObject when holding != 1 objects, currently holding {len(held)} objects."
+            "Cannot RotateWristAroundHeldObject when holding != 1 objects, currently holding "
+            f"{len(held)} objects."
         )
     _turn_around(
         sim, sim.world.objects[held[0]].position, _wrist_turn(pitch, yaw, roll), returnToStart
@@ -209,7 +214,8 @@ def rotate_wrist_around_point(
 
 
 def _wrist_turn(pitch: float, yaw: float, roll: float) -> Array:
-    """Return the rotation (3, 3) of angles in degrees; Unity's roll is the reverse of its rotation about z."""
+    """Return the rotation (3, 3) of angles in degrees; Unity's roll is the reverse of its rotation
+    about z."""
     return euler_matrix((pitch, yaw, -roll))
 
 
@@ -278,7 +284,8 @@ def pick_up_in_sphere(
     forceAction: bool = False,
     manualInteract: bool = False,
 ) -> None:
-    """Hold everything within the hand's sphere that can be picked up, or those candidates that are."""
+    """Hold everything within the hand's sphere that can be picked up, or those candidates that
+    are."""
     given = "objectId" if objectId is not None else "x, y" if x is not None or y is not None else ""
     if given:
         raise ActionError(

@@ -1,4 +1,5 @@
-"""Moving the arm, or the agent with its arm, along a path; what stops it is reported in Unity's words."""
+"""Moving the arm, or the agent with its arm, along a path; what stops it is reported in Unity's
+words."""
 
 import math
 
@@ -17,7 +18,8 @@ Contact = tuple[int, str]  # index of a stance in a path, and id or name of what
 
 
 def agent_arm(sim: Simulation) -> Arm:
-    """Return the agent's arm; the actions that call this are only registered for modes that have one."""
+    """Return the agent's arm; the actions that call this are only registered for modes that have
+    one."""
     assert sim.world.arm is not None
     return sim.world.arm
 
@@ -62,7 +64,10 @@ def follow(
 def _collision_text(sim: Simulation, name: str, target: str) -> str:
     item = sim.world.objects.get(name)
     if item is None and not any(o.name == name for o in sim.world.objects.values()):
-        return f"Collided with static structure in scene: '{name}', could not reach target: '{target}'."
+        return (
+            f"Collided with static structure in scene: '{name}', could not reach target: "
+            f"'{target}'."
+        )
     shown = name if item is None else item.name
     return f"Collided with static sim object: '{shown}', could not reach target: '{target}'."
 
@@ -75,7 +80,8 @@ def position_text(point: Array) -> str:
 def quaternion_text(turn: Array) -> str:
     """Return a rotation (3, 3) as Unity prints its quaternion."""
     w = math.sqrt(max(1.0 + float(np.trace(turn)), 0.0)) / 2
-    # The diagonal gives the components' sizes, also near half a turn, where w is 0; the skew part gives their signs.
+    # The diagonal gives the components' sizes, also near half a turn, where w is 0; the skew part
+    # gives their signs.
     squares = np.maximum(1.0 + 2.0 * np.diag(turn) - np.trace(turn), 0.0)
     skew = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     x, y, z = np.sqrt(squares) / 2 * np.where(skew < 0, -1.0, 1.0)

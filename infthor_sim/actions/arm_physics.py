@@ -1,5 +1,6 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Actions of ManipulaTHOR scripts that control physics. Nothing moves between actions here, so most do nothing."""
+"""Actions of ManipulaTHOR scripts that control physics. Nothing moves between actions here, so most
+do nothing."""
 
 from infthor_sim.actions.registry import action
 from infthor_sim.errors import ActionError
@@ -24,7 +25,8 @@ def advance_physics(
     """Check the step and do nothing: a released object has fallen already."""
     if not 0 < timeStep <= _LONGEST:
         raise ActionError(
-            "Please use a timeStep between 0.0 and 0.05. Larger timeSteps produce inconsistent simulation results."
+            "Please use a timeStep between 0.0 and 0.05. Larger timeSteps produce inconsistent "
+            "simulation results."
         )
 
 

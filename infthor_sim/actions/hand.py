@@ -75,7 +75,8 @@ def rotate_held_object(
     roll: float = 0.0,
     rotation: Vector3 | None = None,
 ) -> None:
-    """Turn the hand, with what it holds, by angles about the hand's own axes, or to a rotation relative to the camera.
+    """Turn the hand, with what it holds, by angles about the hand's own axes, or to a rotation
+    relative to the camera.
 
     The axes are the hand's and not the object's: an object that lies in the hand stays lying in it.
     """
@@ -89,7 +90,8 @@ def rotate_held_object(
 
 
 def _move_held(sim: Simulation, step: Array, force_visible: bool) -> None:
-    """Move the held object by `step` (right, up, ahead), unless it would leave reach or view, or go into something."""
+    """Move the held object by `step` (right, up, ahead), unless it would leave reach or view, or go
+    into something."""
     held = held_object(sim, "Agent can only move hand if holding an item")
     world = sim.world
     offset = world.agent.camera_matrix() @ step
@@ -98,7 +100,8 @@ def _move_held(sim: Simulation, step: Array, force_visible: bool) -> None:
         > sim.settings.visibility_distance
     ):
         raise ActionError(
-            "The target position is out of range- object cannot move outside of max visibility distance."
+            "The target position is out of range- object cannot move outside of max visibility "
+            "distance."
         )
     if not force_visible and not sim.vision.in_frame((held.center + offset)[None])[0]:
         raise ActionError("The target position is not in the Agent's Viewport!")

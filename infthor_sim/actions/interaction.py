@@ -14,8 +14,8 @@ from infthor_sim.physics.receptacles import drawer_offset
 from infthor_sim.physics.unfolding import unfold
 from infthor_sim.simulation import Simulation
 
-# Overlaps of boxes that `forceAction` tolerates in a full receptacle of a recording, smallest first: recorded boxes are
-# coarse. Where things are drawn to the box, an overlap would show.
+# Overlaps of boxes that `forceAction` tolerates in a full receptacle of a recording, smallest
+# first: recorded boxes are coarse. Where things are drawn to the box, an overlap would show.
 _CROWDED = (0.12, 0.24, 0.35)
 
 
@@ -37,7 +37,8 @@ def pick_up(
         )
     if sim.world.held is not None:
         raise ActionError(
-            f"Agent hand has something in it already! Can't pick up anything else. Holding {sim.world.held}.",
+            "Agent hand has something in it already! Can't pick up anything else. Holding "
+            f"{sim.world.held}.",
             ErrorCode.INVENTORY_FULL,
         )
     world = sim.world
@@ -74,9 +75,11 @@ def put(
 def _find_place(
     sim: Simulation, held: SimObject, target: SimObject, force: bool
 ) -> SimObject | None:
-    """Return the held object at the best free place; a forced put squeezes in where it is crowded."""
-    # Best first: without overlap, clear of fixed things, in view. Recorded boxes of fixed things are too large, so a
-    # place within one is better than none; Unity, which has the meshes, would find room there.
+    """Return the held object at the best free place; a forced put squeezes in where it is
+    crowded."""
+    # Best first: without overlap, clear of fixed things, in view. Recorded boxes of fixed things
+    # are too large, so a place within one is better than none; Unity, which has the meshes, would
+    # find room there.
     for overlap in (0.0, *_CROWDED) if force and sim.world.coarse else (0.0,):
         for among_fixed in (False, True):
             for point_filter in (sim.vision.in_frame, None):
@@ -97,7 +100,8 @@ def _check_receptacle(held: SimObject, target: SimObject) -> None:
     if not target.type.receptacle:
         raise ActionError(f"This target object is NOT a receptacle! {target.object_id}")
     if target.type.encloses and target.type.openable and target.state.openness == 0:
-        raise ActionError("Target openable Receptacle is CLOSED, can't place if target is not open!",
+        raise ActionError("Target openable Receptacle is CLOSED, can't place if target is not "
+                          "open!",
                           ErrorCode.RECEPTACLE_CLOSED)  # fmt: skip
     if not allowed_in(held.object_type, target.object_type):
         raise ActionError(

@@ -34,7 +34,8 @@ def _move(
     returnToStart: bool = True,
     disableRendering: bool = True,
 ) -> None:
-    """Walk, keeping within `maxAgentsDistance` metres of the object `objectId` if both are given."""
+    """Walk, keeping within `maxAgentsDistance` metres of the object `objectId` if both are
+    given."""
     size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
     if size <= 0:
         raise ActionError("moveMagnitude must be > 0")
@@ -46,7 +47,8 @@ def _move(
         sim.settings.snap_to_grid
         and abs(size / sim.settings.grid_size - round(size / sim.settings.grid_size)) < 1e-6
     ):
-        # Rounding takes off the noise of sine and cosine, which would add up over a long walk on the grid.
+        # Rounding takes off the noise of sine and cosine, which would add up over a long walk on
+        # the grid.
         target = np.array(
             [round(float(target[0]), 5), float(target[1]), round(float(target[2]), 5)]
         )

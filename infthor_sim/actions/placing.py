@@ -1,5 +1,6 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Putting objects anywhere, disabling and enabling them, and the points of a receptacle's surfaces."""
+"""Putting objects anywhere, disabling and enabling them, and the points of a receptacle's
+surfaces."""
 
 import numpy as np
 
@@ -34,7 +35,8 @@ def teleport_object(
 ) -> None:
     """Give an object a pose, the first of several positions at which there is room; then it falls.
 
-    With `forceAction` it goes where there is no room too, with `forceKinematic` it stays in the air.
+    With `forceAction` it goes where there is no room too, with `forceKinematic` it stays in the
+    air.
     """
     world, item = sim.world, sim.world.get(objectId)
     if item.object_id in world.held_ids() and not allowTeleportOutOfHand:
@@ -76,7 +78,8 @@ def place_object_at_point(
 def get_spawn_coordinates(
     sim: Simulation, objectId: str, anywhere: bool = True
 ) -> list[dict[str, float]]:
-    """Return points on a receptacle's surfaces, all of them or those that the agent sees within its reach."""
+    """Return points on a receptacle's surfaces, all of them or those that the agent sees within its
+    reach."""
     receptacle = sim.world.get(objectId)
     if not receptacle.type.receptacle:
         raise ActionError(f"{objectId} is not a receptacle")
@@ -112,7 +115,8 @@ def enable_object(sim: Simulation, objectId: str) -> None:
 def _first_free(
     world: World, item: SimObject, positions: list[Vector3], turn: Array, force: bool
 ) -> SimObject:
-    """Return a copy of an object at the first of some positions with room; at the very first if forced.
+    """Return a copy of an object at the first of some positions with room; at the very first if
+    forced.
 
     Raises:
         ActionError: there is room at none.
@@ -125,7 +129,8 @@ def _first_free(
         if obstacle is None:
             return pose
     raise ActionError(
-        f"{obstacle} is in the way of {item.object_id}; pass forceAction to put it there nevertheless"
+        f"{obstacle} is in the way of {item.object_id}; pass forceAction to put it there "
+        "nevertheless"
     )
 
 

@@ -1,4 +1,5 @@
-"""Pushing and pulling loose things: each slides until friction stops it, something is in its way, or it falls."""
+"""Pushing and pulling loose things: each slides until friction stops it, something is in its way,
+or it falls."""
 
 from functools import partial
 
@@ -54,7 +55,8 @@ def directional_push(
     if moveMagnitude <= 0:
         raise ActionError(f"moveMagnitude must be > 0, not {moveMagnitude}")
     direction: Array = yaw_matrix(sim.world.agent.yaw + pushAngle)[:, 2]
-    # The force acts for one frame; the speed it gives is then lost to friction: v^2 = 2 * friction * g * distance.
+    # The force acts for one frame; the speed it gives is then lost to friction: v^2 = 2 * friction
+    # * g * distance.
     speed = moveMagnitude * _FRAME / max(target.type.mass, LIGHTEST)
     slide(sim.world, target, direction, float(np.square(speed) / (2 * _FRICTION * _GRAVITY)))
     sim.world.mark_changed()

@@ -17,10 +17,13 @@ from infthor_sim.simulation import Simulation
 
 __all__ = ["Action", "Vector3", "action", "action_names", "bind", "is_vector"]
 
-# The client adds these to messages of any action; Unity reads them before it looks for the action's own arguments.
+# The client adds these to messages of any action; Unity reads them before it looks for the action's
+# own arguments.
 _MESSAGE_KEYS = frozenset(
-    "action sequenceId agentId renderImage renderDepthImage renderClassImage renderObjectImage renderNormalsImage"
-    " renderFlowImage renderSemanticSegmentation renderInstanceSegmentation visibilityDistance fixedDeltaTime"
+    "action sequenceId agentId renderImage renderDepthImage renderClassImage renderObjectImage "
+    "renderNormalsImage"
+    " renderFlowImage renderSemanticSegmentation renderInstanceSegmentation visibilityDistance "
+    "fixedDeltaTime"
     " physicsSimulationParams".split()
 )
 _LARGEST = 1e9  # of a number; squares of larger ones would overflow in the geometry
@@ -37,10 +40,13 @@ class Action:
     Attributes:
         name: name on the wire.
         run: function that takes the simulation and the wire's arguments by name.
-        parameters: parameters of `run` without the simulation; their annotations are the accepted types.
+        parameters: parameters of `run` without the simulation; their annotations are the accepted
+            types.
         query: it changes nothing that is seen, so the client keeps its last frame.
-        lenient: unknown arguments are ignored, as in the actions that take Unity's whole ServerAction.
-        forms: alternative sets of required arguments, for actions that Unity overloads; empty for a single form.
+        lenient: unknown arguments are ignored, as in the actions that take Unity's whole
+            ServerAction.
+        forms: alternative sets of required arguments, for actions that Unity overloads; empty for a
+            single form.
     """
 
     name: str
@@ -68,8 +74,9 @@ def action(
         for name in names:
             new = Action(name, run, parameters, query, lenient, forms)
             for mode in modes:
-                # Unity's arm agents descend from the default one and override some of its actions. An action of
-                # some modes wins over one of all modes, whichever module is imported first.
+                # Unity's arm agents descend from the default one and override some of its actions.
+                # An action of some modes wins over one of all modes, whichever module is imported
+                # first.
                 if modes == AGENT_MODES:
                     _ACTIONS[mode].setdefault(name, new)
                 else:
@@ -99,7 +106,8 @@ def bind(message: Mapping[str, Any], mode: str = "default") -> tuple[Action, dic
         for key, value in message.items()
         if key not in _MESSAGE_KEYS or key in called.parameters
     }
-    # Of several forms the one is meant that most of the given arguments belong to; the first if they tie.
+    # Of several forms the one is meant that most of the given arguments belong to; the first if
+    # they tie.
     form = max(
         called.forms, key=lambda form: sum(given.get(key) is not None for key in form), default=()
     )
@@ -131,18 +139,20 @@ def _check_type(called: Action, key: str, value: Any) -> None:
     """Refuse an argument of the wrong type.
 
     Raises:
-        ActionError: with a code only where Unity has one, as the client raises ValueError by the code.
+        ActionError: with a code only where Unity has one, as the client raises ValueError by the
+            code.
     """
     annotation = called.parameters[key].annotation
     if _matches(value, annotation):
         return
     expected, given = type_name(annotation), value if isinstance(value, str) else json.dumps(value)
-    # Unity's dispatcher converts scalars itself and reports a code. A scalar in place of a vector or list fails
-    # earlier, in its JSON parser, without a code.
+    # Unity's dispatcher converts scalars itself and reports a code. A scalar in place of a vector
+    # or list fails earlier, in its JSON parser, without a code.
     if _is_structured(annotation) and not isinstance(value, dict | list):
         raise ActionError(f"Error converting value {given} to type '{expected}'. Path '{key}'.")
     raise ActionError(
-        f"action: {called.name} has an invalid argument: {key} (=={given}). Cannot convert to: {expected}",
+        f"action: {called.name} has an invalid argument: {key} (=={given}). Cannot convert to: "
+        f"{expected}",
         ErrorCode.INVALID_ARGUMENT,
     )
 
@@ -156,7 +166,8 @@ def _is_structured(annotation: Any) -> bool:
 
 
 def _matches(value: Any, annotation: Any) -> bool:
-    """Return whether a JSON value is of a parameter's type; stricter than Unity: "1" is no number, 1 no boolean."""
+    """Return whether a JSON value is of a parameter's type; stricter than Unity: "1" is no number,
+    1 no boolean."""
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if annotation is Any or annotation is types.NoneType:
         return annotation is Any or value is None
@@ -181,5 +192,6 @@ def is_vector(value: Any) -> TypeGuard[dict[str, float]]:
 
 
 def _is_number(value: Any) -> bool:
-    """Return whether a value is a finite number of usable size; JSON as Python reads it has NaN and infinities."""
+    """Return whether a value is a finite number of usable size; JSON as Python reads it has NaN and
+    infinities."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST

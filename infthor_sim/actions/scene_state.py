@@ -1,5 +1,6 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Setting a scene to a recorded or random state: poses, toggles, states of objects, random placement."""
+"""Setting a scene to a recorded or random state: poses, toggles, states of objects, random
+placement."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -24,10 +25,12 @@ def set_object_poses(
     forceRigidbodySleep: bool = True,
     skipMoveable: bool = False,
 ) -> None:
-    """Place the listed objects by name; a name listed twice is copied, pickupable objects not listed vanish."""
+    """Place the listed objects by name; a name listed twice is copied, pickupable objects not
+    listed vanish."""
     if len(objectPoses) > OBJECT_POSES.value:
         raise ActionError(
-            f"objectPoses has {len(objectPoses):,} entries, too many for a scene; {OBJECT_POSES.hint}"
+            f"objectPoses has {len(objectPoses):,} entries, too many for a scene; "
+            f"{OBJECT_POSES.hint}"
         )
     set_poses(sim.world, [_named_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
 
@@ -102,7 +105,8 @@ _ALL_AT_ONCE = {  # by `StateChange` of SetStateOfAllObjects
 
 @action("SetStateOfAllObjects")
 def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
-    """Make every capable object dirty, filled or used up with `forceAction`; clean, empty or unused without it."""
+    """Make every capable object dirty, filled or used up with `forceAction`; clean, empty or unused
+    without it."""
     change = _ALL_AT_ONCE.get(StateChange)
     if change is None:
         raise ActionError(
@@ -115,8 +119,9 @@ def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: boo
 def set_object_states(sim: Simulation, SetObjectStates: Mapping[str, Any]) -> None:
     """Set one state of all objects of a type, or of all at once.
 
-    `SetObjectStates` holds `objectType` (or none for all), `stateChange` and the new value under its own name
-    (`isOpen`, `isToggled`, `isDirty`, `isBroken`, `isFilledWithLiquid`, `isUsedUp`, `isCooked`).
+    `SetObjectStates` holds `objectType` (or none for all), `stateChange` and the new value under
+    its own name (`isOpen`, `isToggled`, `isDirty`, `isBroken`, `isFilledWithLiquid`, `isUsedUp`,
+    `isCooked`).
     """
     name = str(SetObjectStates.get("stateChange", ""))
     change = _CHANGES.get(name)

@@ -43,13 +43,16 @@ def initialize(
     agentCount: int = 1,
     massThreshold: float | None = None,
 ) -> dict[str, float]:
-    """Set up the agent; arguments that only Unity knows are ignored, as Unity ignores unknown ones here."""
-    # The client does not look at the reply to Reset, but raises on the reply to Initialize that it sends next.
+    """Set up the agent; arguments that only Unity knows are ignored, as Unity ignores unknown ones
+    here."""
+    # The client does not look at the reply to Reset, but raises on the reply to Initialize that it
+    # sends next.
     if sim.failed_reset:
         raise ActionError(sim.failed_reset)
     if agentMode.lower() not in AGENT_MODES:
         raise ActionError(
-            f"agentMode {agentMode!r} is not offered by the embedded simulator; use one of {', '.join(AGENT_MODES)}"
+            f"agentMode {agentMode!r} is not offered by the embedded simulator; use one of "
+            f"{', '.join(AGENT_MODES)}"
         )
     _check(agentCount == 1, f"agentCount must be 1, not {agentCount}")
     _check(gridSize > 0, f"gridSize must be positive, not {gridSize}")

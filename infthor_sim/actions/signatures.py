@@ -1,4 +1,5 @@
-"""The words of messages about wrong arguments: parameters by the names and types that Unity prints."""
+"""The words of messages about wrong arguments: parameters by the names and types that Unity
+prints."""
 
 import inspect
 import types
@@ -26,7 +27,8 @@ def type_name(annotation: Any) -> str:
 def unknown_arguments_text(
     name: str, unknown: Sequence[str], parameters: Mapping[str, inspect.Parameter], given: Any
 ) -> str:
-    """Return Unity's message about arguments that an action does not take, with those that it does."""
+    """Return Unity's message about arguments that an action does not take, with those that it
+    does."""
     plural = "s" if len(unknown) > 1 else ""
     expected = ", ".join(_parameter_text(parameter) for parameter in parameters.values())
     return (

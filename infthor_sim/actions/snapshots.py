@@ -1,4 +1,5 @@
-"""Saving and restoring the scene's state, which Unity cannot: generation undoes failed subtasks without a replay."""
+"""Saving and restoring the scene's state, which Unity cannot: generation undoes failed subtasks
+without a replay."""
 
 from infthor_sim.actions.registry import action
 from infthor_sim.errors import ActionError

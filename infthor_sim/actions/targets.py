@@ -1,4 +1,5 @@
-"""The object that an action names by its id or by a pixel, resolved as AI2-THOR's default agent does."""
+"""The object that an action names by its id or by a pixel, resolved as AI2-THOR's default agent
+does."""
 
 from collections.abc import Callable
 
@@ -44,7 +45,8 @@ def object_action(*names: str) -> Callable[[ObjectFunction], ObjectFunction]:
 def interactable(
     sim: Simulation, object_id: str | None, force: bool, x: float | None, y: float | None
 ) -> SimObject:
-    """Return the object with this id, or the one shown at (x, y), shares of the frame from its top left.
+    """Return the object with this id, or the one shown at (x, y), shares of the frame from its top
+    left.
 
     Raises:
         ActionError: there is no such object, or the agent does not see it within reach.
@@ -89,7 +91,8 @@ def check_in_frame(x: float, y: float) -> None:
 
 
 def object_at(sim: Simulation, x: float, y: float) -> str | None:
-    """Return the id of the object shown at (x, y), shares of the frame from its top left; None for walls and the void.
+    """Return the id of the object shown at (x, y), shares of the frame from its top left; None for
+    walls and the void.
 
     Raises:
         ActionError: the point is outside the frame.
@@ -97,7 +100,8 @@ def object_at(sim: Simulation, x: float, y: float) -> str | None:
     check_in_frame(x, y)
     picture = sim.views.agent_view()
     height, width = picture.instances.shape
-    # Pictures are stored with the bottom row first, as the wire wants them; the action counts from the top.
+    # Pictures are stored with the bottom row first, as the wire wants them; the action counts from
+    # the top.
     index = picture.instances[
         min(int((1 - y) * height), height - 1), min(int(x * width), width - 1)
     ]

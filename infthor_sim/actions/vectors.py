@@ -4,4 +4,5 @@ __all__ = ["Vector3"]
 
 
 class Vector3(dict[str, float]):
-    """Annotates arguments that are a position (metres) or rotation (degrees): `{"x", "y", "z"}`, any of them absent."""
+    """Annotates arguments that are a position (metres) or rotation (degrees): `{"x", "y", "z"}`,
+    any of them absent."""

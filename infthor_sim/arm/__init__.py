@@ -1,1 +1,2 @@
-"""The robot arms of agent modes `arm` (ManipulaTHOR) and `stretch`: geometry, collisions, and what they hold."""
+"""The robot arms of agent modes `arm` (ManipulaTHOR) and `stretch`: geometry, collisions, and what
+they hold."""

@@ -47,7 +47,8 @@ def base_transforms(
         yaws: directions of the agent, degrees (n,).
         poses: poses of the arm (n).
     """
-    # All stances of a path at once: a path has up to thousands, and numpy's calls would take longer than the sums.
+    # All stances of a path at once: a path has up to thousands, and numpy's calls would take longer
+    # than the sums.
     offsets = np.stack([rig.origin(pose) for pose in poses])[:, :, None]
     return positions + (_upright(yaws) @ offsets)[:, :, 0], _upright(yaws + rig.heading)
 
@@ -103,7 +104,8 @@ class Arm:
         self.version += 1
 
     def grips(self) -> Iterator[tuple[str, Grip]]:
-        """Yield ids and poses in the wrist's frame of all that moves with the hand: held objects, then contents."""
+        """Yield ids and poses in the wrist's frame of all that moves with the hand: held objects,
+        then contents."""
         yield from self.held.items()
         yield from self.held_contents.items()
 

@@ -49,7 +49,8 @@ class Boxes:
         """Return the boxes (k, n) in the world, from a local frame with k poses.
 
         Args:
-            origins: positions of the frame, metres (k, 3): one for each group, or many for a single group.
+            origins: positions of the frame, metres (k, 3): one for each group, or many for a single
+                group.
             frames: rotations of the frame (k, 3, 3).
         """
         back = frames.transpose(0, 2, 1)
@@ -58,17 +59,19 @@ class Boxes:
 
 
 def join(parts: Sequence[Boxes], axis: int = 0) -> Boxes:
-    """Return all boxes of some collections, in order; with `axis` 1, join their groups one by one."""
+    """Return all boxes of some collections, in order; with `axis` 1, join their groups one by
+    one."""
     return Boxes(
         *(np.concatenate([getattr(p, f.name) for p in parts], axis=axis) for f in fields(Boxes))
     )
 
 
 def separations(first: Boxes, second: Boxes) -> Array:
-    """Return gaps (n, m) in metres between n boxes and m others, without groups; negative: depth of the overlap.
+    """Return gaps (n, m) in metres between n boxes and m others, without groups; negative: depth of
+    the overlap.
 
-    A gap is measured along the best separating direction. It is at most the true distance, and negative exactly where
-    the boxes overlap. Pairs that are far apart have infinity.
+    A gap is measured along the best separating direction. It is at most the true distance, and
+    negative exactly where the boxes overlap. Pairs that are far apart have infinity.
     """
     # Spheres around the boxes sort out most pairs cheaply.
     gaps = np.full((len(first.center), len(second.center)), np.inf)
@@ -82,9 +85,11 @@ def separations(first: Boxes, second: Boxes) -> Array:
 
 
 def _pair_gaps(a: Boxes, b: Boxes) -> Array:
-    """Return gaps (k,) between the boxes of two collections, pair by pair, by the separating axis theorem."""
-    # Two boxes are apart exactly if they are along one of 15 directions: the 3 + 3 axes of the boxes, and the cross
-    # products of each pair of them. `cosines` holds the dot products of the axes, from which all projections follow.
+    """Return gaps (k,) between the boxes of two collections, pair by pair, by the separating axis
+    theorem."""
+    # Two boxes are apart exactly if they are along one of 15 directions: the 3 + 3 axes of the
+    # boxes, and the cross products of each pair of them. `cosines` holds the dot products of the
+    # axes, from which all projections follow.
     cosines = a.axes @ b.axes.transpose(0, 2, 1)
     size = np.abs(cosines)
     between = b.center - a.center
@@ -99,8 +104,9 @@ def _pair_gaps(a: Boxes, b: Boxes) -> Array:
     reach_b = (
         b.half[:, None, _NEXT] * size[:, :, _LAST] + b.half[:, None, _LAST] * size[:, :, _NEXT]
     )
-    # Cross products have the length of the sine, by which gaps along them are divided. Nearly parallel edges are left
-    # out: the division would blow up rounding, and the axes themselves suffice then.
+    # Cross products have the length of the sine, by which gaps along them are divided. Nearly
+    # parallel edges are left out: the division would blow up rounding, and the axes themselves
+    # suffice then.
     sine = np.sqrt(np.maximum(1.0 - cosines**2, 0.0))
     edges = np.where(
         sine > _PARALLEL, (away - reach_a - reach_b) / np.maximum(sine, _PARALLEL), -np.inf

@@ -16,7 +16,8 @@ __all__ = ["TouchedObjects", "drop_all", "pick_up", "touched_objects"]
 
 
 class TouchedObjects(NamedTuple):
-    """Objects that the hand's sphere touches and the arm does not hold, in the order of the metadata.
+    """Objects that the hand's sphere touches and the arm does not hold, in the order of the
+    metadata.
 
     Attributes:
         pickupable: objects that can be picked up.
@@ -87,8 +88,8 @@ def drop_all(world: World, arm: Arm) -> None:
 
 def _level_rotation(matrix: Array) -> Array:
     """Return the rotation (3, 3) nearest to another in which one axis of the box is upright."""
-    # The axis nearest to the vertical is turned onto it the shortest way, about the level axis at right angles to both
-    # (Rodrigues' formula with the sine in the axis' length).
+    # The axis nearest to the vertical is turned onto it the shortest way, about the level axis at
+    # right angles to both (Rodrigues' formula with the sine in the axis' length).
     axis = int(np.argmax(np.abs(matrix[1])))
     upright = matrix[:, axis] * np.sign(matrix[1, axis])
     about = np.cross(upright, (0.0, 1.0, 0.0))

@@ -1,8 +1,10 @@
-"""ManipulaTHOR's arm: a base that moves up and down, three links of equal length, and a wrist that turns freely.
+"""ManipulaTHOR's arm: a base that moves up and down, three links of equal length, and a wrist that
+turns freely.
 
-From Unity: the reach (0.6335 m from the shoulder, 0.6325 m where restricted), the heights of the base, the resting pose
-and the order of joints. The length of a link follows: Unity's solver uses the links interchangeably, and two of them
-make the reach. Ours: the thickness of the links, and that the elbow points up and to the right while `elbow` is 0.
+From Unity: the reach (0.6335 m from the shoulder, 0.6325 m where restricted), the heights of the
+base, the resting pose and the order of joints. The length of a link follows: Unity's solver uses
+the links interchangeably, and two of them make the reach. Ours: the thickness of the links, and
+that the elbow points up and to the right while `elbow` is 0.
 """
 
 from collections.abc import Sequence
@@ -27,12 +29,14 @@ _LIFTS = (
 )  # of Unity's agent capsule: a quarter of its height below its middle, and its top; metres
 _THICK = (0.04, 0.035, 0.03)  # half thickness of the links from the base to the wrist, metres
 PALM = ((0.0, 0.0, -0.015), (0.04, 0.028, 0.025))  # middle and half extents in the wrist's frame
-FINGERS = 0.05  # metres that the fingers reach ahead of the wrist; they do not collide, as they close around things
+# metres that the fingers reach ahead of the wrist; they do not collide, as they close around things
+FINGERS = 0.05
 _UP: Array = np.array([0.0, 1.0, 0.0])
 _RIGHT: Array = np.array([1.0, 0.0, 0.0])
 _AHEAD: Array = np.array([0.0, 0.0, 1.0])
 _LEVEL: Array = np.eye(3)
-_LEAN = 50.0  # degrees of the elbow from up to the right: a forearm above the hand would hide it from the camera
+# degrees of the elbow from up to the right: a forearm above the hand would hide it from the camera
+_LEAN = 50.0
 _AT_SHOULDER = 1e-9  # metres from the shoulder below which the direction to the wrist is undefined
 _UPRIGHT = (
     1e-6  # sine of the angle from the vertical below which the line to the wrist counts as vertical
@@ -40,20 +44,24 @@ _UPRIGHT = (
 
 
 def inverse(targets: Array, elbows: Array) -> Array:
-    """Return rotations (n, 2, 3, 3) of shoulder and elbow that bring the wrist to targets, or as near as it gets.
+    """Return rotations (n, 2, 3, 3) of shoulder and elbow that bring the wrist to targets, or as
+    near as it gets.
 
     Args:
         targets: targets in the frame of the base, metres (n, 3).
-        elbows: angles of the elbow about the line from shoulder to wrist, degrees (n,); 0: up and to the right.
+        elbows: angles of the elbow about the line from shoulder to wrist, degrees (n,); 0: up and
+            to the right.
     """
-    # Shoulder, elbow and wrist make an isosceles triangle with two sides of LINK. Its base lies on the line to the
-    # target (`ahead`); the elbow is above its middle in the direction `out`, which the elbow's angle turns about it.
+    # Shoulder, elbow and wrist make an isosceles triangle with two sides of LINK. Its base lies on
+    # the line to the target (`ahead`); the elbow is above its middle in the direction `out`, which
+    # the elbow's angle turns about it.
     lines = targets - SHOULDER
     distances = np.linalg.norm(lines, axis=1, keepdims=True)
     ahead = np.where(distances > _AT_SHOULDER, lines / np.maximum(distances, _AT_SHOULDER), _AHEAD)
     aside = cross(np.broadcast_to(_UP, ahead.shape), ahead)
     upright = np.linalg.norm(aside, axis=1, keepdims=True) < _UPRIGHT
-    # A vertical line has no level right-hand side: the base's is taken, made perpendicular to the line.
+    # A vertical line has no level right-hand side: the base's is taken, made perpendicular to the
+    # line.
     aside = np.where(upright, _RIGHT - ahead * ahead[:, :1], aside)
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
     angles = np.radians(elbows - _LEAN)[:, None]
@@ -68,7 +76,8 @@ def inverse(targets: Array, elbows: Array) -> Array:
 
 
 def forward(turns: Array) -> Array:
-    """Return positions (n, 4, 3) of base, shoulder, elbow and wrist for rotations (n, 2, 3, 3) of the middle two."""
+    """Return positions (n, 4, 3) of base, shoulder, elbow and wrist for rotations (n, 2, 3, 3) of
+    the middle two."""
     elbows = SHOULDER + LINK * turns[:, 0, :, 2]
     shoulders = np.broadcast_to(SHOULDER, elbows.shape)
     return np.stack(
@@ -77,7 +86,8 @@ def forward(turns: Array) -> Array:
 
 
 def _look_rotations(ahead: Array, aside: Array) -> Array:
-    """Return rotations (n, 3, 3) with z `ahead` and x `aside`: unit vectors at right angles to each other."""
+    """Return rotations (n, 3, 3) with z `ahead` and x `aside`: unit vectors at right angles to each
+    other."""
     return np.stack([aside, cross(ahead, aside), ahead], axis=2)
 
 
@@ -112,7 +122,8 @@ class Kinova:
         return pose.base
 
     def reach(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
-        """Return poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as it gets."""
+        """Return poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as
+        it gets."""
         wrists = forward(inverse(targets, np.array([p.elbow for p in poses])))[:, 3]
         return [replace(pose, wrist=wrist) for pose, wrist in zip(poses, wrists, strict=True)]
 

@@ -1,7 +1,7 @@
 """Obstacles for an arm: the primitives that are drawn, as oriented boxes.
 
-Walls, floors and everything fixed count, and loose objects too heavy to be pushed aside. Other loose objects give way
-in Unity; here the arm passes through them.
+Walls, floors and everything fixed count, and loose objects too heavy to be pushed aside. Other
+loose objects give way in Unity; here the arm passes through them.
 """
 
 import numpy as np
@@ -60,7 +60,8 @@ def arm_obstacles(
         rows[:, AXES : AXES + 9].reshape(-1, 3, 3),
         rows[:, HALF : HALF + 3],
     )
-    # A round primitive stops the arm as its box does. A hollow one would fill its inside so, where the arm must go.
+    # A round primitive stops the arm as its box does. A hollow one would fill its inside so, where
+    # the arm must go.
     hollow = np.isin(rows[:, FORM], _HOLLOW)
     shells = _shells(boxes[hollow])
     owners = np.concatenate([owner[~hollow], np.repeat(owner[hollow], len(_SIDES))])

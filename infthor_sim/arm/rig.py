@@ -17,7 +17,8 @@ class ArmPose:
     Attributes:
         wrist: position of the wrist, metres (3,).
         turn: rotation of the wrist (3, 3).
-        base: height of the base above the agent's position, metres; unused by arms with a fixed base.
+        base: height of the base above the agent's position, metres; unused by arms with a fixed
+            base.
         elbow: angle of the elbow about the line from shoulder to wrist, degrees.
     """
 
@@ -57,11 +58,13 @@ class Rig(Protocol):
 
     @property
     def palm(self) -> Array:
-        """Point of the wrist's frame at which the hand's sphere begins, metres (3,); the sphere lies along its z."""
+        """Point of the wrist's frame at which the hand's sphere begins, metres (3,); the sphere
+        lies along its z."""
 
     @property
     def lifts(self) -> tuple[float, float]:
-        """Lowest and highest height of the base, or of the lift, above the agent's position, metres."""
+        """Lowest and highest height of the base, or of the lift, above the agent's position,
+        metres."""
 
     def rest(self) -> ArmPose:
         """Return the resting pose."""
@@ -70,19 +73,23 @@ class Rig(Protocol):
         """Return the position of the base in the agent's frame (right, up, ahead), metres (3,)."""
 
     def with_lift(self, pose: ArmPose, height: float) -> ArmPose:
-        """Return the pose with its base, or its lift, at a height above the agent's position, metres."""
+        """Return the pose with its base, or its lift, at a height above the agent's position,
+        metres."""
 
     def lift(self, pose: ArmPose) -> float:
         """Return the height above the agent's position of the base, or of the lift, metres."""
 
     def reach(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
-        """Return poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as it gets."""
+        """Return poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as
+        it gets."""
 
     def joints(self, poses: Sequence[ArmPose]) -> Joints:
         """Return the joints of some poses (n)."""
 
     def boxes(self, poses: Sequence[ArmPose]) -> Boxes:
-        """Return the links and the hand of some poses (n, m), the hand last, in the frame of the base."""
+        """Return the links and the hand of some poses (n, m), the hand last, in the frame of the
+        base."""
 
     def allows(self, target: Array) -> bool:
-        """Return whether `restrictMovement` allows a target (3,) of the wrist in the frame of the base."""
+        """Return whether `restrictMovement` allows a target (3,) of the wrist in the frame of the
+        base."""

@@ -10,9 +10,10 @@ __all__ = ["axis_angle", "rotation"]
 
 
 def axis_angle(turn: Array) -> tuple[Array, float]:
-    """Return the unit axis (3,) and angle in degrees, 0 to 180, of a rotation (3, 3); the axis of none is x."""
-    # The skew part is the axis times twice the sine. Near half a turn the sine vanishes and the symmetric part, whose
-    # columns lie along the axis, gives it.
+    """Return the unit axis (3,) and angle in degrees, 0 to 180, of a rotation (3, 3); the axis of
+    none is x."""
+    # The skew part is the axis times twice the sine. Near half a turn the sine vanishes and the
+    # symmetric part, whose columns lie along the axis, gives it.
     skew = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     sine, cosine = float(np.linalg.norm(skew)), float(np.trace(turn)) - 1.0
     if sine > 1e-6:

@@ -48,10 +48,12 @@ def take_stance(world: World, arm: Arm, to: Stance) -> None:
 def first_contact(
     world: World, arm: Arm, path: list[Stance], around: ArmObstacles
 ) -> tuple[int, str] | None:
-    """Return the index of the first stance in which the arm or what it holds is in something, and that thing's name.
+    """Return the index of the first stance in which the arm or what it holds is in something, and
+    that thing's name.
 
-    What the arm touches already is in the way only where the same part of the arm gets deeper into it. A part that is
-    stuck in an object, as after a teleport, may leave it any way: there only the end of the path counts.
+    What the arm touches already is in the way only where the same part of the arm gets deeper into
+    it. A part that is stuck in an object, as after a teleport, may leave it any way: there only the
+    end of the path counts.
 
     None if the whole path is free; it begins after the present stance.
     """
@@ -60,12 +62,13 @@ def first_contact(
     near = around.near(low.min(axis=(0, 1)), high.max(axis=(0, 1)))
     if not len(near.owner):
         return None
-    # Gaps by stance, part of the arm and object: an object of many primitives counts by its nearest one, so that the
-    # arm may slide along it from one primitive to the next.
+    # Gaps by stance, part of the arm and object: an object of many primitives counts by its nearest
+    # one, so that the arm may slide along it from one primitive to the next.
     gaps = separations(moving.flat(), near.boxes).reshape(len(path) + 1, -1, len(near.owner))
     things = np.unique(near.owner)
     gaps = np.stack([gaps[:, :, near.owner == thing].min(axis=2) for thing in things], axis=2)
-    # Negative where a part is deeper in an object than at the start, where `_SKIN` is always allowed.
+    # Negative where a part is deeper in an object than at the start, where `_SKIN` is always
+    # allowed.
     depth = gaps[1:] - np.minimum(gaps[0], -_SKIN)
     depth[:-1, gaps[0] < -_STUCK] = 0.0
     hit = np.flatnonzero(depth.min(axis=(1, 2)) < -_SAME)
@@ -76,7 +79,8 @@ def first_contact(
 
 
 def is_free(world: World, arm: Arm, there: Stance, around: ArmObstacles) -> bool:
-    """Return whether the arm and what it holds are in nothing in a stance, wherever they are now."""
+    """Return whether the arm and what it holds are in nothing in a stance, wherever they are
+    now."""
     gaps = separations(moving_boxes(world, arm, [there]).flat(), around.boxes)
     return bool((gaps >= -_SKIN).all())
 
@@ -85,7 +89,8 @@ def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:
     """Return the boxes (stances, n) of the arm and of what it holds, in the world."""
     positions, yaws = np.stack([s.position for s in stances]), np.array([s.yaw for s in stances])
     origins, turns = base_transforms(arm.rig, positions, yaws, [s.pose for s in stances])
-    # While the agent walks or turns its arm keeps one pose: its boxes are computed once, and only moved.
+    # While the agent walks or turns its arm keeps one pose: its boxes are computed once, and only
+    # moved.
     poses = (
         [stances[0].pose]
         if all(s.pose is stances[0].pose for s in stances)

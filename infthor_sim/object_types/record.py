@@ -1,7 +1,8 @@
 """The record of one type of object, which declares everything the simulator knows of it.
 
-Abilities have the names of AI2-THOR's documentation. Recorded scenes override them with those of their own objects.
-The record serves procedural scenes, objects that a recording names without describing, and all other rules.
+Abilities have the names of AI2-THOR's documentation. Recorded scenes override them with those of
+their own objects. The record serves procedural scenes, objects that a recording names without
+describing, and all other rules.
 """
 
 from dataclasses import KW_ONLY, dataclass
@@ -16,7 +17,8 @@ PLAIN_BOX = "box"
 
 @dataclass(frozen=True)
 class Unfolding:
-    """A change of an object's box along one of its axes with opening, in proportion to the openness.
+    """A change of an object's box along one of its axes with opening, in proportion to the
+    openness.
 
     Attributes:
         axis: 0, 1 or 2: across, up, or towards the front.
@@ -31,7 +33,8 @@ class Unfolding:
     reach: float = 0.0
 
     def extent(self, size: float, before: float, after: float) -> float:
-        """Return the extent in metres at openness `after` of what measures `size` at openness `before`."""
+        """Return the extent in metres at openness `after` of what measures `size` at openness
+        `before`."""
         share = (self.closed + (1 - self.closed) * after) / (
             self.closed + (1 - self.closed) * before
         )
@@ -44,17 +47,21 @@ class ObjectType:
 
     Attributes:
         name: AI2-THOR's `objectType`.
-        size: usual width, height and depth in metres, front towards z: medians over AI2-THOR's rooms.
+        size: usual width, height and depth in metres, front towards z: medians over AI2-THOR's
+            rooms.
         shape: name of the function in `render/shapes` that draws it.
         categories: categories that receptacles may name in `takes` and `refuses`.
-        takes: categories and types that may be put into or onto it; None: everything that can be picked up.
+        takes: categories and types that may be put into or onto it; None: everything that can be
+            picked up.
         refuses: categories and types that may not be.
         encloses: it hides its contents while it is closed.
         support: share of its height at which things stand on it; None: its top.
-        area: part of its box, seen from above, on which things stand: x0, z0, x1, z1 as shares of its half extents, -1
-            to 1 in its own frame; None: all of it.
-        handled: a handle sticks out at one end of its longer side; the rest is as long as it is wide.
-        space_below: boxes lower than this (metres) are the space above the surface, as recorded counters are.
+        area: part of its box, seen from above, on which things stand: x0, z0, x1, z1 as shares of
+            its half extents, -1 to 1 in its own frame; None: all of it.
+        handled: a handle sticks out at one end of its longer side; the rest is as long as it is
+            wide.
+        space_below: boxes lower than this (metres) are the space above the surface, as recorded
+            counters are.
         centered: its origin is in the middle of its box, not of its underside.
         open_top: share of its width that is open at the top; 0: nothing stands inside its box.
         levels: shares of its height at which things stand inside it.
@@ -62,7 +69,8 @@ class ObjectType:
         hinged: it opens a door that can block the agent.
         slides: it slides out with its contents, as drawers do.
         unfolds: changes of its box with opening, for types without door or drawer.
-        lid: length of a lid that is hinged at its back and stands up when open, as a share of its depth; 0: no lid.
+        lid: length of a lid that is hinged at its back and stands up when open, as a share of its
+            depth; 0: no lid.
         runs_closed: it must be closed to be switched on, and switched off to be opened.
         switched_by: type of the object that switches it; it has no switch of its own.
         slice_type: type of its slices.
@@ -77,12 +85,15 @@ class ObjectType:
         stacked: others of its type are right above it.
         has_cutouts: sinks and basins are cut out of it.
         tall: it reaches from the floor through counters.
-        faces_room: its front cannot be told from the axes of its box; other types face +z of their own frame.
+        faces_room: its front cannot be told from the axes of its box; other types face +z of their
+            own frame.
         flat: its front is its thin side.
-        infer_support: its surface height is inferred from what lies on it, as its box includes backs and the like.
+        infer_support: its surface height is inferred from what lies on it, as its box includes
+            backs and the like.
         beyond_room: it reaches beyond the room's walls or floor.
         starts_open: rooms have it open, and its size is measured open.
-        capacity: loose objects that a procedural room puts into or onto it at most; None: it is never considered.
+        capacity: loose objects that a procedural room puts into or onto it at most; None: it is
+            never considered.
     """
 
     name: str
@@ -150,7 +161,8 @@ class ObjectType:
         return self
 
     def support_height(self, height: float) -> float | None:
-        """Return the height above the underside of a box `height` metres high at which things stand; None: its top."""
+        """Return the height above the underside of a box `height` metres high at which things
+        stand; None: its top."""
         if height < self.space_below:
             return 0.0
         return None if self.support is None else self.support * height
@@ -160,7 +172,8 @@ class ObjectType:
         return self.name in words or any(category in words for category in self.categories)
 
     def accepts(self, item: "ObjectType") -> bool:
-        """Return whether AI2-THOR lets an object of type `item` be put into or onto one of this type."""
+        """Return whether AI2-THOR lets an object of type `item` be put into or onto one of this
+        type."""
         if not (self.receptacle and item.pickupable) or item.counts_as(self.refuses):
             return False
         return self.takes is None or item.counts_as(self.takes)

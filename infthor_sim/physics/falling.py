@@ -1,4 +1,5 @@
-"""Falling: an object that nothing holds drops straight down onto what is below it, and may break."""
+"""Falling: an object that nothing holds drops straight down onto what is below it, and may
+break."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -14,7 +15,8 @@ from infthor_sim.world import World
 __all__ = ["assign_parent", "is_over", "let_fall"]
 
 _BREAKING = 0.9  # metres of fall that break a breakable thing
-_SUNK = 0.03  # metres that an object may already be below what it falls on: it was pushed along it, or lay in it
+# metres that an object may already be below what it falls on: it was pushed along it, or lay in it
+_SUNK = 0.03
 
 
 class _Landing(NamedTuple):
@@ -30,10 +32,11 @@ class _Landing(NamedTuple):
 
 
 def let_fall(world: World, item: SimObject, point: Array) -> None:
-    """Drop a released object to what is below `point` (3,), which is moved into the room if it is outside.
+    """Drop a released object to what is below `point` (3,), which is moved into the room if it is
+    outside.
 
-    The object then belongs to the receptacle that it fell into or onto; on another loose object, to that one's
-    receptacle.
+    The object then belongs to the receptacle that it fell into or onto; on another loose object, to
+    that one's receptacle.
     """
     low, high = world.scene_bounds()
     margin = item.box_size.max() / 2
@@ -87,7 +90,8 @@ def _landings(world: World, item: SimObject, point: Array) -> Iterator[_Landing]
 
 
 def _rank(landing: _Landing) -> float:
-    """Return the height of a landing; a dish ranks above what it stands on, even if its bottom is slightly lower."""
+    """Return the height of a landing; a dish ranks above what it stands on, even if its bottom is
+    slightly lower."""
     dish = landing.parent is not None and landing.parent.type.pickupable
     return landing.height + (_SUNK if dish else 0.0)
 
@@ -95,7 +99,8 @@ def _rank(landing: _Landing) -> float:
 def _landings_on(
     world: World, item: SimObject, other: SimObject, point: Array, bottom: float, *, has_top: bool
 ) -> Iterator[_Landing]:
-    """Yield the places on and in `other` for an object that falls above `point` (3,), its underside at height `bottom`.
+    """Yield the places on and in `other` for an object that falls above `point` (3,), its underside
+    at height `bottom`.
 
     `has_top`: `other` has an upper side at `point`, and not the hole for a basin.
     """
@@ -103,7 +108,8 @@ def _landings_on(
         return
     closed = other.type.encloses and other.type.openable and other.state.openness == 0
     open_surfaces = surfaces(other) if other.type.receptacle and not closed else []
-    # The object must come from below the next shelf. A drawer has none above it where it has come out.
+    # The object must come from below the next shelf. A drawer has none above it where it has come
+    # out.
     reached = [
         s for s in open_surfaces if _is_above(s, point) and _fits(item, other, s)
         and (other.type.slides or bottom <= float(s.center[1]) + s.headroom)
@@ -111,7 +117,8 @@ def _landings_on(
     yield from (_Landing(float(surface.center[1]), other) for surface in reached)
     has_top = has_top and other.type.encloses and not other.type.slides
     if not reached and (has_top or other.type.pickupable) and is_over(other, point):
-        # It lies on top: of what is closed or full of shelves, or across a loose object and so where that one lies.
+        # It lies on top: of what is closed or full of shelves, or across a loose object and so
+        # where that one lies.
         parent = (
             world.objects[other.parent]
             if other.type.pickupable and other.parent is not None

@@ -1,4 +1,5 @@
-"""Free places in and on receptacles: clear of other things, of what the furniture is drawn of, and of its doors."""
+"""Free places in and on receptacles: clear of other things, of what the furniture is drawn of, and
+of its doors."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -55,7 +56,8 @@ class _Obstacles:
         """Return at which of some points (n, 3) a thing of a size (3,) metres stands clear of all.
 
         Args:
-            around: points of its outline from above, turned as it will be, metres from its middle (m, 2).
+            around: points of its outline from above, turned as it will be, metres from its middle
+                (m, 2).
             overlap: share of their size by which loose things may overlap.
         """
         free = _apart(points, size, self.fixed, 0.0) & _apart(points, size, self.loose, overlap)
@@ -65,7 +67,8 @@ class _Obstacles:
 
 
 def _apart(points: Array, size: Array, boxes: list[Box], overlap: float) -> NDArray[np.bool_]:
-    """Return at which points (n, 3) the middle of the underside of a box of a size (3,) is clear of all of `boxes`."""
+    """Return at which points (n, 3) the middle of the underside of a box of a size (3,) is clear of
+    all of `boxes`."""
     free = np.ones(len(points), dtype=bool)
     if not len(points):
         return free
@@ -97,7 +100,8 @@ def find_place(
         overlap: share of their size by which neighbours may overlap.
         random: random numbers that choose among the free places; None for the nearest.
         point_filter: function that marks which of some points (n, 3) may be used; None: all.
-        among_fixed: in a recording, allow places within lamps, appliances and taps: their boxes are too large.
+        among_fixed: in a recording, allow places within lamps, appliances and taps: their boxes are
+            too large.
     """
     boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
     ghost = item.duplicate(item.object_id)
@@ -132,7 +136,8 @@ def find_place(
 
 
 def _outline_with_contents(world: World, item: SimObject, ghost: SimObject) -> Array:
-    """Return points of a thing's outline and of that of what it holds, turned as `ghost` is; see `outline`."""
+    """Return points of a thing's outline and of that of what it holds, turned as `ghost` is; see
+    `outline`."""
     turn = yaw_matrix(float(ghost.rotation[1] - item.rotation[1]))
     parts = [outline(ghost)]
     for content in world.descendants(item):
@@ -142,13 +147,14 @@ def _outline_with_contents(world: World, item: SimObject, ghost: SimObject) -> A
 
 
 def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterator[SimObject]:
-    """Yield the loose objects that could be in the way: those in this receptacle, and those of other receptacles."""
+    """Yield the loose objects that could be in the way: those in this receptacle, and those of
+    other receptacles."""
     inside = {o.object_id for o in world.descendants(item)} | {item.object_id}
     for other in world.objects.values():
         if other.object_id in inside or other is receptacle or not other.type.pickupable:
             continue
-        # Left out: objects on nothing, and those that share the receptacle's own parent. These stand beside it, as
-        # plates on the table that a bowl is on.
+        # Left out: objects on nothing, and those that share the receptacle's own parent. These
+        # stand beside it, as plates on the table that a bowl is on.
         if other.parent == receptacle.object_id or (
             other.parent is not None and receptacle.parent != other.parent
         ):
@@ -156,7 +162,8 @@ def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterato
 
 
 def _fixed_on(world: World, receptacle: SimObject, surface: Surface) -> Iterator[SimObject]:
-    """Yield what stands on the surface and cannot be picked up: lamps, screens, appliances, taps, burners."""
+    """Yield what stands on the surface and cannot be picked up: lamps, screens, appliances, taps,
+    burners."""
     for other in world.objects.values():
         if (
             other.type.pickupable
@@ -172,7 +179,8 @@ def _fixed_on(world: World, receptacle: SimObject, surface: Surface) -> Iterator
 def _solid_boxes(
     world: World, item: SimObject, receptacle: SimObject, surface: Surface
 ) -> Iterator[Box]:
-    """Yield the boxes of what stands on a surface or sticks out of it, of doors that swing over it, and of walls.
+    """Yield the boxes of what stands on a surface or sticks out of it, of doors that swing over it,
+    and of walls.
 
     Rooms whose furniture is known by its shape are measured by that, and not by boxes.
     """
@@ -192,7 +200,8 @@ def _solid_boxes(
 
 
 def _inner_boxes(receptacle: SimObject) -> list[Box]:
-    """Return the boxes of a receptacle's own parts, as if it were open; none where things hang over or stick out."""
+    """Return the boxes of a receptacle's own parts, as if it were open; none where things hang over
+    or stick out."""
     if receptacle.type.overhang or receptacle.type.shape == PLAIN_BOX:
         return []
     opened = _opened(receptacle)
@@ -201,12 +210,14 @@ def _inner_boxes(receptacle: SimObject) -> list[Box]:
 
 
 def _opened(receptacle: SimObject) -> SimObject:
-    """Return a receptacle as it is drawn open, which shows its inside; one that hides nothing as it is."""
+    """Return a receptacle as it is drawn open, which shows its inside; one that hides nothing as it
+    is."""
     return as_open(receptacle, 1.0) if receptacle.type.encloses else receptacle
 
 
 def _outer_boxes(other: SimObject, low: Array, high: Array) -> Iterator[Box]:
-    """Yield the boxes of another object's parts, of the whole of what hides its inside, and of the room for its door.
+    """Yield the boxes of another object's parts, of the whole of what hides its inside, and of the
+    room for its door.
 
     So there is room around the foot of a lamp, as in AI2-THOR, whose colliders are parts too.
     """
@@ -242,7 +253,8 @@ def _inner_walls(receptacle: SimObject) -> list[Wall]:
 
 
 def _sort_by_reach(world: World, listed: list[Surface]) -> list[Surface]:
-    """Return surfaces, the easiest for the agent to reach first: near its hand's height, then near it, then low."""
+    """Return surfaces, the easiest for the agent to reach first: near its hand's height, then near
+    it, then low."""
     agent = world.agent.position
 
     def cost(surface: Surface) -> tuple[float, float, float]:
@@ -267,7 +279,8 @@ def _free_point(
     random: np.random.Generator | None,
     point_filter: PointFilter | None,
 ) -> Array | None:
-    """Return the point (3,) of a surface for the underside of `ghost`, clear of obstacles; None if there is none."""
+    """Return the point (3,) of a surface for the underside of `ghost`, clear of obstacles; None if
+    there is none."""
     low, high = ghost.bounds()
     height = high[1] - low[1]
     if height > surface.headroom + (_SQUEEZE if world.coarse else 0.0):
@@ -286,7 +299,8 @@ def _free_point(
 
 
 def _grid(world: World, surface: Surface, half: tuple[float, float], turn: Array) -> Array:
-    """Return points (n, 3) of the surface at which something of this half size fits on it, nearest first."""
+    """Return points (n, 3) of the surface at which something of this half size fits on it, nearest
+    first."""
     spans = [surface.half[i] - half[i] for i in range(2)]
     if min(spans) < -surface.overhang:
         return np.zeros((0, 3))
@@ -300,7 +314,8 @@ def _grid(world: World, surface: Surface, half: tuple[float, float], turn: Array
     flat = np.stack([xs.ravel(), np.zeros(xs.size), zs.ravel()], axis=1) @ turn.T + surface.center
     origin = surface.center if surface.from_middle else world.agent.position
     away = np.hypot(flat[:, 0] - origin[0], flat[:, 2] - origin[2])
-    # Places within 6 cm of the edge count as farther away than they are: things stand safer, and look so, inside.
+    # Places within 6 cm of the edge count as farther away than they are: things stand safer, and
+    # look so, inside.
     edge = np.maximum(
         0.0,
         0.06 - np.minimum(axes[0].max() - np.abs(xs.ravel()), axes[1].max() - np.abs(zs.ravel())),

@@ -1,4 +1,5 @@
-"""Obstacles for the agent that the navigation grid does not know: open doors and drawers, and what it holds."""
+"""Obstacles for the agent that the navigation grid does not know: open doors and drawers, and what
+it holds."""
 
 import numpy as np
 
@@ -13,9 +14,11 @@ _KNEE, _HEAD = 0.15, 1.5  # heights in metres between which a door stops the age
 
 
 def blocking_object(world: World, target: Array) -> str | None:
-    """Return the name of the open door or drawer that keeps the agent from standing at `target` (3,), or None.
+    """Return the name of the open door or drawer that keeps the agent from standing at `target`
+    (3,), or None.
 
-    One that already touches the agent does not count, as the agent could not get away from it otherwise.
+    One that already touches the agent does not count, as the agent could not get away from it
+    otherwise.
     """
     for item in world.objects.values():
         if item.object_id in world.open_at_start or item.state.openness <= 0:
@@ -29,14 +32,16 @@ def blocking_object(world: World, target: Array) -> str | None:
 
 
 def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
-    """Return the low and high corner of the axis-aligned box around an open door or drawer; None for other objects."""
+    """Return the low and high corner of the axis-aligned box around an open door or drawer; None
+    for other objects."""
     if not (item.type.hinged or item.type.slides):
         return None
     width, height, depth = item.front_size
     matrix = item.matrix @ yaw_matrix(item.front)
     if item.type.slides:
         reach = DRAWER_SLIDE * depth * item.state.openness
-        points = [(x, y, depth / 2 + z) for x in (-width / 2, width / 2) for y in (-height / 2, height / 2)
+        points = [(x, y, depth / 2 + z) for x in (-width / 2, width / 2) for y in (-height / 2,
+                                                                                   height / 2)
                   for z in (0.0, reach)]  # fmt: skip
     else:
         side = item.hinge or -1
@@ -49,7 +54,8 @@ def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
 
 
 def held_object_blocks(world: World, target: Array) -> bool:
-    """Return whether what the agent holds would be outside the outer walls if the agent stood at `target`."""
+    """Return whether what the agent holds would be outside the outer walls if the agent stood at
+    `target`."""
     if world.held is None:
         return False
     held = world.objects[world.held]
@@ -60,7 +66,8 @@ def held_object_blocks(world: World, target: Array) -> bool:
 
 
 def nearest_name(world: World, point: Array) -> str:
-    """Return the name of the furniture nearest to `point`, for messages about what stopped the agent."""
+    """Return the name of the furniture nearest to `point`, for messages about what stopped the
+    agent."""
     # The grid knows only that a cell is not free, and not what stands there.
     best = ("Wall", 0.6)  # beyond so many metres a wall is the likelier obstacle
     for item in world.objects.values():

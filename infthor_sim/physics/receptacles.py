@@ -25,8 +25,8 @@ class Surface:
         yaw: rotation of the receptacle in degrees.
         headroom: free height above, metres.
         overhang: metres that a thing may stick out beyond the edge.
-        from_middle: places are tried from the middle outwards, as walls hide what stands near them; else from the
-            agent's side.
+        from_middle: places are tried from the middle outwards, as walls hide what stands near them;
+            else from the agent's side.
     """
 
     center: Array
@@ -75,7 +75,8 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
 
 
 def _standing_area(receptacle: SimObject) -> tuple[Array, tuple[float, float]]:
-    """Return the middle (3,) in the world of the part of a box on or in which things stand, and its half extents (2,).
+    """Return the middle (3,) in the world of the part of a box on or in which things stand, and its
+    half extents (2,).
 
     Its height is that of the box's middle.
     """
@@ -89,7 +90,8 @@ def _standing_area(receptacle: SimObject) -> tuple[Array, tuple[float, float]]:
 
 
 def _body(receptacle: SimObject) -> Rect:
-    """Return the part of a box that neither a handle nor the flaps of an open carton take up, as shares of its half."""
+    """Return the part of a box that neither a handle nor the flaps of an open carton take up, as
+    shares of its half."""
     width, _, depth = (float(side) for side in receptacle.box_size)
     if receptacle.type.handled:
         return (-1.0, -1.0, min(1.0, 2 * depth / width - 1), min(1.0, 2 * width / depth - 1))
@@ -107,7 +109,8 @@ def _closed_share(receptacle: SimObject, axis: int) -> float:
 
 
 def _shelves(receptacle: SimObject) -> list[Surface]:
-    """Return the floor and shelves inside a cabinet, fridge or the like, or the floor of a drawer where it is now."""
+    """Return the floor and shelves inside a cabinet, fridge or the like, or the floor of a drawer
+    where it is now."""
     low, high = receptacle.bounds()
     inner = (
         max(receptacle.box_size[0] / 2 - WALL, 0.02),
@@ -123,7 +126,8 @@ def _shelves(receptacle: SimObject) -> list[Surface]:
 
 
 def drawer_offset(receptacle: SimObject) -> Array:
-    """Return how far an open drawer has come out of its box, metres (3,); zeros for other objects."""
+    """Return how far an open drawer has come out of its box, metres (3,); zeros for other
+    objects."""
     if not receptacle.type.slides or receptacle.state.openness == 0:
         return np.zeros(3)
     matrix = yaw_matrix(float(receptacle.rotation[1]) + receptacle.front)
@@ -133,12 +137,14 @@ def drawer_offset(receptacle: SimObject) -> Array:
 
 
 def contains_box(vessel: SimObject, low: Array, high: Array) -> bool:
-    """Return whether a box, given by its corners, is within the walls of an open vessel and above its floor."""
+    """Return whether a box, given by its corners, is within the walls of an open vessel and above
+    its floor."""
     if not vessel.type.open_top or (vessel.type.encloses and vessel.state.openness == 0):
         return False
     (cavity,) = surfaces(vessel)
     middle, half = (low + high) / 2, (high - low) / 2
-    # The middles of its sides, not its corners, must be inside: most of what lies in vessels is round.
+    # The middles of its sides, not its corners, must be inside: most of what lies in vessels is
+    # round.
     sides = np.array([[half[0], 0, 0], [-half[0], 0, 0], [0, 0, half[2]], [0, 0, -half[2]]])
     points = (middle + sides - cavity.center) @ yaw_matrix(cavity.yaw)
     beside = np.abs(points[:, [0, 2]]).max(axis=0) > cavity.half
@@ -146,7 +152,8 @@ def contains_box(vessel: SimObject, low: Array, high: Array) -> bool:
 
 
 def find_parent(world: World, item: SimObject) -> SimObject | None:
-    """Return the receptacle that an object is in or on, judged by its position alone; None in mid-air."""
+    """Return the receptacle that an object is in or on, judged by its position alone; None in
+    mid-air."""
     low, high = item.bounds()
     point = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     best: tuple[float, SimObject] | None = None
@@ -161,7 +168,8 @@ def find_parent(world: World, item: SimObject) -> SimObject | None:
 
 
 def _parent_cost(receptacle: SimObject, point: Array, item: SimObject) -> float | None:
-    """Return how unlikely it is that an object whose underside is at `point` is in a receptacle; None: it is not.
+    """Return how unlikely it is that an object whose underside is at `point` is in a receptacle;
+    None: it is not.
 
     Hollow receptacles come before surfaces, small before large ones, and the floor last.
     """
@@ -188,7 +196,8 @@ def _parent_cost(receptacle: SimObject, point: Array, item: SimObject) -> float 
 
 
 def _depth_below(receptacle: SimObject) -> float:
-    """Return metres below the box of a hollow receptacle at which the underside of its contents may be recorded."""
+    """Return metres below the box of a hollow receptacle at which the underside of its contents may
+    be recorded."""
     if receptacle.type.encloses:
         return 0.12
     return 0.03 if receptacle.type.pickupable else 0.08

@@ -10,14 +10,16 @@ __all__ = ["LIGHTEST", "slide"]
 
 _STEP = 0.02  # metres between two collision checks
 LIGHTEST = 0.05  # kilograms; some recorded objects have a mass of 0
-_FARTHEST = 5.0  # metres; no room is much larger, and a strong push of a light object would go on for kilometres
+# metres; no room is much larger, and a strong push of a light object would go on for kilometres
+_FARTHEST = 5.0
 
 
 def slide(world: World, item: SimObject, direction: Array, distance: float) -> None:
     """Move an object, with its contents, along `direction` (3,) for at most `distance` metres.
 
-    It takes loose things in its way along, which costs it way in proportion to their masses. It stops at anything else
-    and at the walls of something closed. What is then beyond the edge of what it stands on falls.
+    It takes loose things in its way along, which costs it way in proportion to their masses. It
+    stops at anything else and at the walls of something closed. What is then beyond the edge of
+    what it stands on falls.
     """
     step, left = direction * _STEP, min(distance, _FARTHEST)
     moved = {item.object_id: item}
@@ -50,7 +52,8 @@ def _support(world: World, item: SimObject) -> SimObject | None:
 def _pushed(
     world: World, item: SimObject, step: Array, pushed: dict[str, SimObject]
 ) -> dict[str, SimObject] | None:
-    """Return an object and the loose things that it would take along, by id; None if something stops one of them."""
+    """Return an object and the loose things that it would take along, by id; None if something
+    stops one of them."""
     support = _support(world, item)
     if support is not None and world.is_hidden(item) and not is_over(support, item.center + step):
         return None  # the wall of something closed

@@ -1,7 +1,9 @@
-"""What of an object is solid, as its drawing has it: parts, the walls of vessels, and the space that its door needs.
+"""What of an object is solid, as its drawing has it: parts, the walls of vessels, and the space
+that its door needs.
 
-The metadata's box of a sofa has its back and arms, that of a drawer its sides: what is put down must stay clear of
-those. So room for things is measured against what is drawn, and the two cannot disagree.
+The metadata's box of a sofa has its back and arms, that of a drawer its sides: what is put down
+must stay clear of those. So room for things is measured against what is drawn, and the two cannot
+disagree.
 """
 
 from dataclasses import dataclass, replace
@@ -57,7 +59,8 @@ class Wall:
 
 
 def part_boxes(item: SimObject, hollow: bool = False) -> list[Box]:
-    """Return the boxes around an object's drawn parts; with `hollow`, without the walls of vessels."""
+    """Return the boxes around an object's drawn parts; with `hollow`, without the walls of
+    vessels."""
     return [_box(item, part) for part in shape(item) if not (hollow and part.form in _VESSELS)]
 
 
@@ -65,14 +68,16 @@ def vessel_walls(item: SimObject) -> list[Wall]:
     """Return the walls of the vessels that an object is drawn of."""
     matrix = item.matrix
     return [
-        Wall(item.position + matrix @ np.asarray(part.center, dtype=float), np.asarray(part.half, dtype=float),
+        Wall(item.position + matrix @ np.asarray(part.center, dtype=float),
+             np.asarray(part.half, dtype=float),
              (matrix @ _own_matrix(part)).T, part.bottom, part.top)
         for part in shape(item) if part.form == Form.CUP
     ]  # fmt: skip
 
 
 def outline(item: SimObject) -> Array:
-    """Return points around an object's drawn parts seen from above, metres from the middle of its box (m, 2)."""
+    """Return points around an object's drawn parts seen from above, metres from the middle of its
+    box (m, 2)."""
     middle = item.center
     corners = []
     for part in shape(item):
@@ -90,7 +95,8 @@ def outline(item: SimObject) -> Array:
 
 
 def opening_space(item: SimObject) -> Box | None:
-    """Return the box in front of an object that its door or drawer needs to open; None for one without."""
+    """Return the box in front of an object that its door or drawer needs to open; None for one
+    without."""
     width, height, depth = (float(v) for v in item.front_size)
     if not (item.type.hinged or item.type.slides):
         return None

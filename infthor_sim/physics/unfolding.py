@@ -1,4 +1,5 @@
-"""Boxes that change with opening, of objects without door or drawer: lids rise, flaps spread, blinds come down."""
+"""Boxes that change with opening, of objects without door or drawer: lids rise, flaps spread,
+blinds come down."""
 
 import numpy as np
 
@@ -12,7 +13,8 @@ def unfold(item: SimObject, openness: float) -> None:
     """Change an object's box from that at its present openness to that at `openness`."""
     turn, before = yaw_matrix(item.front), item.state.openness
     for way in item.type.unfolds:
-        # The axis is given as seen from the front; `step` is its direction in the object's own frame.
+        # The axis is given as seen from the front; `step` is its direction in the object's own
+        # frame.
         step = turn @ np.eye(3)[way.axis]
         own = int(np.argmax(np.abs(step)))
         size = way.extent(float(item.box_size[own]), before, openness)

@@ -22,7 +22,8 @@ class ThirdPartyCamera:
         position: metres (3,).
         rotation: Unity's Euler angles in degrees (3,).
         field_of_view: vertical, degrees.
-        orthographic_size: metres from the middle of an orthographic picture to its upper edge; None for perspective.
+        orthographic_size: metres from the middle of an orthographic picture to its upper edge; None
+            for perspective.
     """
 
     position: Array
@@ -43,7 +44,8 @@ def map_camera(world: World) -> ThirdPartyCamera:
 
 def agent_camera(agent: Agent, field_of_view: float, width: int, height: int) -> PinholeCamera:
     """Return the agent's own camera for pictures of `width` x `height` pixels."""
-    # The metadata rounds a pose. A client that reads it and teleports back to it must get the same picture.
+    # The metadata rounds a pose. A client that reads it and teleports back to it must get the same
+    # picture.
     position = np.round(agent.camera_position(), _POSITION_DIGITS)
     return PinholeCamera(position, agent.camera_matrix(), field_of_view, width, height)
 
@@ -53,7 +55,8 @@ def pinhole_camera(camera: ThirdPartyCamera, width: int, height: int) -> Pinhole
     matrix = euler_matrix(camera.rotation)
     if camera.orthographic_size is None:
         return PinholeCamera(camera.position, matrix, camera.field_of_view, width, height)
-    # The ray caster has no parallel rays. A long lens from far away differs from them by less than a pixel.
+    # The ray caster has no parallel rays. A long lens from far away differs from them by less than
+    # a pixel.
     away = camera.orthographic_size * 40.0
     angle = float(np.degrees(2 * np.arctan(camera.orthographic_size / away)))
     eye = camera.position - matrix[:, 2] * away

@@ -1,4 +1,5 @@
-"""Colours of objects and classes in the segmentation frames; the same name always has the same colour."""
+"""Colours of objects and classes in the segmentation frames; the same name always has the same
+colour."""
 
 from functools import lru_cache
 
@@ -25,7 +26,8 @@ def class_color(name: str) -> tuple[int, int, int]:
 
 
 def instance_image(picture: Picture) -> NDArray[np.uint8]:
-    """Return the instance frame (h, w, 4) RGBA, bottom row first; walls have the colour of their class."""
+    """Return the instance frame (h, w, 4) RGBA, bottom row first; walls have the colour of their
+    class."""
     colors = [instance_color(name) if "|" in name else class_color(name) for name in picture.names]
     return _paint(picture, colors)
 
@@ -40,7 +42,8 @@ def class_image(picture: Picture, world: World) -> NDArray[np.uint8]:
 
 
 def _paint(picture: Picture, colors: list[tuple[int, int, int]]) -> NDArray[np.uint8]:
-    # The void, instance -1, takes the last entry: black. One lookup of 32-bit words is faster than one of four bytes.
+    # The void, instance -1, takes the last entry: black. One lookup of 32-bit words is faster than
+    # one of four bytes.
     table = np.array([(*color, 255) for color in [*colors, (0, 0, 0)]], dtype=np.uint8)
     packed = table.view(np.uint32).ravel()
     return packed[picture.instances].view(np.uint8).reshape(*picture.instances.shape, 4)

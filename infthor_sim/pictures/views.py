@@ -1,4 +1,5 @@
-"""Pictures of one world: the agent's view, the frame that the client gets, and those of third-party cameras."""
+"""Pictures of one world: the agent's view, the frame that the client gets, and those of third-party
+cameras."""
 
 from dataclasses import dataclass, field
 
@@ -61,7 +62,8 @@ class Views:
         self._frame_arm_version = -1
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
-        """Return the scene's primitives, those of what the hand holds, and the names of the instances."""
+        """Return the scene's primitives, those of what the hand holds, and the names of the
+        instances."""
         return self._model.primitives()
 
     def cast(self, rows: Array, camera: PinholeCamera) -> Picture:
@@ -69,9 +71,11 @@ class Views:
         return cast_picture(rows, self.primitives()[2], camera, self._display.rasterizer)
 
     def agent_view(self) -> Picture:
-        """Return the agent's view without what it holds: that hides nothing from its sight, as in AI2-THOR."""
+        """Return the agent's view without what it holds: that hides nothing from its sight, as in
+        AI2-THOR."""
         agent, display = self._world.agent, self._display
-        # Walking changes the agent without a new version of the world, so its pose is part of the key.
+        # Walking changes the agent without a new version of the world, so its pose is part of the
+        # key.
         key = (self._world.version, tuple(agent.position), agent.yaw, agent.horizon, agent.standing,
                display.width, display.height, self.settings.field_of_view)  # fmt: skip
         if self._view is None or key != self._view_key:
@@ -81,7 +85,8 @@ class Views:
         return self._view
 
     def agent_frame(self) -> Picture:
-        """Return what the agent's frame shows: its view with held object or arm, or the map in map view."""
+        """Return what the agent's frame shows: its view with held object or arm, or the map in map
+        view."""
         return (
             self.third_party(map_camera(self._world))
             if self._display.map_view
@@ -90,7 +95,8 @@ class Views:
 
     def _view_with_hand(self) -> Picture:
         view = self.agent_view()
-        # The arm has a version of its own: bending it changes the frame, but not what the agent sees.
+        # The arm has a version of its own: bending it changes the frame, but not what the agent
+        # sees.
         arm_version = -1 if self._world.arm is None else self._world.arm.version
         if self._frame is None or self._frame_arm_version != arm_version:
             rows, names = self._list_held()
@@ -105,7 +111,8 @@ class Views:
         return self._frame
 
     def _list_held(self) -> tuple[Array, tuple[str, ...]]:
-        """Return the primitives of the agent's arm, or of what its hand holds, and the names of all instances."""
+        """Return the primitives of the agent's arm, or of what its hand holds, and the names of all
+        instances."""
         _, held, names = self.primitives()
         if self._world.arm is None:
             return held, (*names, HAND)

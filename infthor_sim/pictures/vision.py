@@ -1,4 +1,5 @@
-"""What the agent sees: which objects, which point at a pixel, and whether it would see an object from elsewhere."""
+"""What the agent sees: which objects, which point at a pixel, and whether it would see an object
+from elsewhere."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,11 @@ from infthor_sim.world import World
 
 __all__ = ["AgentVision"]
 
-_PIXEL_SHARE = 2.5e-5  # of a picture's pixels that must show an object for it to be visible: 2 pixels at 300x300
+# of a picture's pixels that must show an object for it to be visible: 2 pixels at 300x300
+_PIXEL_SHARE = 2.5e-5
 _INNER_FRAME = 0.9  # of half the frame: what is nearer to its edge may be cut off
-_POSE_FRAME = 0.8  # of half the frame; gives the numbers of poses that AI2-THOR's tests state for FloorPlan28's fridge
+# of half the frame; gives the numbers of poses that AI2-THOR's tests state for FloorPlan28's fridge
+_POSE_FRAME = 0.8
 _TOUCHING = 0.05  # metres around a receptacle's box within which an object still counts as in it
 
 
@@ -41,7 +44,8 @@ class AgentVision:
         self._visible: tuple[Picture, float, frozenset[str]] | None = None
 
     def visible_ids(self) -> frozenset[str]:
-        """Return the ids of the objects that AI2-THOR would report as visible: shown, and near enough."""
+        """Return the ids of the objects that AI2-THOR would report as visible: shown, and near
+        enough."""
         view, distance = self._views.agent_view(), self.settings.visibility_distance
         if self._visible is None or self._visible[0] is not view or self._visible[1] != distance:
             self._visible = (view, distance, self._visible_in(view))
@@ -65,8 +69,9 @@ class AgentVision:
     def visible_in_container(self, item: SimObject) -> bool:
         """Return whether the agent would see the object if what contains it were not drawn.
 
-        Only in recorded scenes: their receptacles are boxes, coarser than the real ones, and may hide what the
-        agent of the recording saw in them. What is inside something closed stays hidden.
+        Only in recorded scenes: their receptacles are boxes, coarser than the real ones, and may
+        hide what the agent of the recording saw in them. What is inside something closed stays
+        hidden.
         """
         if not self._world.coarse or self._world.is_hidden(item):
             return False
@@ -89,14 +94,17 @@ class AgentVision:
         return [o for o in containers if o.object_type != "Floor" and o is not item]
 
     def probe(self, item: SimObject) -> VisibilityProbe:
-        """Return a probe that looks for an object from many poses; valid until the world changes."""
+        """Return a probe that looks for an object from many poses; valid until the world
+        changes."""
         rows, _, names = self._views.primitives()
         return VisibilityProbe(rows, names.index(item.object_id), self._display.rasterizer)
 
     def sees_from(self, agent: Agent, probe: VisibilityProbe) -> bool:
-        """Return whether the agent would see the probe's object well, at any distance, in the pose of `agent`.
+        """Return whether the agent would see the probe's object well, at any distance, in the pose
+        of `agent`.
 
-        A sliver at the edge of the frame does not count: AI2-THOR looks for points inside an object's outline.
+        A sliver at the edge of the frame does not count: AI2-THOR looks for points inside an
+        object's outline.
         """
         slope = _POSE_FRAME * np.tan(np.radians(self.settings.field_of_view) / 2)
         field_of_view = float(np.degrees(2 * np.arctan(slope)))
@@ -104,14 +112,16 @@ class AgentVision:
         return probe.is_seen_by(camera, _least_pixels(camera))
 
     def point_at(self, x: float, y: float) -> Array | None:
-        """Return the point (3,) seen at (x, y), shares of the frame from its bottom left; None for the void."""
+        """Return the point (3,) seen at (x, y), shares of the frame from its bottom left; None for
+        the void."""
         camera = self._views.agent_view().camera
         slope = np.tan(np.radians(camera.field_of_view) / 2)
         ray = np.array(
             [(2 * x - 1) * slope * camera.width / camera.height, (2 * y - 1) * slope, 1.0]
         )
         ahead = camera.matrix @ (ray / np.linalg.norm(ray))
-        # A camera of one pixel that looks along the ray: the point may lie between the pixels of the frame.
+        # A camera of one pixel that looks along the ray: the point may lie between the pixels of
+        # the frame.
         aside = np.cross(camera.matrix[:, 1], ahead)
         aside /= np.linalg.norm(aside)
         pixel = PinholeCamera(
@@ -124,7 +134,8 @@ class AgentVision:
         return point
 
     def in_frame(self, points: Array) -> NDArray[np.bool_]:
-        """Return which of some points (n, 3) lie well within the agent's frame, whatever may hide them."""
+        """Return which of some points (n, 3) lie well within the agent's frame, whatever may hide
+        them."""
         camera = self._views.agent_view().camera
         local = (points - camera.position) @ camera.matrix
         limit = _INNER_FRAME * np.tan(np.radians(camera.field_of_view) / 2)

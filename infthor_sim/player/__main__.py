@@ -1,7 +1,7 @@
 """`python -m infthor_sim [--data DIR] [--supplement FILE] <arguments of a Unity player>`.
 
-The Controller starts this process as if it were Unity and names the pipes in the environment. Of Unity's own
-arguments only the screen's size and the quality have an effect.
+The Controller starts this process as if it were Unity and names the pipes in the environment. Of
+Unity's own arguments only the screen's size and the quality have an effect.
 """
 
 import os
@@ -15,8 +15,9 @@ __all__ = ["main"]
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the simulator until the controller hangs up; return the exit code."""
-    # Both must be set before numba is imported, hence the imports below. OpenMP's threads must not spin between frames:
-    # the controller needs the core meanwhile. At most four threads, as several simulators often share a machine.
+    # Both must be set before numba is imported, hence the imports below. OpenMP's threads must not
+    # spin between frames: the controller needs the core meanwhile. At most four threads, as several
+    # simulators often share a machine.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     os.environ.setdefault("NUMBA_NUM_THREADS", str(min(4, os.cpu_count() or 1)))
     from infthor_eval.errors import InfthorError
@@ -60,7 +61,8 @@ def _pipe(variable: str) -> Path:
     path = os.environ.get(variable)
     if not path:
         raise UsageError(
-            f"{variable} is not set: ai2thor's Controller starts this process (local_executable_path, FIFO server);"
+            f"{variable} is not set: ai2thor's Controller starts this process "
+            "(local_executable_path, FIFO server);"
             " it cannot be started by hand"
         )
     return Path(path)

@@ -1,6 +1,7 @@
 """The simulator's side of ai2thor's FIFO transport: two named pipes, framed messages.
 
-A frame is a header `!BI` (field type, length of the body) and a body; a message is frames and an empty end frame.
+A frame is a header `!BI` (field type, length of the body) and a body; a message is frames and an
+empty end frame.
 """
 
 import errno
@@ -99,14 +100,15 @@ class FifoPipes:
             action = parse_action(field_type, body)
         if action is None:
             raise SimulatorError(
-                "the controller sent a message without an action; it must be ai2thor 5.0.0's FIFO form"
+                "the controller sent a message without an action; it must be ai2thor 5.0.0's FIFO "
+                "form"
             )
         return action
 
     def _open_out(self, path: Path) -> int:
         """Open the pipe of states when the controller reads from it."""
-        # A blocking open would wait for ever for a controller that has died meanwhile. A non-blocking one fails with
-        # ENXIO as long as nobody reads.
+        # A blocking open would wait for ever for a controller that has died meanwhile. A
+        # non-blocking one fails with ENXIO as long as nobody reads.
         while True:
             try:
                 pipe = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
@@ -124,7 +126,8 @@ class FifoPipes:
                 return pipe
 
     def _open_in(self) -> int | None:
-        """Open the pipe of actions and wait until the controller writes to it; return None if it dies before."""
+        """Open the pipe of actions and wait until the controller writes to it; return None if it
+        dies before."""
         pipe = os.open(self._client_path, os.O_RDONLY | os.O_NONBLOCK)
         poll = select.poll()
         poll.register(pipe, select.POLLIN)
@@ -156,11 +159,13 @@ class FifoPipes:
 
 
 def _widen(pipe: int) -> None:
-    """Give a pipe room for a whole reply, so that its writer goes on while the reader still reads."""
+    """Give a pipe room for a whole reply, so that its writer goes on while the reader still
+    reads."""
     try:
         fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _ROOM)
     except PermissionError:
-        return  # more than the system grants: the pipe stays as it is, which is slower and nothing else
+        # more than the system grants: the pipe stays as it is, which is slower and nothing else
+        return
 
 
 def parse_action(field_type: int, body: bytes) -> dict[str, Any]:

@@ -1,7 +1,8 @@
-"""Metadata as msgpack, fast: the fields of an object that do not depend on the agent are packed once per state.
+"""Metadata as msgpack, fast: the fields of an object that do not depend on the agent are packed
+once per state.
 
-Packing 70 objects of 45 fields for each reply takes longer than drawing the frame. So the packed bytes of those fields
-are kept, and the few other fields are appended to the same map.
+Packing 70 objects of 45 fields for each reply takes longer than drawing the frame. So the packed
+bytes of those fields are kept, and the few other fields are appended to the same map.
 """
 
 import struct
@@ -47,8 +48,8 @@ class MetadataPacker:
             str, tuple[int, int, bytes]
         ] = {}  # version, number of fields, their bytes, by object id
         self._colors: tuple[tuple[str, ...], bytes] | None = None
-        # The world whose objects are packed. The reference keeps it alive, so that no other world can get its address
-        # and be taken for it.
+        # The world whose objects are packed. The reference keeps it alive, so that no other world
+        # can get its address and be taken for it.
         self._world: World | None = None
 
     def message(self, sim: Simulation, outcome: Outcome, sequence: int, with_colors: bool) -> bytes:

@@ -1,4 +1,5 @@
-"""The process's loop: receive an action, run it, reply with the metadata and the requested pictures."""
+"""The process's loop: receive an action, run it, reply with the metadata and the requested
+pictures."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -38,7 +39,8 @@ class SimulatorServer:
 
     def serve(self, pipes: FifoPipes) -> None:
         """Send the first state, then one reply to each action."""
-        # The client waits for a state before it sends its first action, as Unity sends one when it has started.
+        # The client waits for a state before it sends its first action, as Unity sends one when it
+        # has started.
         pipes.send(self._reply(Outcome("Initialize"), 0, {}))
         while (message := pipes.receive()) is not None:
             pipes.send(self.answer(message))
@@ -50,7 +52,8 @@ class SimulatorServer:
         """
         sequence = int(message.get("sequenceId", 0))
         outcome, query = self.run(message)
-        # Unity's fast emit: after a query the client keeps its last frame and gets only what the action returned.
+        # Unity's fast emit: after a query the client keeps its last frame and gets only what the
+        # action returned.
         if query and self._sim.settings.fast_emit:
             return iter([(FieldType.METADATA_PATCH, self._packer.patch(outcome))])
         return self._reply(outcome, sequence, message)

@@ -1,1 +1,2 @@
-"""The renderer: primitives, a ray caster with a depth buffer, shading, and the shapes of object types."""
+"""The renderer: primitives, a ray caster with a depth buffer, shading, and the shapes of object
+types."""

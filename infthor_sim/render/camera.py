@@ -1,7 +1,8 @@
 """Pinhole cameras, and the projection of primitives for the ray caster.
 
-A ray through pixel (column, row) leaves the camera along `forward + us[column] * right + vs[row] * up`, so its
-parameter t is the depth along the camera's forward axis in metres. Rows count from the bottom, as in the protocol.
+A ray through pixel (column, row) leaves the camera along `forward + us[column] * right + vs[row] *
+up`, so its parameter t is the depth along the camera's forward axis in metres. Rows count from the
+bottom, as in the protocol.
 """
 
 import math
@@ -41,7 +42,8 @@ class PinholeCamera:
     far: float = FAR
 
     def rays(self) -> tuple[Array, Array]:
-        """Return the horizontal (width,) and vertical (height,) components of the rays; row 0 is the bottom one."""
+        """Return the horizontal (width,) and vertical (height,) components of the rays; row 0 is
+        the bottom one."""
         focal = self.height / 2 / math.tan(math.radians(self.field_of_view) / 2)
         us: Array = (np.arange(self.width, dtype=np.float64) + 0.5 - self.width / 2) / focal
         vs: Array = (np.arange(self.height, dtype=np.float64) + 0.5 - self.height / 2) / focal
@@ -56,7 +58,8 @@ class Projection:
         index: row of each primitive in the scene's array (n,).
         origin: camera's position in each primitive's scaled frame (n, 3).
         steps: camera's forward, right and up vectors in each primitive's scaled frame (n, 3, 3).
-        box: first and last column, first and last row of each primitive's picture, both inclusive (n, 4).
+        box: first and last column, first and last row of each primitive's picture, both inclusive
+            (n, 4).
         near: lower bound of each primitive's depth, metres (n,).
     """
 
@@ -89,9 +92,10 @@ def project(prims: Array, camera: PinholeCamera) -> Projection:
         & (last_row >= 0)
     )
     index = np.nonzero(seen)[0]
-    # Nearest first, so that near primitives hide far ones before these are computed. The nearest corner alone would put
-    # walls and floors, which pass under the camera, before everything; half the depth of the middle corrects that.
-    # The order also breaks ties between coinciding surfaces, so the sort must be stable.
+    # Nearest first, so that near primitives hide far ones before these are computed. The nearest
+    # corner alone would put walls and floors, which pass under the camera, before everything; half
+    # the depth of the middle corrects that. The order also breaks ties between coinciding surfaces,
+    # so the sort must be stable.
     index = index[np.argsort(np.maximum(near[index], center[index, 2] * 0.5), kind="stable")]
     box = np.stack([first_column, last_column, first_row, last_row], axis=1)[index]
     box[:, :2] = np.clip(box[:, :2], 0, camera.width - 1)
@@ -106,15 +110,16 @@ def project(prims: Array, camera: PinholeCamera) -> Projection:
 
 
 def _screen_bounds(points: Array, limit: float) -> tuple[Array, Array]:
-    """Return the low and high (u, v) of boxes, by their corners (n, 8, 3) in the camera's frame, clipped at `limit`."""
+    """Return the low and high (u, v) of boxes, by their corners (n, 8, 3) in the camera's frame,
+    clipped at `limit`."""
     depth = points[:, :, 2]
     front = depth >= limit
     safe = np.where(front, depth, 1.0)
     flat = points[:, :, :2] / safe[:, :, None]
     low = np.where(front[:, :, None], flat, np.inf).min(axis=1)
     high = np.where(front[:, :, None], flat, -np.inf).max(axis=1)
-    # Boxes that reach behind the camera: corners there project to the wrong side. The points where edges cross the
-    # clipping plane take the corners' place.
+    # Boxes that reach behind the camera: corners there project to the wrong side. The points where
+    # edges cross the clipping plane take the corners' place.
     cut = np.nonzero(front.any(axis=1) & ~front.all(axis=1))[0]
     if cut.size:
         a, b = points[cut][:, _EDGES[:, 0]], points[cut][:, _EDGES[:, 1]]

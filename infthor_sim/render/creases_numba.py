@@ -1,4 +1,5 @@
-"""Light and shadow at creases and outlines, compiled by numba: the formulas of `creases`, in the same order."""
+"""Light and shadow at creases and outlines, compiled by numba: the formulas of `creases`, in the
+same order."""
 
 import numpy as np
 from numba import njit

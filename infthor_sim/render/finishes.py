@@ -15,7 +15,8 @@ RANDOM_PATTERNS = tuple(int(m) for m in Material if m not in (Material.GLASS, Ma
 
 
 def apply_finishes(prims: Array, names: Sequence[str], look: Appearance) -> Array:
-    """Return the primitives (n, COLUMNS) with the looks of `look`; `names` are those of the instances."""
+    """Return the primitives (n, COLUMNS) with the looks of `look`; `names` are those of the
+    instances."""
     # Brightness does not count: it changes the lights and not a surface.
     if not look.finishes and np.all(look.light == 1.0):
         return prims
@@ -28,7 +29,8 @@ def apply_finishes(prims: Array, names: Sequence[str], look: Appearance) -> Arra
     instance = prims[:, INSTANCE].astype(int)
     out = prims.copy()
     out[:, COLOR : COLOR + 3] = np.minimum(prims[:, COLOR : COLOR + 3] * tints[instance], 1.0)
-    # Glass keeps its pattern: the picture has no transparency, and only the pattern makes a pane look like one.
+    # Glass keeps its pattern: the picture has no transparency, and only the pattern makes a pane
+    # look like one.
     solid = (prims[:, MATERIAL] != Material.GLASS) & (patterns[instance] >= 0)
     out[solid, MATERIAL] = patterns[instance][solid]
     return out

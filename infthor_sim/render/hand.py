@@ -1,7 +1,9 @@
-"""The held object in the agent's own frame: whole, low and small, in a gripper that comes from the frame's lower edge.
+"""The held object in the agent's own frame: whole, low and small, in a gripper that comes from the
+frame's lower edge.
 
-Only the picture is arranged so. In the world, for the metadata and for collisions, the object is somewhere else. The
-gripper is none of AI2-THOR's, but without it the object would seem to lie on the floor.
+Only the picture is arranged so. In the world, for the metadata and for collisions, the object is
+somewhere else. The gripper is none of AI2-THOR's, but without it the object would seem to lie on
+the floor.
 """
 
 import math
@@ -32,7 +34,8 @@ _AWAY = (
     0.16  # metres in front of the camera: nearer than anything that the agent can stand in front of
 )
 _NEAREST = 0.115  # of the gripper: beyond the camera's clipping plane
-_FOOT = 0.97  # of the object's lowest point below the middle of the picture, as a share of its half height
+# of the object's lowest point below the middle of the picture, as a share of its half height
+_FOOT = 0.97
 _SMALLEST, _GROWTH, _LARGEST = (
     0.105,
     0.26,
@@ -53,7 +56,8 @@ _RUBBER: Color = (0.95, 0.55, 0.1)
 
 
 def _outlines() -> Array:
-    """Return points on the surface of each form of primitive, scaled by its half extents (forms, points, 3)."""
+    """Return points on the surface of each form of primitive, scaled by its half extents (forms,
+    points, 3)."""
     angles = np.arange(8) * np.pi / 4
     ring = np.stack([np.cos(angles), np.zeros(8), np.sin(angles)], axis=1)
     up = np.array([0.0, 1.0, 0.0])
@@ -65,7 +69,8 @@ def _outlines() -> Array:
     )  # the lower half of a sphere, from -1 to 1
     by_form = {
         Form.BOX: np.concatenate([box, box]), Form.CYLINDER: cylinder, Form.CUP: cylinder,
-        Form.ELLIPSOID: np.concatenate([ring, upright]), Form.BOWL: np.concatenate([ring + up, bowl]),
+        Form.ELLIPSOID: np.concatenate([ring, upright]),
+        Form.BOWL: np.concatenate([ring + up, bowl]),
     }  # fmt: skip
     return np.stack([by_form[form] for form in Form])
 
@@ -74,7 +79,8 @@ _OUTLINES = _outlines()
 
 
 def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) -> Array:
-    """Return the primitives of `item` and its contents, moved to where the picture shows them, and of the gripper.
+    """Return the primitives of `item` and its contents, moved to where the picture shows them, and
+    of the gripper.
 
     Args:
         rows: the primitives in the world (n, COLUMNS).
@@ -100,7 +106,8 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
     )
     points = surfaces.reshape(-1, 3) @ camera.matrix  # right, up and forward of the object's middle
     low, high = points.min(axis=0), points.max(axis=0)
-    # At `height`, a point is drawn at (height + y) / (away + z): the one that is drawn lowest is to be at the foot.
+    # At `height`, a point is drawn at (height + y) / (away + z): the one that is drawn lowest is to
+    # be at the foot.
     height = float(np.max(-_FOOT * reach / _AWAY * (_AWAY + points[:, 2]) - points[:, 1]))
     middle = np.array([0.0, height, _AWAY])
     shown[:, CENTER : CENTER + 3] = camera.position + centers + camera.matrix @ middle
@@ -114,7 +121,8 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
 
 
 def _gripper(left: float, right: float) -> list[ShapePart]:
-    """Return a bar at the lower edge of the picture and two jaws beside what is held, in shares of its half height."""
+    """Return a bar at the lower edge of the picture and two jaws beside what is held, in shares of
+    its half height."""
     middle, half = (left + right) / 2, min(max((right - left) / 2, _NARROWEST), _WIDEST)
     parts = [
         ShapePart(
@@ -134,7 +142,8 @@ def _gripper(left: float, right: float) -> list[ShapePart]:
 
 
 def _in_picture(rows: Array, away: float, scale: float, camera: PinholeCamera) -> Array:
-    """Return primitives in shares of the picture's half height as in the world, `away` metres from the camera."""
+    """Return primitives in shares of the picture's half height as in the world, `away` metres from
+    the camera."""
     at = camera.position + camera.matrix @ np.array([0.0, 0.0, away])
     rows[:, CENTER : CENTER + 3] = at + scale * rows[:, CENTER : CENTER + 3] @ camera.matrix.T
     rows[:, HALF : HALF + 3] *= scale

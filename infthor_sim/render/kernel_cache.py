@@ -1,7 +1,8 @@
 """Invalidation of numba's cache of compiled kernels.
 
-Numba recompiles a kernel when its own file changes, but not when a function or constant changes that it takes from
-another file. A digest of all the kernels' sources beside the cache shows when the cache is stale.
+Numba recompiles a kernel when its own file changes, but not when a function or constant changes
+that it takes from another file. A digest of all the kernels' sources beside the cache shows when
+the cache is stale.
 """
 
 from pathlib import Path
@@ -11,14 +12,16 @@ from infthor_eval.storage.digests import digest
 __all__ = ["drop_stale_kernels"]
 
 _SOURCES = (  # every file that compiled code comes from
-    "camera.py", "creases.py", "creases_numba.py", "probe_numba.py", "lighting.py", "patterns.py", "primitives.py",
+    "camera.py", "creases.py", "creases_numba.py", "probe_numba.py", "lighting.py", "patterns.py",
+    "primitives.py",
     "raster_numba.py", "shading_numba.py", "smoothing.py", "smoothing_numba.py", "table.py",
 )  # fmt: skip
 _HERE = Path(__file__).parent
 
 
 def drop_stale_kernels(folder: Path = _HERE) -> bool:
-    """Remove kernels that were compiled from other sources than those in `folder`; return whether there were any."""
+    """Remove kernels that were compiled from other sources than those in `folder`; return whether
+    there were any."""
     sources = digest(b"".join((folder / name).read_bytes() for name in _SOURCES))
     cache = folder / "__pycache__"
     stamp = cache / "kernels.stamp"

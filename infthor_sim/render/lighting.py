@@ -1,4 +1,5 @@
-"""The lights of a picture: one sun, the sky's ambient light, a weak light at the camera, and lamps."""
+"""The lights of a picture: one sun, the sky's ambient light, a weak light at the camera, and
+lamps."""
 
 from dataclasses import dataclass
 

@@ -1,8 +1,9 @@
 """Surface patterns: a brightness factor from two metric coordinates on the surface.
 
-Each function works alike on floats (compiled by numba) and on arrays (numpy), so that both renderers draw the same
-picture. They use arithmetic only, as library functions such as sines may differ in the last bit between the two. Shades
-of boards and tiles are multiples of the constants of the R2 low-discrepancy sequence: neighbours always differ.
+Each function works alike on floats (compiled by numba) and on arrays (numpy), so that both
+renderers draw the same picture. They use arithmetic only, as library functions such as sines may
+differ in the last bit between the two. Shades of boards and tiles are multiples of the constants of
+the R2 low-discrepancy sequence: neighbours always differ.
 """
 
 from collections.abc import Callable

@@ -72,7 +72,8 @@ class Picture:
 
 
 def choose_rasterizer(name: str | None = None) -> Rasterizer:
-    """Return the rasterizer: `numba`, or `numpy` if numba is not installed or INFTHOR_SIM_RENDERER asks for it."""
+    """Return the rasterizer: `numba`, or `numpy` if numba is not installed or INFTHOR_SIM_RENDERER
+    asks for it."""
     chosen = name or os.environ.get("INFTHOR_SIM_RENDERER", "")
     if chosen != "numpy":
         drop_stale_kernels()  # before the imports, which load cached kernels
@@ -89,7 +90,8 @@ def choose_rasterizer(name: str | None = None) -> Rasterizer:
                 raise
         else:
             return Rasterizer(
-                "numba", raster_numba.cast, creases_numba.crease_factors, shading_numba.shade, smoothing_numba.smooth,
+                "numba", raster_numba.cast, creases_numba.crease_factors, shading_numba.shade,
+                smoothing_numba.smooth,
                 probe_numba.is_visible,
             )  # fmt: skip
     from infthor_sim.render import (
@@ -101,7 +103,8 @@ def choose_rasterizer(name: str | None = None) -> Rasterizer:
     )
 
     return Rasterizer(
-        "numpy", raster_numpy.cast, creases.crease_factors, shading_numpy.shade, smoothing_numpy.smooth,
+        "numpy", raster_numpy.cast, creases.crease_factors, shading_numpy.shade,
+        smoothing_numpy.smooth,
         probe_numpy.is_visible,
     )  # fmt: skip
 
@@ -118,7 +121,8 @@ def cast_picture(
     Args:
         prims: the primitives (n, COLUMNS).
         names: ids of objects and names of the parts of the shell, by instance.
-        base: picture of the same camera to draw over; its pixels that are nearer stay. None for an empty one.
+        base: picture of the same camera to draw over; its pixels that are nearer stay. None for an
+            empty one.
     """
     projection = project(prims, camera)
     depth, nearest = rasterizer.cast(prims, projection, camera)

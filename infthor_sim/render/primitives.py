@@ -1,11 +1,12 @@
-"""The primitives of the ray caster: boxes, ellipsoids, (tapered) cylinders and bowls, a row of numbers each.
+"""The primitives of the ray caster: boxes, ellipsoids, (tapered) cylinders and bowls, a row of
+numbers each.
 
-A row holds the primitive's world pose, half extents, colour and material; see the column constants. Plain arrays, as
-numba compiles loops over them and one numpy call transforms them all.
+A row holds the primitive's world pose, half extents, colour and material; see the column constants.
+Plain arrays, as numba compiles loops over them and one numpy call transforms them all.
 
-In the primitive's own frame, scaled by its half extents, a box is [-1, 1]^3 and an ellipsoid the unit sphere. A
-cylinder has its axis along y, with radius `BOTTOM` at y = -1 and `TOP` at y = 1. A bowl is the lower half of an
-ellipsoid with its rim, the unit circle, at y = 1.
+In the primitive's own frame, scaled by its half extents, a box is [-1, 1]^3 and an ellipsoid the
+unit sphere. A cylinder has its axis along y, with radius `BOTTOM` at y = -1 and `TOP` at y = 1. A
+bowl is the lower half of an ellipsoid with its rim, the unit circle, at y = 1.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,7 +18,8 @@ import numpy as np
 from infthor_sim.geometry import Array
 
 __all__ = [
-    "AXES", "BOTTOM", "CENTER", "COLOR", "COLUMNS", "EMISSION", "FORM", "HALF", "INSTANCE", "MATERIAL", "TOP", "Color",
+    "AXES", "BOTTOM", "CENTER", "COLOR", "COLUMNS", "EMISSION", "FORM", "HALF", "INSTANCE",
+    "MATERIAL", "TOP", "Color",
     "Form", "Material", "ShapePart", "rows",
 ]  # fmt: skip
 

@@ -11,7 +11,8 @@ from infthor_sim.render.primitives import AXES, CENTER, HALF, INSTANCE
 __all__ = ["VisibilityProbe"]
 
 _SLACK = 1e-6  # metres; what touches the region between camera and object counts as in it
-_PLACES = 2  # cached camera positions: callers ask for many directions from one place, standing and crouched
+# cached camera positions: callers ask for many directions from one place, standing and crouched
+_PLACES = 2
 
 
 class VisibilityProbe:
@@ -50,7 +51,8 @@ class VisibilityProbe:
 
     def _relevant(self, eye: Array) -> Array:
         """Return the instance's primitives and those that could hide it from `eye`."""
-        # Everything that could hide it overlaps the box around the eye and the instance. That leaves few primitives.
+        # Everything that could hide it overlaps the box around the eye and the instance. That
+        # leaves few primitives.
         key = eye.tobytes()
         if key not in self._between:
             if len(self._between) == _PLACES:

@@ -1,4 +1,5 @@
-"""Checking whether an object is visible, compiled by numba: it stops as soon as enough pixels show the object."""
+"""Checking whether an object is visible, compiled by numba: it stops as soon as enough pixels show
+the object."""
 
 import numpy as np
 from numba import njit
@@ -23,11 +24,13 @@ def is_visible(
     own: NDArray[np.bool_],
     min_pixels: int,
 ) -> bool:
-    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked in `own` (n,)."""
+    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked
+    in `own` (n,)."""
     us, vs = camera.rays()
     profiles = prims[projection.index][:, [FORM, BOTTOM, TOP]]
     enough = _is_visible(
-        profiles, projection.origin, projection.steps, projection.box, projection.near, us, vs, camera.near, camera.far,
+        profiles, projection.origin, projection.steps, projection.box, projection.near, us, vs,
+        camera.near, camera.far,
         np.nonzero(own)[0], np.nonzero(~own)[0], min_pixels,
     )  # fmt: skip
     return bool(enough)
@@ -83,7 +86,8 @@ def _is_visible(
                     k = others[n] if n >= 0 else hider
                     if k >= 0 and _covers(box, k, x, y) and near[k] <= depth:
                         t = _depth(profiles, origin, steps, k, u, v, clip)
-                        # Ties go to the earlier primitive, as in the ray caster, with whose picture this must agree.
+                        # Ties go to the earlier primitive, as in the ray caster, with whose picture
+                        # this must agree.
                         if t > clip and (t < depth or (t == depth and k < first)):
                             hider, hidden = k, True
                             break

@@ -19,9 +19,11 @@ def is_visible(
     own: NDArray[np.bool_],
     min_pixels: int,
 ) -> bool:
-    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked in `own` (n,)."""
+    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked
+    in `own` (n,)."""
     us, vs = camera.rays()
-    # First the pixels that the object would show alone; then each other primitive takes away those that it hides.
+    # First the pixels that the object would show alone; then each other primitive takes away those
+    # that it hides.
     fields = ("index", "origin", "steps", "box", "near")
     kept = replace(projection, **{name: getattr(projection, name)[own] for name in fields})
     depths, nearest = cast(prims, kept, camera)

@@ -1,7 +1,9 @@
-"""The ray caster compiled by numba: for each primitive, nearest first, the pixels of its box on the screen.
+"""The ray caster compiled by numba: for each primitive, nearest first, the pixels of its box on the
+screen.
 
-`raster_numpy` computes the same picture to the last bit. So all numbers are float64, sums are in the same order (hence
-some parentheses), and numba's `fastmath`, which would reorder them, stays off.
+`raster_numpy` computes the same picture to the last bit. So all numbers are float64, sums are in
+the same order (hence some parentheses), and numba's `fastmath`, which would reorder them, stays
+off.
 """
 
 import math
@@ -23,13 +25,15 @@ _BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP
 def cast(
     prims: Array, projection: Projection, camera: PinholeCamera
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`, or -1 (h, w)."""
+    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`,
+    or -1 (h, w)."""
     us, vs = camera.rays()
     depth = np.empty((len(vs), len(us)))
     nearest = np.empty((len(vs), len(us)), dtype=np.int32)
     profiles = prims[projection.index][:, [FORM, BOTTOM, TOP]]
     _cast(
-        profiles, projection.origin, projection.steps, projection.box, projection.near, us, vs, camera.near, camera.far,
+        profiles, projection.origin, projection.steps, projection.box, projection.near, us, vs,
+        camera.near, camera.far,
         depth, nearest,
     )  # fmt: skip
     return depth, nearest
@@ -68,8 +72,8 @@ def _hit_sphere(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float
 def _hit_bowl(
     ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, clip: float
 ) -> float:
-    # In this frame a bowl is the lower half of the unit sphere. Where the near side is cut off the far side counts, as
-    # one sees the inside through the opening.
+    # In this frame a bowl is the lower half of the unit sphere. Where the near side is cut off the
+    # far side counts, as one sees the inside through the opening.
     oy, dy = (oy - 1.0) * 0.5, dy * 0.5
     a = dx * dx + dy * dy + dz * dz
     b = ox * dx + oy * dy + oz * dz
@@ -98,7 +102,8 @@ def _hit_cylinder(
     is_open: bool,
     clip: float,
 ) -> float:
-    # The side is x^2 + z^2 = (m + k * y)^2, of which m + k * y >= 0 excludes the mirrored cone beyond the apex.
+    # The side is x^2 + z^2 = (m + k * y)^2, of which m + k * y >= 0 excludes the mirrored cone
+    # beyond the apex.
     m, k = (bottom + top) * 0.5, (top - bottom) * 0.5
     radius = m + k * oy
     a = _nonzero(dx * dx + dz * dz - k * k * dy * dy)
@@ -139,7 +144,8 @@ def hit(
     dz: float,
     clip: float,
 ) -> float:
-    """Return the depth at which a ray from o along d meets a primitive, in its scaled frame; infinity for a miss."""
+    """Return the depth at which a ray from o along d meets a primitive, in its scaled frame;
+    infinity for a miss."""
     if form == _BOX:
         return _hit_box(ox, oy, oz, dx, dy, dz)
     if form == _ELLIPSOID:

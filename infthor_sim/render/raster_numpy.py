@@ -1,4 +1,5 @@
-"""The ray caster in numpy, for machines without numba; draws the same picture as `raster_numba`, bit for bit.
+"""The ray caster in numpy, for machines without numba; draws the same picture as `raster_numba`,
+bit for bit.
 
 Every formula has the order of operations of its counterpart there, which has the comments.
 """
@@ -18,7 +19,8 @@ _TINY = 1e-12
 def cast(
     prims: Array, projection: Projection, camera: PinholeCamera
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`, or -1 (h, w)."""
+    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`,
+    or -1 (h, w)."""
     us, vs = camera.rays()
     depth = np.full((len(vs), len(us)), camera.far)
     nearest = np.full((len(vs), len(us)), -1, dtype=np.int32)
@@ -36,7 +38,8 @@ def cast(
 def hit(
     prims: Array, projection: Projection, order: int, rays: tuple[Array, Array], near: float
 ) -> Array:
-    """Return depths at which rays (u, v) meet primitive `order` of the projection; infinity where they do not."""
+    """Return depths at which rays (u, v) meet primitive `order` of the projection; infinity where
+    they do not."""
     prim, o, steps = (
         prims[projection.index[order]],
         projection.origin[order],

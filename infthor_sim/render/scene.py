@@ -1,4 +1,5 @@
-"""A world as primitives: the rooms' shell, and every object's shape, cached until the object changes."""
+"""A world as primitives: the rooms' shell, and every object's shape, cached until the object
+changes."""
 
 import numpy as np
 
@@ -29,7 +30,8 @@ class SceneModel:
         self._held: Array = np.zeros((0, COLUMNS))
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
-        """Return the primitives of everything but the held object (n, COLUMNS), those of it, and names of instances."""
+        """Return the primitives of everything but the held object (n, COLUMNS), those of it, and
+        names of instances."""
         if self._version != self._world.version:
             self._rebuild()
         return self._all, self._held, self._names
@@ -58,7 +60,8 @@ class SceneModel:
         world = self._world
         names = [*SHELL_NAMES, *world.objects]
         parts, held = [self._shell], [np.zeros((0, COLUMNS))]
-        # What the hand holds is drawn apart: it hides nothing from the agent's sight, and the frame shows it smaller.
+        # What the hand holds is drawn apart: it hides nothing from the agent's sight, and the frame
+        # shows it smaller.
         in_hand = set() if world.held is None else {world.held}
         if world.held is not None:
             in_hand |= {o.object_id for o in world.descendants(world.objects[world.held])}

@@ -56,7 +56,8 @@ def shade(
     factors: Array,
     lights: Lights,
 ) -> NDArray[np.uint8]:
-    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times its factor."""
+    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times
+    its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     table = shading_table(prims, projection, lights)
@@ -116,9 +117,11 @@ def _lamp_light(
     t: float,
     eye: Any,
 ) -> float:
-    """Return the light of the lamps at depth t on the ray (u, v), on a surface of unit normal (nx, ny, nz).
+    """Return the light of the lamps at depth t on the ray (u, v), on a surface of unit normal (nx,
+    ny, nz).
 
-    The normal is given along the axes of primitive `k`; the lamps are the table's rows from `first` on.
+    The normal is given along the axes of primitive `k`; the lamps are the table's rows from `first`
+    on.
     """
     mx = table[k, AXES] * nx + table[k, AXES + 3] * ny + table[k, AXES + 6] * nz
     my = table[k, AXES + 1] * nx + table[k, AXES + 4] * ny + table[k, AXES + 7] * nz
@@ -161,14 +164,16 @@ def brightness(
     depths: Array,
     levels: Array,
 ) -> None:
-    """Write to `levels` the brightness of primitives where rays hit them; lamps are the table's rows from `first` on.
+    """Write to `levels` the brightness of primitives where rays hit them; lamps are the table's
+    rows from `first` on.
 
     Args:
         orders: the primitives (n,); -1 for none, whose level stays as it is.
         us, vs, depths: the rays, and the depth at which they hit (n,).
     """
-    # What can be told in the primitive's own frame is: the ray's direction d and the normal n have the product
-    # sum(d * n) there whatever the primitive's size, as d is scaled by the inverse of what n is scaled by.
+    # What can be told in the primitive's own frame is: the ray's direction d and the normal n have
+    # the product sum(d * n) there whatever the primitive's size, as d is scaled by the inverse of
+    # what n is scaled by.
     for i in range(len(orders)):
         k = orders[i]
         if k < 0:
@@ -185,8 +190,8 @@ def brightness(
         hx, hy, hz = table[k, HALF], table[k, HALF + 1], table[k, HALF + 2]
         nx, ny, nz = 0.0, 0.0, 0.0
         if table[k, FORM] == _BOX:
-            # The hit is on the face whose coordinate is nearest to 1. At an edge x wins over y over z, as in numpy. The
-            # normal is one of the axes, of the sign that faces the camera.
+            # The hit is on the face whose coordinate is nearest to 1. At an edge x wins over y over
+            # z, as in numpy. The normal is one of the axes, of the sign that faces the camera.
             ax, ay, az = abs(x), abs(y), abs(z)
             if ax >= ay and ax >= az:
                 nx, facing, sun, up, a, b = (

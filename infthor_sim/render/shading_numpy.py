@@ -1,4 +1,5 @@
-"""Colours of the cast pixels in numpy: the formulas of `shading_numba`, in the same order of operations."""
+"""Colours of the cast pixels in numpy: the formulas of `shading_numba`, in the same order of
+operations."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,8 @@ def shade(
     factors: Array,
     lights: Lights,
 ) -> NDArray[np.uint8]:
-    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times its factor."""
+    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times
+    its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     ys, xs = np.nonzero(nearest >= 0)
@@ -67,7 +69,8 @@ def brightness_at(
     camera: PinholeCamera,
     lights: Lights,
 ) -> Array:
-    """Return the brightness (n,) of primitives `p` (n, COLUMNS) at depth t on the rays (u, v, t)."""
+    """Return the brightness (n,) of primitives `p` (n, COLUMNS) at depth t on the rays (u, v,
+    t)."""
     u, v, t = rays
     local = [o[:, i] + t * ((s[:, 0, i] + u * s[:, 1, i]) + v * s[:, 2, i]) for i in range(3)]
     normal, a, b = _surface(p, local)
@@ -92,7 +95,8 @@ def surface_normals(
     depth: Array,
     nearest: NDArray[np.int32],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Return rows, columns and world normals (n, 3), of either sign, of the pixels that `cast` hit."""
+    """Return rows, columns and world normals (n, 3), of either sign, of the pixels that `cast`
+    hit."""
     us, vs = camera.rays()
     ys, xs = np.nonzero(nearest >= 0)
     order = nearest[ys, xs]
@@ -104,7 +108,8 @@ def surface_normals(
 
 
 def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
-    """Return world normals (3 arrays) and two surface coordinates in metres of hit points in scaled frames."""
+    """Return world normals (3 arrays) and two surface coordinates in metres of hit points in scaled
+    frames."""
     x, y, z = local
     form = p[:, FORM]
     ax, ay, az = np.abs(x), np.abs(y), np.abs(z)

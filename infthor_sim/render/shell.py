@@ -10,7 +10,8 @@ __all__ = ["FLOORS", "SHELL_NAMES", "shell_rows"]
 
 SHELL_NAMES = ("Wall", "Ceiling", "Ground")
 _WALLS: tuple[Color, ...] = (
-    (0.86, 0.82, 0.74), (0.74, 0.80, 0.82), (0.82, 0.76, 0.72), (0.76, 0.81, 0.73), (0.83, 0.83, 0.80),
+    (0.86, 0.82, 0.74), (0.74, 0.80, 0.82), (0.82, 0.76, 0.72), (0.76, 0.81, 0.73),
+    (0.83, 0.83, 0.80),
 )  # fmt: skip
 FLOORS: dict[str, tuple[Color, Material]] = {
     "wood": ((0.62, 0.44, 0.29), Material.PLANKS),
@@ -39,7 +40,8 @@ def shell_rows(world: World) -> Array:
         parts.append(rows([ceiling], origin, straight, 1))
         color, material = FLOORS[room.floor_style]
         parts.append(rows(_thresholds(room, color, material), origin, straight, 2))
-        # The ground shows where no Floor object is. It is 2 mm lower, so that the two do not coincide.
+        # The ground shows where no Floor object is. It is 2 mm lower, so that the two do not
+        # coincide.
         ground = ShapePart(
             Form.BOX,
             (middle[0], room.floor - _THICK - 0.002, middle[1]),
@@ -116,7 +118,8 @@ def _thresholds(room: RoomShell, color: Color, material: Material) -> list[Shape
 def _pieces(
     start: float, end: float, doors: list[tuple[float, float]], floor: float
 ) -> list[tuple[float, float, float]]:
-    """Return the stretches of a wall as (from, to, bottom): whole ones between doorways, and those above them."""
+    """Return the stretches of a wall as (from, to, bottom): whole ones between doorways, and those
+    above them."""
     stretches, at = [], start
     for low, high in doors:
         stretches += [(at, low, floor), (low, high, floor + _DOOR)]

@@ -34,7 +34,8 @@ def smooth(
     us, vs = camera.rays()
     table = shading_table(prims, projection, lights)
     _smooth(
-        table, len(projection.index), eye_of(camera), us, vs, camera.near, camera.far, nearest, factors,
+        table, len(projection.index), eye_of(camera), us, vs, camera.near, camera.far, nearest,
+        factors,
         lights.daylight, _find_jagged(rgb), rgb,
     )  # fmt: skip
 
@@ -71,7 +72,8 @@ def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
 def _candidates(
     nearest: NDArray[np.int32], y: int, x: int, orders: NDArray[np.int32], at: NDArray[np.int64]
 ) -> int:
-    """Write the primitives that a pixel and its neighbours show to `orders`, and where to `at`; return how many."""
+    """Write the primitives that a pixel and its neighbours show to `orders`, and where to `at`;
+    return how many."""
     count = 0
     for j in range(len(_NEIGHBOURS)):
         yy, xx = y + _NEIGHBOURS[j, 0], x + _NEIGHBOURS[j, 1]
@@ -156,7 +158,8 @@ def _smooth(
             if chosen >= 0:
                 i = place * parts + part
                 shown[i], ray_u[i], ray_v[i], depths[i] = orders[chosen], u, v, best
-                # The crease factor is that of the pixel that showed it, as there is no depth around the ray.
+                # The crease factor is that of the pixel that showed it, as there is no depth around
+                # the ray.
                 crease[i] = factors[at[chosen, 0], at[chosen, 1]]
     brightness(table, first, eye, daylight, shown, ray_u, ray_v, depths, levels)
     for place in range(len(jagged)):

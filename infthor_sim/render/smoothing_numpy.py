@@ -1,4 +1,5 @@
-"""Smoothing of jagged pixels in numpy: the formulas of `smoothing_numba`, in the same order of operations."""
+"""Smoothing of jagged pixels in numpy: the formulas of `smoothing_numba`, in the same order of
+operations."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,8 @@ def smooth(
 
 def _find_jagged(rgb: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return rows and columns of the pixels that differ much from a neighbour."""
-    # int16 holds sums up to 765 and their differences, in a quarter of the memory of numpy's default.
+    # int16 holds sums up to 765 and their differences, in a quarter of the memory of numpy's
+    # default.
     total = np.add(rgb[:, :, 0], rgb[:, :, 1], dtype=np.int16)
     total += rgb[:, :, 2]
     marked = np.zeros(total.shape, dtype=bool)
@@ -88,7 +90,8 @@ def _depths(
     u: Array,
     v: Array,
 ) -> Array:
-    """Return the depth of each candidate (n, m) on the rays (u, v) (n,); infinity where it is missed."""
+    """Return the depth of each candidate (n, m) on the rays (u, v) (n,); infinity where it is
+    missed."""
     depths = np.full(orders.shape, np.inf)
     for order in np.unique(orders[orders >= 0]):
         rows, columns = np.nonzero(orders == order)

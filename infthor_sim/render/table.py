@@ -1,7 +1,8 @@
 """All that the colours of a picture depend on, in one array.
 
-Numba counts references to each array that an inlined function takes, at every call: two arrays more for each pixel cost
-as much as its light. So primitives, their place in the camera's view, and the lamps go into the kernels as one table.
+Numba counts references to each array that an inlined function takes, at every call: two arrays more
+for each pixel cost as much as its light. So primitives, their place in the camera's view, and the
+lamps go into the kernels as one table.
 """
 
 import numpy as np
@@ -23,7 +24,8 @@ _WIDTH = STEPS + 9
 def shading_table(prims: Array, projection: Projection, lights: Lights) -> Array:
     """Return the projected primitives, and below them the lamps (n + m, columns).
 
-    A primitive's row begins as in `prims`; a lamp's has its position and strength in the first four columns.
+    A primitive's row begins as in `prims`; a lamp's has its position and strength in the first four
+    columns.
     """
     n = len(projection.index)
     table = np.zeros((n + len(lights.lamps), _WIDTH))

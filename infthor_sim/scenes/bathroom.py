@@ -7,7 +7,8 @@ from infthor_sim.scenes.roomplan import RoomPlan
 __all__ = ["furnish_bathroom"]
 
 _LOOSE = (
-    "Candle Candle Cloth Cloth DishSponge SoapBar SoapBar SoapBottle SoapBottle SprayBottle SprayBottle TissueBox"
+    "Candle Candle Cloth Cloth DishSponge SoapBar SoapBar SoapBottle SoapBottle SprayBottle "
+    "SprayBottle TissueBox"
     " ToiletPaper ToiletPaper HandTowel Towel"
 ).split()
 _TOP = 0.85  # of the washstand, metres

@@ -7,7 +7,8 @@ from infthor_sim.scenes.roomplan import RoomPlan
 __all__ = ["furnish_bedroom"]
 
 _LOOSE = (
-    "AlarmClock AlarmClock BaseballBat BasketBall Book Book Bowl CD CD CellPhone CreditCard CreditCard KeyChain Laptop"
+    "AlarmClock AlarmClock BaseballBat BasketBall Book Book Bowl CD CD CellPhone CreditCard "
+    "CreditCard KeyChain Laptop"
     " Mug Pen Pencil Pillow Pillow TeddyBear TennisRacket TissueBox Cloth Box"
 ).split()
 

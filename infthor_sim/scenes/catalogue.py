@@ -77,7 +77,8 @@ class Catalogue:
     def _floor_plan(self, name: str) -> World:
         if self._data is None:
             raise DataError(
-                f"Scene {name} needs recorded data: give the folder that has thor_scenes/objects.jsonl.gz and"
+                f"Scene {name} needs recorded data: give the folder that has "
+                "thor_scenes/objects.jsonl.gz and"
                 " alfred/layouts/ (run and watch: --scenes DIR; other commands: --data DIR)"
             )
         if self._supplement is None:

@@ -1,4 +1,5 @@
-"""Recorded floor plans on disk: objects as AI2-THOR 5 reported them, and cells that the agent reached.
+"""Recorded floor plans on disk: objects as AI2-THOR 5 reported them, and cells that the agent
+reached.
 
 A data folder holds `thor_scenes/objects.jsonl.gz` (one `{"scene", "objects"}` a line) and
 `alfred/layouts/FloorPlan<N>-layout.npy` (reachable (x, z), metres).
@@ -64,7 +65,8 @@ class FloorPlanData:
         return objects
 
     def cells(self, scene: str) -> Array | None:
-        """Return the reachable (x, z) of a floor plan, metres (n, 2); None if the folder has no layout of it.
+        """Return the reachable (x, z) of a floor plan, metres (n, 2); None if the folder has no
+        layout of it.
 
         Raises:
             DataError: the layout is not an array of that form.
@@ -73,7 +75,8 @@ class FloorPlanData:
         if not path.exists():
             return None
         try:
-            # Mapped, so that a header that promises more numbers than there are is refused and fills no memory.
+            # Mapped, so that a header that promises more numbers than there are is refused and
+            # fills no memory.
             cells: Array = np.array(np.load(path, allow_pickle=False, mmap_mode="r"))
         except _NO_ARRAY as error:
             raise DataError(
@@ -95,7 +98,8 @@ class FloorPlanData:
                     lines = [line for line in file if line.strip()]
             except (OSError, EOFError, UnicodeDecodeError, zlib.error) as error:
                 raise DataError(
-                    f"{path}: cannot be read ({error}); --data must name a folder laid out like the published data"
+                    f"{path}: cannot be read ({error}); --data must name a folder laid out like "
+                    "the published data"
                 ) from error
             self._lines = {
                 _scene_of(path, number, line): line for number, line in enumerate(lines, start=1)

@@ -20,10 +20,11 @@ _KNEE = 0.1  # metres above the floor below which nothing stops the agent
 
 
 def add_door_cells(world: World) -> None:
-    """Add the cells beside the grid that only a door or drawer, closed now, would block if it were open.
+    """Add the cells beside the grid that only a door or drawer, closed now, would block if it were
+    open.
 
-    ALFRED's layouts have no such cells, but AI2-THOR lets its agent stand there while the door is closed. An open door
-    blocks them as it blocks others, see `obstacles`.
+    ALFRED's layouts have no such cells, but AI2-THOR lets its agent stand there while the door is
+    closed. An open door blocks them as it blocks others, see `obstacles`.
     """
     places = np.array(sorted(set(_fringe(world.nav)))).reshape(-1, 2)
     free = places[_in_reach_of_a_door(world, places) & _clear(world, places)]
@@ -41,7 +42,8 @@ def _fringe(nav: NavGrid) -> Iterator[tuple[float, float]]:
 
 
 def _in_reach_of_a_door(world: World, places: Array) -> NDArray[np.bool_]:
-    """Return at which places (n, 2) the agent would touch a door or drawer on its way to wide open."""
+    """Return at which places (n, 2) the agent would touch a door or drawer on its way to wide
+    open."""
     reached = np.zeros(len(places), dtype=bool)
     for item in world.objects.values():
         if item.state.openness == 0 and (item.type.hinged or item.type.slides):
@@ -51,7 +53,8 @@ def _in_reach_of_a_door(world: World, places: Array) -> NDArray[np.bool_]:
 
 
 def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
-    """Yield the boxes (low and high corner) around an object's door or drawer on its way to wide open."""
+    """Yield the boxes (low and high corner) around an object's door or drawer on its way to wide
+    open."""
     opened = item.duplicate(item.object_id)
     for opened.state.openness in _OPENNESS:
         leaf = door_leaf(opened)
@@ -60,7 +63,8 @@ def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
 
 
 def _clear(world: World, places: Array) -> NDArray[np.bool_]:
-    """Return at which places (n, 2) the agent's capsule touches neither an object nor the room's walls."""
+    """Return at which places (n, 2) the agent's capsule touches neither an object nor the room's
+    walls."""
     low, high = (corner[[0, 2]] for corner in world.scene_bounds())
     floor = world.standing_height - AGENT_HEIGHT
     clear = np.minimum(places - low, high - places).min(axis=1, initial=np.inf) >= _RADIUS

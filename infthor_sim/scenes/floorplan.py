@@ -21,7 +21,8 @@ from infthor_sim.world import FLOOR_STYLES, RoomShell, World
 __all__ = ["build_floor_plan"]
 
 _CEILING = 2.6  # metres
-# Poses (x, z, yaw) that AI2-THOR starts its agent in, where known: recordings do not have them. Others are inferred.
+# Poses (x, z, yaw) that AI2-THOR starts its agent in, where known: recordings do not have them.
+# Others are inferred.
 _STARTS = {"FloorPlan28": (-1.5, -1.5, 180.0)}
 _STYLES = {
     0: "tiles",
@@ -43,7 +44,8 @@ def build_floor_plan(
         extra: additions from trajectories.
 
     Raises:
-        DataError: neither a layout nor trajectories give a cell to stand on, or an entry is malformed.
+        DataError: neither a layout nor trajectories give a cell to stand on, or an entry is
+            malformed.
     """
     cells = [] if layout is None else [(float(x), float(z)) for x, z in layout]
     cells += extra.cells
@@ -84,7 +86,8 @@ def build_floor_plan(
 
 
 def _assign_recorded_parents(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
-    """Attach loose objects to the receptacles that the recording names: the innermost, which is the smallest."""
+    """Attach loose objects to the receptacles that the recording names: the innermost, which is the
+    smallest."""
     for entry in entries:
         item = world.objects.get(str(entry["objectId"]))
         if item is None or not item.type.pickupable:
@@ -113,7 +116,8 @@ def _room(
     low, high = np.min(lows, axis=0), np.max(highs, axis=0)
     number = _number(name)
     return RoomShell(
-        float(low[0]), float(high[0]), float(low[2]), float(high[2]), max(floor + _CEILING, float(high[1]) + 0.05),
+        float(low[0]), float(high[0]), float(low[2]), float(high[2]),
+        max(floor + _CEILING, float(high[1]) + 0.05),
         floor, _STYLES.get(number // 100, "wood"), number,
     )  # fmt: skip
 

@@ -1,5 +1,6 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""Procedural kitchens: a counter with sink, stove and appliances along one wall, a table with chairs, small things."""
+"""Procedural kitchens: a counter with sink, stove and appliances along one wall, a table with
+chairs, small things."""
 
 import numpy as np
 
@@ -18,10 +19,13 @@ _APPLIANCES = (
     ("Toaster", (0.2, 0.2, 0.3)),
 )
 _TOOLS = (
-    "Apple Bread ButterKnife Bowl Cup DishSponge Egg Fork Knife Lettuce Mug Pan PepperShaker Plate Pot Potato"
+    "Apple Bread ButterKnife Bowl Cup DishSponge Egg Fork Knife Lettuce Mug Pan PepperShaker Plate "
+    "Pot Potato"
     " SaltShaker SoapBottle Spatula Spoon Tomato Cup Mug Plate Bowl Apple Potato Tomato".split()
 )
-_MORE = "Bottle Book Kettle Ladle Mug PaperTowelRoll Plate Statue Vase WineBottle Spoon Fork Egg Bowl".split()
+_MORE = (
+    "Bottle Book Kettle Ladle Mug PaperTowelRoll Plate Statue Vase WineBottle Spoon Fork Egg Bowl"
+).split()
 
 
 def furnish_kitchen(plan: RoomPlan, loose: int = 34) -> None:

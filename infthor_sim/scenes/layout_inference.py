@@ -1,4 +1,5 @@
-"""Inference of what recorded boxes do not say: fronts, hinges, drawers in desks, sinks in counters, burners' knobs."""
+"""Inference of what recorded boxes do not say: fronts, hinges, drawers in desks, sinks in counters,
+burners' knobs."""
 
 from collections.abc import Iterator
 
@@ -20,7 +21,8 @@ _LIP, _BEFORE = (
 
 
 def infer_layout(world: World) -> None:
-    """Set fronts, hinges, outlines, hollow furniture, knobs and surface heights of a world's objects, in place."""
+    """Set fronts, hinges, outlines, hollow furniture, knobs and surface heights of a world's
+    objects, in place."""
     items = list(world.objects.values())
     fixed = [o for o in items if not o.type.pickupable]
     for item in fixed:
@@ -31,7 +33,8 @@ def infer_layout(world: World) -> None:
     for item in fixed:
         item.pieces = _outline(item, fixed, world.nav) if item.type.has_cutouts else ()
         if item.object_type == "Cabinet":
-            # A solid cabinet would fill a basin that hangs in it. A tub, which is no `open_top`, has its own basin.
+            # A solid cabinet would fill a basin that hangs in it. A tub, which is no `open_top`,
+            # has its own basin.
             item.hollow = any(
                 o.type.basin and o.type.open_top > 0 and _overlaps(o, item) for o in fixed
             )
@@ -44,7 +47,8 @@ def infer_layout(world: World) -> None:
 
 
 def _front(item: SimObject, nav: NavGrid) -> float:
-    """Return the yaw of the front in the object's own frame, degrees: towards the most free floor."""
+    """Return the yaw of the front in the object's own frame, degrees: towards the most free
+    floor."""
     low, high = item.bounds()
     center, half = (low + high) / 2, (high - low) / 2
     hinge = item.position - center
@@ -53,7 +57,8 @@ def _front(item: SimObject, nav: NavGrid) -> float:
         direction = np.round([np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))])
         face = center + direction * half
         free = nav.count_free_ahead(face[0], face[2], angle)
-        # A cabinet's origin is at its hinge, which is on its front: that counts more than any amount of floor.
+        # A cabinet's origin is at its hinge, which is on its front: that counts more than any
+        # amount of floor.
         at_face = float(hinge @ direction) >= float(np.abs(direction) @ half) - 0.08
         bonus = 100 if item.object_type == "Cabinet" and at_face else 0
         thin = float(np.abs(direction) @ half) <= min(half[0], half[2]) + 1e-6
@@ -66,7 +71,8 @@ def _front(item: SimObject, nav: NavGrid) -> float:
 
 
 def _hinge(item: SimObject) -> int:
-    """Return the side of the hinge, -1 or 1, seen from the front: where a cabinet's origin is; 1 for other doors."""
+    """Return the side of the hinge, -1 or 1, seen from the front: where a cabinet's origin is; 1
+    for other doors."""
     if item.object_type != "Cabinet":
         return 1
     angle = np.radians(float(item.rotation[1]) + item.front)
@@ -88,9 +94,11 @@ def _is_inside(inner: SimObject, outer: SimObject) -> bool:
 
 
 def _outline(item: SimObject, fixed: list[SimObject], nav: NavGrid) -> tuple[Rect, ...]:
-    """Return an object's outline from above without sinks and, for counters, without the floor; empty: the whole box.
+    """Return an object's outline from above without sinks and, for counters, without the floor;
+    empty: the whole box.
 
-    A counter around a corner is recorded as one box. The agent's cells in it, and what its cabinets open on, are floor.
+    A counter around a corner is recorded as one box. The agent's cells in it, and what its cabinets
+    open on, are floor.
     """
     low, high = item.bounds()
     holes = [_own_frame(item, *box) for box in _sink_boxes(item, fixed)]
@@ -126,7 +134,8 @@ def _sink_boxes(item: SimObject, fixed: list[SimObject]) -> Iterator[tuple[Array
 
 
 def _fronts_below(counter: SimObject, fixed: list[SimObject]) -> Iterator[tuple[Array, Array]]:
-    """Yield the corners of boxes over the floor in front of the cabinets and drawers below a counter."""
+    """Yield the corners of boxes over the floor in front of the cabinets and drawers below a
+    counter."""
     high = counter.bounds()[1]
     for other in fixed:
         if other.object_type not in {"Cabinet", "Drawer"}:
@@ -135,7 +144,8 @@ def _fronts_below(counter: SimObject, fixed: list[SimObject]) -> Iterator[tuple[
         if o_high[1] > high[1] + 0.05 or high[1] - o_high[1] > 0.5:
             continue  # above the counter, or of other furniture
         ahead = np.round(yaw_matrix(float(other.rotation[1]) + other.front)[:, 2])
-        # Along the axis of the front the box goes from the lip to the free floor; across it, it is the cabinet's.
+        # Along the axis of the front the box goes from the lip to the free floor; across it, it is
+        # the cabinet's.
         start, end = o_low + ahead * (_LIP + (o_high - o_low)), o_high + ahead * _BEFORE
         yield (
             np.minimum(start, end) * np.abs(ahead) + o_low * (1 - np.abs(ahead)),
@@ -166,7 +176,8 @@ def _connect_knobs(items: list[SimObject]) -> None:
 
 
 def _infer_supports(world: World) -> None:
-    """Set the surface height of tables and seats to where things lie on them, as their boxes include backs and rims."""
+    """Set the surface height of tables and seats to where things lie on them, as their boxes
+    include backs and rims."""
     lying: dict[str, list[float]] = {}
     for item in world.objects.values():
         if item.type.pickupable:

@@ -1,5 +1,6 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""Procedural living rooms: a sofa before a television, a low table between, shelves and lamps along the walls."""
+"""Procedural living rooms: a sofa before a television, a low table between, shelves and lamps along
+the walls."""
 
 from infthor_sim.scenes.roomplan import RoomPlan
 
@@ -9,7 +10,8 @@ _ALONG_WALLS = (
     "ArmChair SideTable FloorLamp ShelvingUnit GarbageCan DiningTable Desk Ottoman".split()
 )
 _LOOSE = (
-    "Book Book Box CellPhone CreditCard KeyChain Laptop Newspaper Pillow Pillow RemoteControl Statue"
+    "Book Book Box CellPhone CreditCard KeyChain Laptop Newspaper Pillow Pillow RemoteControl "
+    "Statue"
     " TissueBox Vase Watch WateringCan Candle Plate Bowl Pencil Pen Mug CreditCard KeyChain Vase"
 ).split()
 
@@ -49,7 +51,8 @@ def furnish_living_room(plan: RoomPlan, loose: int = 24) -> None:
     plan.loose += plan.shuffle(_LOOSE)[:loose]
 
 
-_SIZES = {"DiningTable": (1.1, 0.75, 0.8), "Desk": (1.2, 0.76, 0.6), "ShelvingUnit": (0.9, 1.5, 0.35),
+_SIZES = {"DiningTable": (1.1, 0.75, 0.8), "Desk": (1.2, 0.76, 0.6),
+          "ShelvingUnit": (0.9, 1.5, 0.35),
           "SideTable": (0.5, 0.6, 0.4), "FloorLamp": (0.4, 1.6, 0.4)}  # fmt: skip
 
 
@@ -63,7 +66,8 @@ def place_lamp(plan: RoomPlan, x: float, z: float, y: float) -> None:
 def place_drawers(
     plan: RoomPlan, owner_id: str, side: str, at: float, size: tuple[float, float, float], rows: int
 ) -> None:
-    """Fill the front of a chest with two columns of drawers; the chest itself is drawn without a front."""
+    """Fill the front of a chest with two columns of drawers; the chest itself is drawn without a
+    front."""
     owner = next(o for o in plan.objects if o.object_id == owner_id)
     owner.hollow = True
     width, height, depth = size

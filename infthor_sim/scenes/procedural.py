@@ -37,13 +37,15 @@ SCENE_TYPES = (*_FURNISH, "house")
 
 
 def build_scene(scene_type: str, seed: int) -> World:
-    """Return the world of `<scene_type>-<seed>`: the first draw of furniture that leaves every room accessible.
+    """Return the world of `<scene_type>-<seed>`: the first draw of furniture that leaves every room
+    accessible.
 
     Raises:
         SimulatorError: no draw does.
     """
     for attempt in range(_DRAWS):
-        # Each attempt of each scene has a random stream of its own, whatever the attempts before it drew.
+        # Each attempt of each scene has a random stream of its own, whatever the attempts before it
+        # drew.
         random = np.random.default_rng([zlib.crc32(scene_type.encode()), seed, attempt])
         if scene_type == "house":
             plans, doors = _house_plans(random, seed)
@@ -59,7 +61,8 @@ def build_scene(scene_type: str, seed: int) -> World:
 
 
 def _is_accessible(world: World, plan: RoomPlan) -> bool:
-    """Return whether the agent gets to most of a room's free floor, and near all its receptacles."""
+    """Return whether the agent gets to most of a room's free floor, and near all its
+    receptacles."""
     free = plan.free_cells()
     reached = [cell for cell in free if world.nav.can_stand(*cell)]
     if len(reached) < _REACHABLE_SHARE * len(free):
@@ -99,7 +102,8 @@ def _furnish(plan: RoomPlan, room_type: str) -> None:
 def _house_plans(
     random: np.random.Generator, seed: int
 ) -> tuple[list[RoomPlan], list[tuple[float, float]]]:
-    """Return the plans of four rooms, two by two with doorways between them, and the cells in the doorways."""
+    """Return the plans of four rooms, two by two with doorways between them, and the cells in the
+    doorways."""
     west, east = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.6, 5.2), 2)
     south, north = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.4, 5.0), 2)
     gap = 0.1  # the thickness of an inner wall

@@ -33,7 +33,8 @@ Span = tuple[float, float, float, float]
 
 
 def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
-    """Return the bounding boxes (width, height, depth) of ProcTHOR's assets by id; empty if the folder has none.
+    """Return the bounding boxes (width, height, depth) of ProcTHOR's assets by id; empty if the
+    folder has none.
 
     Raises:
         DataError: the file is there but not readable.
@@ -94,7 +95,8 @@ def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, fl
         if "assetPosition" in entry:
             objects[str(entry["id"])] = _window(entry, house)
     rooms = tuple(
-        RoomShell(*(r[0], r[2], r[1], r[3]), _HEIGHT, 0.0, _FLOORS.get(room_type, "wood"), index, walled=False)
+        RoomShell(*(r[0], r[2], r[1], r[3]), _HEIGHT, 0.0, _FLOORS.get(room_type, "wood"), index,
+                  walled=False)
         for index, (room_type, rects) in enumerate(floors) for r in rects
     )  # fmt: skip
     nav = _nav([r for _, rects in floors for r in rects], walls, list(objects.values()))
@@ -174,14 +176,16 @@ def _window(entry: Mapping[str, Any], house: Mapping[str, Any]) -> SimObject:
 
 
 def _base(polygon: Sequence[Mapping[str, float]]) -> Span:
-    """Return the two lower corners of a wall, in the order of its polygon: places along a wall count from the first."""
+    """Return the two lower corners of a wall, in the order of its polygon: places along a wall
+    count from the first."""
     lower = sorted(polygon, key=lambda p: float(p["y"]))[:2]
     first, second = [p for p in polygon if any(p is q for q in lower)]
     return float(first["x"]), float(first["z"]), float(second["x"]), float(second["z"])
 
 
 def _door_spans(house: Mapping[str, Any]) -> Iterator[tuple[str, float, float]]:
-    """Yield each doorway once per wall that it is in: the wall's id, and from and to along that wall."""
+    """Yield each doorway once per wall that it is in: the wall's id, and from and to along that
+    wall."""
     for door in house.get("doors", ()):
         if "holePolygon" in door:
             points = [float(p["x"]) for p in door["holePolygon"]]
@@ -200,7 +204,8 @@ def _walls(house: Mapping[str, Any], doors: Sequence[tuple[str, float, float]]) 
         x0, z0, x1, z1 = _base(wall["polygon"])
         length = math.dist((x0, z0), (x1, z1))
         if length < 1e-6 or wall.get("empty") or "exterior" in str(wall["id"]):
-            continue  # exterior walls coincide with those of rooms; empty ones are openings between rooms
+            # exterior walls coincide with those of rooms; empty ones are openings between rooms
+            continue
         style = style_of(str(wall.get("roomId", "")))
         at = 0.0
         for _, low, high in sorted(d for d in doors if d[0] == str(wall["id"])):
@@ -211,7 +216,8 @@ def _walls(house: Mapping[str, Any], doors: Sequence[tuple[str, float, float]]) 
 
 
 def _stretch(ends: Span, length: float, low: float, high: float, bottom: float, style: int) -> Wall:
-    """Return the part of a wall of some length between two places along it, from `bottom` to the ceiling."""
+    """Return the part of a wall of some length between two places along it, from `bottom` to the
+    ceiling."""
     x0, z0, x1, z1 = ends
     a, b = low / length, high / length
     return Wall(

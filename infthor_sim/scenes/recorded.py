@@ -15,11 +15,13 @@ from infthor_sim.objects import SimObject, SimObjectState
 
 __all__ = ["recorded_object"]
 
-_TILTED = 10.0  # degrees of pitch or roll beyond which an object's yaw is taken from its box, not from its angles
+# degrees of pitch or roll beyond which an object's yaw is taken from its box, not from its angles
+_TILTED = 10.0
 
 
 def recorded_object(entry: Mapping[str, Any]) -> SimObject:
-    """Return an upright object from one entry of `metadata["objects"]`; a small tilt goes into its box.
+    """Return an upright object from one entry of `metadata["objects"]`; a small tilt goes into its
+    box.
 
     Raises:
         DataError: a required field is missing or malformed.
@@ -63,7 +65,8 @@ def _object(entry: Mapping[str, Any]) -> SimObject:
 
 
 def _type(entry: Mapping[str, Any]) -> ObjectType:
-    """Return the record of the entry's type with the abilities that the entry has: versions of AI2-THOR differ."""
+    """Return the record of the entry's type with the abilities that the entry has: versions of
+    AI2-THOR differ."""
     declared = type_named(str(entry["objectType"]))
     return replace(
         declared,
@@ -99,7 +102,8 @@ def _state(entry: Mapping[str, Any]) -> SimObjectState:
 
 
 def _yaw(rotation: Mapping[str, float], points: Array) -> float:
-    """Return the yaw in degrees; of an object that lies on its side, the direction of its longest level edge."""
+    """Return the yaw in degrees; of an object that lies on its side, the direction of its longest
+    level edge."""
     tilt = max(abs(wrap_degrees(float(rotation["x"]))), abs(wrap_degrees(float(rotation["z"]))))
     if tilt <= _TILTED:
         return float(rotation["y"])

@@ -2,10 +2,12 @@
 
 The file is JSON, one entry per floor plan:
 
-    {"FloorPlan10": {"cells": [[x, z], ...], "floor_y": 0.9009992, "objects": ["Fridge|-00.33|+00.00|-00.77", ...]}}
+    {"FloorPlan10": {"cells": [[x, z], ...], "floor_y": 0.9009992, "objects":
+    ["Fridge|-00.33|+00.00|-00.77", ...]}}
 
-`cells` are positions of the agent that the trajectories visit (metres), `floor_y` is the agent's height there, and
-`objects` are ids of fixed things that they interact with. All three may be absent.
+`cells` are positions of the agent that the trajectories visit (metres), `floor_y` is the agent's
+height there, and `objects` are ids of fixed things that they interact with. All three may be
+absent.
 """
 
 import json

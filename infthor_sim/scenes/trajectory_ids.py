@@ -1,7 +1,8 @@
 """Giving recorded objects the ids that trajectories use.
 
-Trajectories were recorded with another version of AI2-THOR than the objects' metadata: fixed objects may have another
-id, be another type of table, or be missing. What a trajectory interacts with must exist under the trajectory's id.
+Trajectories were recorded with another version of AI2-THOR than the objects' metadata: fixed
+objects may have another id, be another type of table, or be missing. What a trajectory interacts
+with must exist under the trajectory's id.
 """
 
 from collections.abc import Iterable
@@ -22,12 +23,14 @@ _NEAR = 0.3  # metres that an object may be off between the two versions
 def use_trajectory_ids(
     objects: dict[str, SimObject], ids: Iterable[str], nav: NavGrid, floor: float
 ) -> dict[str, SimObject]:
-    """Return `objects` with a fixed object for each id: renamed, given another type, or created if missing.
+    """Return `objects` with a fixed object for each id: renamed, given another type, or created if
+    missing.
 
     Ids of loose objects are skipped: those come with a trajectory's own poses.
     """
     missing = [i for i in sorted(set(ids)) if i not in objects and not _is_loose(i)]
-    # All pairs, cheapest first, so that the best matches are made before an object is taken by a worse one.
+    # All pairs, cheapest first, so that the best matches are made before an object is taken by a
+    # worse one.
     pairs = sorted(
         (cost, new_id, item.object_id) for new_id in missing for item in objects.values()
         if (cost := _match_cost(new_id, item)) is not None
@@ -50,7 +53,8 @@ def use_trajectory_ids(
 
 
 def parse_id(object_id: str) -> tuple[str, Array]:
-    """Return the type and position (3,) that an id names; `Sink|..|..|..|SinkBasin` is a SinkBasin."""
+    """Return the type and position (3,) that an id names; `Sink|..|..|..|SinkBasin` is a
+    SinkBasin."""
     parts = object_id.split("|")
     object_type = parts[4].split("_")[0] if len(parts) > 4 else parts[0]
     try:
@@ -67,13 +71,15 @@ def _is_loose(object_id: str) -> bool:
 
 
 def _match_cost(object_id: str, item: SimObject) -> float | None:
-    """Return how unlikely it is that an object is the one that an id names; None: it is another one."""
+    """Return how unlikely it is that an object is the one that an id names; None: it is another
+    one."""
     object_type, position = parse_id(object_id)
     low, high = item.bounds()
     level = float(np.hypot(*(position - item.position)[[0, 2]]))
     rise = abs(float(position[1] - item.position[1]))
     if object_type == item.object_type:
-        # Versions differ in the height of origins, so it counts little, but for drawers and the like above each other.
+        # Versions differ in the height of origins, so it counts little, but for drawers and the
+        # like above each other.
         away = float(np.hypot(level, rise)) if item.type.stacked else level + 0.05 * rise
         inside = item.type.furniture and bool(
             np.all((position >= low - 0.05) & (position <= high + 0.3))
@@ -97,7 +103,8 @@ def _rename(item: SimObject, object_id: str) -> None:
 
 
 def _create(object_id: str, nav: NavGrid, floor: float) -> SimObject:
-    """Return a new object of the type and at the position that an id names, turned to the free floor."""
+    """Return a new object of the type and at the position that an id names, turned to the free
+    floor."""
     object_type, position = parse_id(object_id)
     item = default_object(object_type, position, nav.freest_yaw(position[0], position[2]))
     if (

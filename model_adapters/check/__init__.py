@@ -1,6 +1,7 @@
 """Contract checks for anybody's adapter.
 
-The checks use the protocols only, so they apply to every back end. A violated clause raises an error of one line.
+The checks use the protocols only, so they apply to every back end. A violated clause raises an
+error of one line.
 """
 
 from model_adapters.check.clauses import ContractError

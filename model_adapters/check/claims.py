@@ -25,7 +25,8 @@ _CHOICES = ("bright", "dark", "dark and bright")  # one is a prefix of another
 
 
 def check_sampling(model: Model, frame: FrameRef) -> None:
-    """Check that replies are sampled if the model claims to, and depend on the seed alone if it is deterministic."""
+    """Check that replies are sampled if the model claims to, and depend on the seed alone if it is
+    deterministic."""
     decodings = [
         Decoding(max_new_tokens=NEW_TOKENS, temperature=2.0, seed=seed) for seed in range(4)
     ]
@@ -34,7 +35,8 @@ def check_sampling(model: Model, frame: FrameRef) -> None:
         refuses = raises(ModelError, talk.reply, decodings[0])
         require(
             refuses,
-            "a temperature does not raise ModelError though sampling is false; call check_decoding first",
+            "a temperature does not raise ModelError though sampling is false; call check_decoding "
+            "first",
         )
         return
     replies = [talk.reply(decoding) for decoding in decodings]
@@ -64,7 +66,8 @@ def check_choices(model: Model, frame: FrameRef) -> None:
 
 
 def check_video(model: Model, black: FrameRef, white: FrameRef) -> None:
-    """Check that videos are taken if the model claims so, and that replies to them do not depend on earlier ones."""
+    """Check that videos are taken if the model claims so, and that replies to them do not depend on
+    earlier ones."""
     videos = [
         Video((black, white, white, black), fps=1.0),
         Video((black, white, white, white), fps=1.0),

@@ -17,7 +17,8 @@ class CheckResult:
 
     Attributes:
         name: name of the check, a word.
-        violation: the clause that does not hold, or the error that the checked code raised; None if the check passes.
+        violation: the clause that does not hold, or the error that the checked code raised; None if
+            the check passes.
     """
 
     name: str

@@ -53,7 +53,8 @@ class CheckpointAdapter:
         model_type = located.config.model_type
         if model_type not in cls.model_types:
             raise ModelError(
-                f"{options.pretrained} is a {model_type} checkpoint, not {' or '.join(cls.model_types)}; try hf-vlm"
+                f"{options.pretrained} is a {model_type} checkpoint, not "
+                f"{' or '.join(cls.model_types)}; try hf-vlm"
             )
         return located
 
@@ -64,7 +65,8 @@ def load_model(
     """Load a checkpoint of a known family and test it on one frame.
 
     Raises:
-        ModelError: the checkpoint cannot be loaded, or processor and model disagree on a frame's tokens.
+        ModelError: the checkpoint cannot be loaded, or processor and model disagree on a frame's
+            tokens.
     """
     loaded, pretrained = load_checkpoint(located, family), located.options.pretrained
     with wrap_mismatch_errors(pretrained), torch.inference_mode():
@@ -72,20 +74,22 @@ def load_model(
         n_features = len(loaded.family.features([Image.new("RGB", _SAMPLE)])[0])
     if n_slots != n_features:
         raise ModelError(
-            f"{pretrained}: the processor makes {n_slots} image tokens of one frame and the model {n_features} "
-            "features; they do not belong to one checkpoint"
+            f"{pretrained}: the processor makes {n_slots} image tokens of one frame and the model "
+            f"{n_features} features; they do not belong to one checkpoint"
         )
     return TransformersModel(name, loaded, located.options)
 
 
 @contextmanager
 def wrap_mismatch_errors(pretrained: str) -> Iterator[None]:
-    """Turn errors of a model on the pixels or tokens of another checkpoint's processor into one line.
+    """Turn errors of a model on the pixels or tokens of another checkpoint's processor into one
+    line.
 
     Raises:
         ModelError: the model failed on them.
     """
-    # Any error is possible: the processor's settings come from a file and end up in arithmetic and shapes.
+    # Any error is possible: the processor's settings come from a file and end up in arithmetic and
+    # shapes.
     problem = f"{pretrained}: the model fails on what the processor makes of a frame"
     with wrap_errors(
         problem, "do they belong to one checkpoint?", catch=Exception, raise_as=ModelError

@@ -79,7 +79,8 @@ class HfModel(CheckpointModel):
 
     @property
     def capabilities(self) -> Capabilities:
-        """Sampling and choices, one request at a time, `_batch_size` continuations of a shared prefix together."""
+        """Sampling and choices, one request at a time, `_batch_size` continuations of a shared
+        prefix together."""
         text_config = self._loaded.model.config.get_text_config()
         return Capabilities(
             sampling=True,
@@ -93,7 +94,8 @@ class HfModel(CheckpointModel):
         )
 
     def identity(self) -> dict[str, Any]:
-        """Return checkpoint, precision, kernels, versions and generation settings, as JSON values."""
+        """Return checkpoint, precision, kernels, versions and generation settings, as JSON
+        values."""
         options, generation = self._options, self._loaded.generation
         return self._loaded.identity | {
             "adapter": self.name,

@@ -14,7 +14,8 @@ Size = tuple[int, int]  # width, height in pixels
 
 @dataclass(frozen=True)
 class ClipShape:
-    """All that tokens and positions of a clip depend on: successive frames of a video that are encoded together.
+    """All that tokens and positions of a clip depend on: successive frames of a video that are
+    encoded together.
 
     Attributes:
         size: width and height of the video's frames, in pixels.
@@ -36,7 +37,8 @@ class VideoInput(Protocol):
     """Conversion of videos to tokens and features, clip by clip.
 
     Attributes:
-        placeholder_id: token id of a video in the tokenised chat template, and of each token that it expands to.
+        placeholder_id: token id of a video in the tokenised chat template, and of each token that
+            it expands to.
         clip_frames: frames of a clip; the last one is repeated where a video has too few.
     """
 
@@ -49,7 +51,8 @@ class VideoInput(Protocol):
     def features(
         self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
     ) -> list[torch.Tensor]:
-        """Return the embeddings for the tokens of each clip, (tokens, hidden), on the embedding layer's device."""
+        """Return the embeddings for the tokens of each clip, (tokens, hidden), on the embedding
+        layer's device."""
 
 
 class Family(Protocol):
@@ -69,10 +72,12 @@ class Family(Protocol):
         """Return the ids that the placeholder of a frame of this size expands to."""
 
     def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
-        """Return the ids of a frame or a video in a template: its placeholder and, in some families, markers."""
+        """Return the ids of a frame or a video in a template: its placeholder and, in some
+        families, markers."""
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the embeddings for the slots of each image, (slots, hidden), on the embedding layer's device.
+        """Return the embeddings for the slots of each image, (slots, hidden), on the embedding
+        layer's device.
 
         They carry gradients, for training; inference calls this under `torch.inference_mode`.
         """

@@ -17,7 +17,8 @@ _FAILURES = (RuntimeError, ValueError, IndexError, ArithmeticError, MemoryError)
 def check_limit(
     name: str, n_context: int, max_new_tokens: int, limit: int | None, option: str = "max_tokens"
 ) -> None:
-    """Check that context and reply, in tokens, are within the limit of both together; None for none.
+    """Check that context and reply, in tokens, are within the limit of both together; None for
+    none.
 
     `option` is the model's option that sets the limit, for the message.
 
@@ -26,14 +27,15 @@ def check_limit(
     """
     if limit is not None and n_context + max_new_tokens > limit:
         raise ModelError(
-            f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} tokens "
-            f"of {name}; use fewer frames, or set {option} if the model can take more"
+            f"a context of {n_context} tokens and {max_new_tokens} new ones is beyond the {limit} "
+            f"tokens of {name}; use fewer frames, or set {option} if the model can take more"
         )
 
 
 @contextmanager
 def wrap_model_errors(name: str) -> Iterator[None]:
-    """Turn an error of a model or its processor on one request into one line, so that the run goes on.
+    """Turn an error of a model or its processor on one request into one line, so that the run goes
+    on.
 
     Raises:
         ModelError: the model failed on the request.
@@ -62,7 +64,8 @@ def wrap_memory_errors(name: str, n_context: int) -> Iterator[None]:
         traceback.clear_frames(
             error.__traceback__
         )  # its local variables hold the request's cache and activations
-        # torch has its own exception for GPUs only; on the CPU, only the allocator's name identifies the error.
+        # torch has its own exception for GPUs only; on the CPU, only the allocator's name
+        # identifies the error.
         cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)
         if not (cpu or isinstance(error, torch.OutOfMemoryError)):
             raise

@@ -1,8 +1,8 @@
 """Similarity of frames and texts by a CLIP model, for retrieval contexts.
 
-A set has hundreds of thousands of frames, and every question on a trajectory ranks the same ones. So each frame is
-embedded once, in small batches, and the vectors are kept in a file of the user's cache: memory does not grow with the
-set, and the next run reuses them.
+A set has hundreds of thousands of frames, and every question on a trajectory ranks the same ones.
+So each frame is embedded once, in small batches, and the vectors are kept in a file of the user's
+cache: memory does not grow with the set, and the next run reuses them.
 """
 
 import json
@@ -35,10 +35,12 @@ _BATCH = 32  # frames whose pixels are in memory at once
 
 
 class Retriever:
-    """A CLIP model in float32, on a GPU if there is one; its vectors have length 1, so dot products are cosines."""
+    """A CLIP model in float32, on a GPU if there is one; its vectors have length 1, so dot products
+    are cosines."""
 
     def __init__(self, name: str, revision: str | None = None) -> None:
-        """Load a checkpoint from a folder or the hub; the hub's default branch where the revision is None.
+        """Load a checkpoint from a folder or the hub; the hub's default branch where the revision
+        is None.
 
         Raises:
             UsageError: the checkpoint cannot be found or loaded, or is not one of CLIP.
@@ -90,7 +92,8 @@ class Retriever:
         return self._vectors.get([frame.digest for frame in frames])
 
     def text(self, text: str) -> np.ndarray:
-        """Return the vector of a text, (dimensions,); the text is truncated to CLIP's limit (77 tokens)."""
+        """Return the vector of a text, (dimensions,); the text is truncated to CLIP's limit (77
+        tokens)."""
         key = digest(f"text: {text}")
         if key not in self._vectors:
             limit = self._model.config.text_config.max_position_embeddings

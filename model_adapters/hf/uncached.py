@@ -1,7 +1,8 @@
-"""Any image-text-to-text model, run by its own processor and `generate` without a cache between replies.
+"""Any image-text-to-text model, run by its own processor and `generate` without a cache between
+replies.
 
-It is slow and correct for every architecture, including those that cannot share prefixes: attention in both directions
-over images, or vision features that enter at several layers.
+It is slow and correct for every architecture, including those that cannot share prefixes: attention
+in both directions over images, or vision features that enter at several layers.
 """
 
 from collections.abc import Sequence
@@ -74,7 +75,8 @@ def expand_image_token(processor: Any, image: Image.Image) -> list[int]:
 
 
 class _ForceReplyTokens(LogitsProcessor):
-    """Makes `generate` emit the tokens that a `ReplyState` chooses, so that decoding is the same as with a cache."""
+    """Makes `generate` emit the tokens that a `ReplyState` chooses, so that decoding is the same as
+    with a cache."""
 
     def __init__(self, reply: ReplyState) -> None:
         self._reply = reply

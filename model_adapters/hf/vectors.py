@@ -15,7 +15,8 @@ _DIGITS = 6  # digits of a similarity; rounding errors beyond must not decide be
 
 
 class VectorFile:
-    """An append-only file of float32 vectors; only the keys are in memory, so millions of vectors cost little."""
+    """An append-only file of float32 vectors; only the keys are in memory, so millions of vectors
+    cost little."""
 
     def __init__(self, path: Path, width: int) -> None:
         """Open the file, or create it and its folder; `width` is the dimensions of a vector.
@@ -42,7 +43,8 @@ class VectorFile:
         """Append vectors.
 
         Args:
-            keys: keys of 32 ASCII characters each; if another process has added a key meanwhile, its vector is kept.
+            keys: keys of 32 ASCII characters each; if another process has added a key meanwhile,
+                its vector is kept.
             vectors: vectors, (keys, width).
 
         Raises:

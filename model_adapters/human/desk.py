@@ -1,4 +1,5 @@
-"""Where a question waits for its answer: the run asks in one thread, and the page answers in others."""
+"""Where a question waits for its answer: the run asks in one thread, and the page answers in
+others."""
 
 import itertools
 import threading
@@ -10,7 +11,8 @@ from model_adapters.protocols import Decoding, Turn
 
 __all__ = ["Answer", "Asked", "Desk", "Question", "StaleError"]
 
-_WAKE_S = 0.2  # seconds between two looks at signals: conditions wait without, and Ctrl-C must end a run at once
+# seconds between two looks at signals: conditions wait without, and Ctrl-C must end a run at once
+_WAKE_S = 0.2
 
 
 class StaleError(Exception):
@@ -19,7 +21,8 @@ class StaleError(Exception):
 
 @dataclass(frozen=True)
 class Asked:
-    """What is put before a person: the turns that a model would be given, the decoding, and what is told beside."""
+    """What is put before a person: the turns that a model would be given, the decoding, and what is
+    told beside."""
 
     turns: tuple[Turn, ...]
     decoding: Decoding
@@ -36,7 +39,8 @@ class Answer:
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked; `number` counts from 1, and `since` is the monotonic time in seconds at which it was put."""
+    """What is asked; `number` counts from 1, and `since` is the monotonic time in seconds at which
+    it was put."""
 
     number: int
     asked: Asked
@@ -134,12 +138,14 @@ class Desk:
             self._changed.notify_all()
 
     def wait_until_told(self, timeout_s: float) -> None:
-        """Wait until a page has learned that it is over, if there is one, for so many seconds at most."""
+        """Wait until a page has learned that it is over, if there is one, for so many seconds at
+        most."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_told or not self._has_readers, timeout_s)
 
     def stop(self) -> None:
-        """Let the run end as Ctrl-C does: what is asked now stays unanswered, and is asked when the run goes on."""
+        """Let the run end as Ctrl-C does: what is asked now stays unanswered, and is asked when the
+        run goes on."""
         with self._changed:
             self._is_stopped = True
             self._changed.notify_all()

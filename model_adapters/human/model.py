@@ -29,7 +29,8 @@ class HumanModel:
 
     @property
     def capabilities(self) -> Capabilities:
-        """One question at a time; nothing is counted in tokens, and nobody answers the same twice for certain."""
+        """One question at a time; nothing is counted in tokens, and nobody answers the same twice
+        for certain."""
         return Capabilities(
             counts_tokens=False, token_ids=False, deterministic=False, sampling=True, choices=True
         )

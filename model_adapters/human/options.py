@@ -28,7 +28,8 @@ class HumanOptions:
         """Check all values; raise `UsageError` for one that is out of its range."""
         if not _READER.fullmatch(str(self.reader)):
             raise UsageError(
-                f"human: reader is {self.reader!r:.60}; write a name of at most 40 letters, digits, '.', '-' and '_'"
+                f"human: reader is {self.reader!r:.60}; write a name of at most 40 letters, "
+                "digits, '.', '-' and '_'"
             )
         if not 0 <= self.port <= 65_535:
             raise UsageError(f"human: port must be between 0 and 65535, not {self.port}")

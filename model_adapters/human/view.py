@@ -14,8 +14,8 @@ __all__ = ["frames_of", "state_of"]
 def state_of(desk: Desk) -> dict[str, Any]:
     """Return what the page shows now.
 
-    `parts` has the texts and frames that a model would be given, in order: `{"text": ...}` or `{"frame": n}`, n being
-    the frame's place among all frames.
+    `parts` has the texts and frames that a model would be given, in order: `{"text": ...}` or
+    `{"frame": n}`, n being the frame's place among all frames.
     """
     version, question = desk.version, desk.question
     return {

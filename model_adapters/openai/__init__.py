@@ -1,1 +1,2 @@
-"""Models behind a server that speaks OpenAI's chat completions: vLLM, SGLang, `transformers serve`, commercial ones."""
+"""Models behind a server that speaks OpenAI's chat completions: vLLM, SGLang, `transformers serve`,
+commercial ones."""

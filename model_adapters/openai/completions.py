@@ -80,7 +80,8 @@ class Completion(msgspec.Struct, frozen=True):
         return message.reasoning_content or message.reasoning or None
 
     def text(self, where: str) -> str:
-        """Return the text of the reply; a refusal in words counts as a reply. The message names the server by `where`.
+        """Return the text of the reply; a refusal in words counts as a reply. The message names the
+        server by `where`.
 
         The text is empty where the model was cut off while it thought.
 
@@ -112,5 +113,6 @@ def read_completion(where: str, content: bytes) -> Completion:
         return msgspec.json.decode(content, type=Completion)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise ModelError(
-            f"{where} does not answer with a chat completion ({in_one_line(error)}); is it a chat model's address?"
+            f"{where} does not answer with a chat completion ({in_one_line(error)}); is it a chat "
+            "model's address?"
         ) from error

@@ -35,8 +35,8 @@ _HINTS = {
     500: "see the server's log",
 }
 _OTHER_HINT = (
-    "check model and the options of requests (send_seed, send_temperature, send_stop, send_repetition_penalty, "
-    "send_skip_special_tokens, max_tokens_field)"
+    "check model and the options of requests (send_seed, send_temperature, send_stop, "
+    "send_repetition_penalty, send_skip_special_tokens, max_tokens_field)"
 )
 
 
@@ -61,8 +61,9 @@ class _TransientError(Exception):
 class Endpoint:
     """One server, for any number of threads.
 
-    After a request has failed in all its attempts, later requests get one attempt each until one succeeds: otherwise
-    every sample of a run would wait through all retries of a server that is down.
+    After a request has failed in all its attempts, later requests get one attempt each until one
+    succeeds: otherwise every sample of a run would wait through all retries of a server that is
+    down.
     """
 
     def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
@@ -74,7 +75,8 @@ class Endpoint:
         self._is_down = Event()
 
     def ask(self, request: Mapping[str, Any]) -> tuple[bytes, tuple[str, ...]]:
-        """Return the reply's body to a chat completion request, and a line for each fault that a retry recovered from.
+        """Return the reply's body to a chat completion request, and a line for each fault that a
+        retry recovered from.
 
         Raises:
             ModelError: the server does not answer, or answers with an error.
@@ -136,7 +138,8 @@ class Endpoint:
         wait_s = _retry_after_s(error.response.headers)
         if wait_s is not None and wait_s > _LONGEST_RETRY_AFTER_S:
             return ModelError(
-                f"{self.where} {problem}, and asks to wait {wait_s:.0f} s; run the same command again then: it resumes"
+                f"{self.where} {problem}, and asks to wait {wait_s:.0f} s; run the same command "
+                "again then: it resumes"
             )
         return _TransientError(problem, hint, wait_s, busy=status == 429)
 
@@ -149,18 +152,23 @@ class Endpoint:
 def _hint_of(body: bytes) -> str | None:
     """Return the hint to a refusal that servers have words of their own for; None for others."""
     if b"may be provided in one prompt" in body:  # vLLM
-        return "start the server with a higher --limit-mm-per-prompt '{\"image\": N}', or use fewer frames"
+        return (
+            "start the server with a higher --limit-mm-per-prompt '{\"image\": N}', or use fewer "
+            "frames"
+        )
     return None
 
 
 def _pause_s(n_faults: int, fault: _TransientError) -> float:
-    """Return the server's pause, or one that doubles; a random part spreads threads that failed together."""
+    """Return the server's pause, or one that doubles; a random part spreads threads that failed
+    together."""
     pause = min(_FIRST_WAIT_S * 2 ** (n_faults - 1), _LONGEST_WAIT_S) * (1 + random.random() / 4)
     return pause if fault.wait_s is None else fault.wait_s + random.random() * _FIRST_WAIT_S
 
 
 def _retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Return the pause that a server requests, in seconds from now, or None if there is none or it is not readable."""
+    """Return the pause that a server requests, in seconds from now, or None if there is none or it
+    is not readable."""
     try:
         if "retry-after-ms" in headers:
             return max(0.0, float(headers["retry-after-ms"]) / 1000)

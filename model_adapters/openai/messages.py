@@ -54,16 +54,19 @@ class EncodedFrames:
             return url
 
     def _encode(self, frame: FrameRef) -> str:
-        """Encode the pixels, not the file: servers differ in how they read palettes and transparency."""
+        """Encode the pixels, not the file: servers differ in how they read palettes and
+        transparency."""
         content = BytesIO()
         frame.load().save(content, self._format, **_SETTINGS[self._format])
-        return f"data:image/{self._format};base64,{base64.b64encode(content.getvalue()).decode('ascii')}"
+        encoded = base64.b64encode(content.getvalue()).decode("ascii")
+        return f"data:image/{self._format};base64,{encoded}"
 
 
 def to_messages(
     name: str, turns: Sequence[Turn], frames: EncodedFrames, detail: str | None
 ) -> list[dict[str, Any]]:
-    """Return a conversation's messages, with texts and frames in order; each frame has this `detail` unless it is None.
+    """Return a conversation's messages, with texts and frames in order; each frame has this
+    `detail` unless it is None.
 
     Raises:
         DataError: a frame cannot be read.

@@ -24,7 +24,8 @@ _SEEDS = 2**31  # servers accept seeds of few more bits
 
 
 class ServedModel:
-    """A model behind a server. Every request has the whole conversation; the server may cache common prefixes."""
+    """A model behind a server. Every request has the whole conversation; the server may cache
+    common prefixes."""
 
     def __init__(self, name: str, options: OpenAIOptions, secret: Secret) -> None:
         self.name = name
@@ -51,7 +52,8 @@ class ServedModel:
         )
 
     def identity(self) -> dict[str, Any]:
-        """Return address, model and form of requests, as JSON values; the weights behind the address are unknown."""
+        """Return address, model and form of requests, as JSON values; the weights behind the
+        address are unknown."""
         return {"adapter": self.name} | self._options.document()
 
     def tokens_per_frame(self, frame: FrameRef) -> None:
@@ -88,7 +90,8 @@ class ServedModel:
     def answer_each(
         self, conversations: Sequence[Sequence[Turn]], decoding: Decoding
     ) -> list[Reply]:
-        """Answer one after the other, because answers before a failure are paid for; see `Conversation.replies`."""
+        """Answer one after the other, because answers before a failure are paid for; see
+        `Conversation.replies`."""
         return [self.answer(turns, decoding) for turns in conversations]
 
     def close(self) -> None:
@@ -122,7 +125,8 @@ class ServedModel:
         return request
 
     def _send(self, request: dict[str, Any], charge: Charge) -> tuple[Completion, tuple[str, ...]]:
-        # The tokens of a request are known only afterwards: an estimate is taken first and corrected then.
+        # The tokens of a request are known only afterwards: an estimate is taken first and
+        # corrected then.
         expected = used = self._expected_tokens
         self._token_limiter.wait(expected)
         try:
@@ -147,8 +151,8 @@ class ServedModel:
             return text if before_stop is None else before_stop
         if text not in decoding.choices:
             raise ModelError(
-                f"{self._endpoint.where} answers {text[:40]!r}, which is none of the choices; "
-                "it does not support structured_outputs: leave out guided"
+                f"{self._endpoint.where} answers {text[:40]!r}, which is none of the choices; it "
+                "does not support structured_outputs: leave out guided"
             )
         return text
 

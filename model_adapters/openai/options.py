@@ -28,8 +28,8 @@ _IN_IDENTITY = (  # options that can change a reply; rates and prices cannot
     "send_stop",
     "guided",
 )
-# Only requests of agents have these: what others ask is the same whatever they are, so that the document names them
-# only where they are not at their default.
+# Only requests of agents have these: what others ask is the same whatever they are, so that the
+# document names them only where they are not at their default.
 _OF_AGENTS = ("send_repetition_penalty", "send_skip_special_tokens")
 
 
@@ -40,25 +40,32 @@ class OpenAIOptions:
     Attributes:
         model: the server's name of the model.
         base_url: address of the server without `/chat/completions`.
-        api_key_env: name of the environment variable with the key; the key itself is never an option.
+        api_key_env: name of the environment variable with the key; the key itself is never an
+            option.
         insecure: allow requests to another machine without encryption.
         image_format: encoding of frames: png is lossless, jpeg (quality 95) is smaller.
         detail: value of `detail` for every frame; not sent where None.
         max_tokens_field: name of the field that limits the reply.
         send_seed: send the seed of sampled replies.
-        send_temperature: send temperature and top_p; some models refuse them and decode in their own way.
+        send_temperature: send temperature and top_p; some models refuse them and decode in their
+            own way.
         send_stop: send stop strings, at most 4; replies are cut here in any case.
-        send_repetition_penalty: send the penalty of requests that have one, as agents' have; OpenAI itself refuses it.
-        send_skip_special_tokens: send `skip_special_tokens: false` with stop strings, as agents have: else vLLM and
-            SGLang strip `<|act|>` from the text before they look for it. OpenAI itself refuses it.
-        guided: method that restricts replies to choices: `vllm` sends its `structured_outputs`; None for no support.
+        send_repetition_penalty: send the penalty of requests that have one, as agents' have; OpenAI
+            itself refuses it.
+        send_skip_special_tokens: send `skip_special_tokens: false` with stop strings, as agents
+            have: else vLLM and SGLang strip `<|act|>` from the text before they look for it. OpenAI
+            itself refuses it.
+        guided: method that restricts replies to choices: `vllm` sends its `structured_outputs`;
+            None for no support.
         max_in_flight: requests at the same time.
         timeout_s: limit for a whole reply, from the connection to its last byte, in seconds.
         retries: repetitions of a request after transient failures.
         requests_per_minute: rate limit, kept evenly; None for none.
-        tokens_per_minute: rate limit of the tokens of requests and replies, kept evenly; None for none.
+        tokens_per_minute: rate limit of the tokens of requests and replies, kept evenly; None for
+            none.
         price_per_m_input: US dollars per million tokens of requests.
-        price_per_m_cached: US dollars per million cached tokens of requests; as the others where None.
+        price_per_m_cached: US dollars per million cached tokens of requests; as the others where
+            None.
         price_per_m_output: US dollars per million tokens of replies.
         max_tokens_total: cap on the tokens of a run; no request is sent once it is reached.
         max_cost: cap on the cost of a run in US dollars; no request is sent once it is reached.
@@ -89,7 +96,8 @@ class OpenAIOptions:
     max_cost: float | None = None
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for a value that is not valid; the message names the option and repeats no secret."""
+        """Raise `ValueError` for a value that is not valid; the message names the option and
+        repeats no secret."""
         if not self.model:
             raise ValueError("it needs model=..., the server's name of the model")
         if not _NAME.fullmatch(self.api_key_env):
@@ -114,8 +122,8 @@ class OpenAIOptions:
         address = server_address("base_url", self.base_url)
         if address.scheme == "http" and not (is_local(address) or self.insecure):
             raise ValueError(
-                f"base_url leads to {address.hostname} without encryption, readable by everyone in between; "
-                "use https, or set insecure=true"
+                f"base_url leads to {address.hostname} without encryption, readable by everyone in "
+                "between; use https, or set insecure=true"
             )
 
     def _check_values(self) -> None:

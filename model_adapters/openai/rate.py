@@ -7,10 +7,11 @@ __all__ = ["RateLimiter"]
 
 
 class RateLimiter:
-    """Grants a number of units per minute, evenly: after each grant, the next one waits until its time has passed.
+    """Grants a number of units per minute, evenly: after each grant, the next one waits until its
+    time has passed.
 
-    Servers count in their own windows, often shorter than a minute, so unused units are not saved up for a burst.
-    Several threads may use it at once. A rate of None sets no limit.
+    Servers count in their own windows, often shorter than a minute, so unused units are not saved
+    up for a burst. Several threads may use it at once. A rate of None sets no limit.
     """
 
     def __init__(self, per_minute: float | None) -> None:
@@ -28,6 +29,7 @@ class RateLimiter:
             time.sleep(begin - now)
 
     def take(self, amount: float) -> None:
-        """Take units that were used already, without waiting; a negative amount gives units back."""
+        """Take units that were used already, without waiting; a negative amount gives units
+        back."""
         with self._lock:
             self._free_at = max(time.monotonic(), self._free_at) + amount * self._seconds_per_unit

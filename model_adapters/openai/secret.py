@@ -37,11 +37,13 @@ def read_key(variable: str, *, needed: bool) -> Secret:
     if not value:
         if needed:
             raise ModelError(
-                "the environment variable that api_key_env names holds no key; set it (OPENAI_API_KEY)"
+                "the environment variable that api_key_env names holds no key; set it "
+                "(OPENAI_API_KEY)"
             )
         return Secret(None)
     if not (value.isascii() and value.isprintable()) or " " in value:
         raise ModelError(
-            "the environment variable that api_key_env names holds no key (blanks, or not ASCII); fix it"
+            "the environment variable that api_key_env names holds no key (blanks, or not ASCII); "
+            "fix it"
         )
     return Secret(value)

@@ -35,7 +35,8 @@ class Prices:
 
 @dataclass(frozen=True)
 class Caps:
-    """Caps on the tokens of a run's requests and replies, and on its cost in US dollars; None for no cap."""
+    """Caps on the tokens of a run's requests and replies, and on its cost in US dollars; None for
+    no cap."""
 
     tokens: int | None = None
     cost: float | None = None
@@ -59,10 +60,11 @@ class Charge:
 class Spend:
     """Tokens and cost so far, for several threads.
 
-    Once a cap is reached, requests are refused before they are sent. Requests in flight count with the largest tokens
-    and cost so far, and a new request waits for them if they may use up the rest. So a cap is exceeded by at most one
-    request, not by one per thread, as long as no request costs more than all before. A reply without usage counts as
-    the largest so far; before the first usage is reported, caps cannot be enforced.
+    Once a cap is reached, requests are refused before they are sent. Requests in flight count with
+    the largest tokens and cost so far, and a new request waits for them if they may use up the
+    rest. So a cap is exceeded by at most one request, not by one per thread, as long as no request
+    costs more than all before. A reply without usage counts as the largest so far; before the first
+    usage is reported, caps cannot be enforced.
     """
 
     def __init__(self, name: str, caps: Caps) -> None:
@@ -75,7 +77,8 @@ class Spend:
 
     @contextmanager
     def request(self) -> Iterator[Charge]:
-        """Account for one request; what is filled into the charge counts even if the request fails later.
+        """Account for one request; what is filled into the charge counts even if the request fails
+        later.
 
         Raises:
             ModelError: a cap is reached or cannot be enforced; the request must not be sent.
@@ -111,7 +114,8 @@ class Spend:
             self._changed.notify_all()
 
     def _may_reach_cap_in_flight(self) -> bool:
-        """Return whether requests in flight may use up the rest; the first one is unpredictable, so it runs alone."""
+        """Return whether requests in flight may use up the rest; the first one is unpredictable, so
+        it runs alone."""
         if self._caps == Caps():
             return False
         tokens = self._tokens + self._in_flight * self._most_tokens
@@ -126,12 +130,15 @@ class Spend:
         """Return why no more requests may be sent, or None if they may."""
         if self._has_unknown_usage and self._caps != Caps():
             return (
-                f"not asked: {self._name} does not report the usage of its replies, so caps cannot be enforced; "
-                "leave out max_tokens_total and max_cost"
+                f"not asked: {self._name} does not report the usage of its replies, so caps cannot "
+                "be enforced; leave out max_tokens_total and max_cost"
             )
         hint = "raise it and run the same command again, which resumes"
         if _is_reached(self._tokens, self._caps.tokens):
-            return f"not asked: {self._tokens} tokens reach max_tokens_total={self._caps.tokens}; {hint}"
+            return (
+                f"not asked: {self._tokens} tokens reach max_tokens_total={self._caps.tokens}; "
+                f"{hint}"
+            )
         if _is_reached(self._cost, self._caps.cost):
             return (
                 f"not asked: {self._cost:.4f} US dollars reach max_cost={self._caps.cost:g}; {hint}"

@@ -1,4 +1,5 @@
-"""Requests by the official client, without redirects, limited in bytes and in time whatever the server does."""
+"""Requests by the official client, without redirects, limited in bytes and in time whatever the
+server does."""
 
 import asyncio
 import logging
@@ -32,8 +33,9 @@ class UnreadableError(Exception):
 class Wire:
     """Sends requests to one server, from any number of threads.
 
-    All requests run in the event loop of one background thread. There a request can be cancelled at any moment, also
-    during a name lookup or while headers or body arrive slowly; timeouts of sockets cover only single reads.
+    All requests run in the event loop of one background thread. There a request can be cancelled at
+    any moment, also during a name lookup or while headers or body arrive slowly; timeouts of
+    sockets cover only single reads.
     """
 
     def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
@@ -113,7 +115,8 @@ def _client(options: OpenAIOptions, secret: Secret) -> openai.AsyncOpenAI:
 
 
 async def _limit_body(response: httpx2.Response) -> None:
-    """Make reading fail beyond the largest body; compressed ones, which may expand to any length, are refused."""
+    """Make reading fail beyond the largest body; compressed ones, which may expand to any length,
+    are refused."""
     if response.headers.get("Content-Encoding", "identity").strip().lower() not in ("", "identity"):
         raise UnreadableError("answers in an encoding that was not requested")
     assert isinstance(response.stream, httpx2.AsyncByteStream)  # of an asynchronous client

@@ -1,6 +1,7 @@
 """Options of all adapters, as dataclasses with defaults.
 
-Nothing here imports torch or transformers, so that listing models and reporting a typing error take no time.
+Nothing here imports torch or transformers, so that listing models and reporting a typing error take
+no time.
 """
 
 from model_adapters.options.parsing import NoOptions, describe, parse

@@ -38,7 +38,8 @@ def parse_rope(text: str) -> tuple[str, float]:
         factor = 0.0
     if rope_type not in _ROPES or not 1 < factor < 1000:
         raise ValueError(
-            f"rope={text} is not TYPE:FACTOR with TYPE one of {', '.join(_ROPES)} and FACTOR above 1"
+            f"rope={text} is not TYPE:FACTOR with TYPE one of {', '.join(_ROPES)} and FACTOR above "
+            "1"
         )
     return rope_type, factor
 
@@ -60,13 +61,15 @@ class Placement:
     threads: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse attention that transformers does not know, or would download from the hub and run."""
+        """Refuse attention that transformers does not know, or would download from the hub and
+        run."""
         if self.threads is not None and not 1 <= self.threads <= _MOST_THREADS:
             raise ValueError(f"threads={self.threads} is not from 1 to {_MOST_THREADS}")
         name = self.attn_implementation
         if "/" in name and not getattr(self, "trust_remote_code", False):
             raise ValueError(
-                f"attn_implementation={name} is code on the hub, which runs with trust_remote_code=true"
+                f"attn_implementation={name} is code on the hub, which runs with "
+                "trust_remote_code=true"
             )
         if "/" not in name and name not in _ATTENTION:
             raise ValueError(
@@ -82,17 +85,18 @@ class Reading:
     """Form and length of a model's prompts, on any engine.
 
     Attributes:
-        prompt: chat renders conversations by the checkpoint's chat template; plain concatenates the texts and frames
-            of all turns, without roles.
-        rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8, longrope-scaled:8) instead of the
-            checkpoint's RoPE.
+        prompt: chat renders conversations by the checkpoint's chat template; plain concatenates the
+            texts and frames of all turns, without roles.
+        rope: context extension TYPE:FACTOR (yarn:4, linear:2, dynamic:4, longrope:8,
+            longrope-scaled:8) instead of the checkpoint's RoPE.
     """
 
     prompt: str = "chat"
     rope: str | None = None
 
     def image_settings(self) -> dict[str, Any]:
-        """Return the image processor settings that differ from the checkpoint's; some families override this."""
+        """Return the image processor settings that differ from the checkpoint's; some families
+        override this."""
         return {}
 
     def __post_init__(self) -> None:
@@ -131,11 +135,14 @@ class HfOptions(Reading, Placement):
     """Inference by transformers.
 
     Attributes:
-        share_prefix: encode the common prefix of two prompts once; false encodes every prompt as a whole.
+        share_prefix: encode the common prefix of two prompts once; false encodes every prompt as a
+            whole.
         chunk_tokens: most tokens encoded in one forward pass.
-        batch_size: most continuations of one prefix that are answered together. They read the prefix's keys and values
-            together, and a reply can differ by rounding with what is answered beside it.
-        kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the GPU.
+        batch_size: most continuations of one prefix that are answered together. They read the
+            prefix's keys and values together, and a reply can differ by rounding with what is
+            answered beside it.
+        kv_offload: keep keys and values in CPU memory; slower, for contexts that do not fit on the
+            GPU.
         feature_cache_mb: memory for vision features of earlier frames, in MiB.
         max_tokens: context limit instead of the checkpoint's; 0 for none.
     """
@@ -155,7 +162,8 @@ class HfOptions(Reading, Placement):
             or (self.max_tokens or 0) < 0
         ):
             raise ValueError(
-                "chunk_tokens and batch_size must be positive, feature_cache_mb and max_tokens not negative"
+                "chunk_tokens and batch_size must be positive, feature_cache_mb and max_tokens not "
+                "negative"
             )
         for name in ("chunk_tokens", "batch_size", "feature_cache_mb", "max_tokens"):
             if (getattr(self, name) or 0) > _LARGEST:
@@ -170,7 +178,8 @@ class CheckpointOptions(HfOptions, CheckpointReading):
 
     Attributes:
         device_map: transformers' device map (auto, balanced, ...) instead of one device.
-        quantization: bnb4 or bnb8 for bitsandbytes with 4 or 8 bits per weight; none for the checkpoint's own.
+        quantization: bnb4 or bnb8 for bitsandbytes with 4 or 8 bits per weight; none for the
+            checkpoint's own.
     """
 
     device_map: str | None = None

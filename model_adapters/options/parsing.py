@@ -35,11 +35,13 @@ def parse(model: str, options: type, given: Mapping[str, str]) -> Any:
 
     Args:
         model: name of the model, for the message.
-        options: a dataclass with defaults, whose fields are str, int, float, bool, or one of these or None.
+        options: a dataclass with defaults, whose fields are str, int, float, bool, or one of these
+            or None.
         given: option names to values as typed.
 
     Raises:
-        UsageError: an option is unknown (the message has the nearest one), or a value does not fit its type.
+        UsageError: an option is unknown (the message has the nearest one), or a value does not fit
+            its type.
     """
     hints = typing.get_type_hints(options)
     for name in given:

@@ -38,7 +38,8 @@ def parse_field_of_view(text: str) -> float | None:
         degrees = 0.0
     if kind != "thor" or not 0 < degrees < 180:
         raise ValueError(
-            f"intrinsics={text} is not {DEFAULT_INTRINSICS} or thor:DEGREES, DEGREES the vertical field of view"
+            f"intrinsics={text} is not {DEFAULT_INTRINSICS} or thor:DEGREES, DEGREES the vertical "
+            "field of view"
         )
     return degrees
 
@@ -48,9 +49,12 @@ class ActionOptions:
     """Decoding and use of a policy's actions, on any engine; decoding is always greedy.
 
     Attributes:
-        unnorm_key: dataset whose statistics scale actions to metres and radians; None if the checkpoint has only one.
-        constrained: decode among action tokens only; false decodes among all tokens and clips, as the originals do.
-        ensemble: none returns chunks as they are; exp averages overlapping chunks and returns one step a call.
+        unnorm_key: dataset whose statistics scale actions to metres and radians; None if the
+            checkpoint has only one.
+        constrained: decode among action tokens only; false decodes among all tokens and clips, as
+            the originals do.
+        ensemble: none returns chunks as they are; exp averages overlapping chunks and returns one
+            step a call.
         execute: steps of a chunk that are returned; all where None.
     """
 
@@ -96,10 +100,11 @@ class SpatialVLAOptions(PolicyOptions):
     """Options of SpatialVLA.
 
     Attributes:
-        attn_implementation: eager caps attention scores, as Gemma 2 was trained; sdpa is faster and does not.
+        attn_implementation: eager caps attention scores, as Gemma 2 was trained; sdpa is faster and
+            does not.
         ensemble: exp as in the published evaluations in SimplerEnv.
-        intrinsics: default for the camera of the checkpoint's dataset, or thor:DEGREES for a simulator's camera with
-            this vertical field of view.
+        intrinsics: default for the camera of the checkpoint's dataset, or thor:DEGREES for a
+            simulator's camera with this vertical field of view.
     """
 
     attn_implementation: str = "eager"
@@ -111,8 +116,8 @@ class SpatialVLAOptions(PolicyOptions):
         parse_field_of_view(self.intrinsics)
         if self.attn_implementation not in _ATTENTION:
             raise ValueError(
-                f"attn_implementation={self.attn_implementation} cannot attend to the prefix in both directions; "
-                f"use {' or '.join(_ATTENTION)}"
+                f"attn_implementation={self.attn_implementation} cannot attend to the prefix in "
+                f"both directions; use {' or '.join(_ATTENTION)}"
             )
 
 
@@ -130,7 +135,8 @@ class VlaHttpOptions:
     Attributes:
         url: address of the server, without `/act`.
         unnorm_key: dataset key sent with every request; not sent where None.
-        image: json_numpy sends frames in base 64, as OpenVLA's server expects; list sends nested lists of numbers.
+        image: json_numpy sends frames in base 64, as OpenVLA's server expects; list sends nested
+            lists of numbers.
         execute: steps of a chunk that are returned; all where None.
         timeout_s: limit for a whole reply, in seconds.
         retries: repetitions of a request after a failed connection.

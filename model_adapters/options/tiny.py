@@ -16,8 +16,8 @@ class _TinyPlacement:
     Attributes:
         dtype: float32, so that replies do not depend on rounding.
         device: cpu.
-        threads: 1: tiny tensors gain nothing from more, and on a busy machine waiting for the slowest thread makes each
-            operation many times slower.
+        threads: 1: tiny tensors gain nothing from more, and on a busy machine waiting for the
+            slowest thread makes each operation many times slower.
     """
 
     dtype: str = "float32"

@@ -1,7 +1,8 @@
-"""Vision-language-action policies: native ports of published checkpoints, and a client for any policy behind a server.
+"""Vision-language-action policies: native ports of published checkpoints, and a client for any
+policy behind a server.
 
-Remote code, timm and torchvision are not needed: the keys of a checkpoint are mapped to modules of this package or of
-transformers.
+Remote code, timm and torchvision are not needed: the keys of a checkpoint are mapped to modules of
+this package or of transformers.
 """
 
 import model_adapters.lean_transformers  # noqa: F401 - before any module imports transformers

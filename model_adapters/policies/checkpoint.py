@@ -57,7 +57,8 @@ class PolicyCheckpoint:
         own_type = self._config().model_type
         if own_type != model_type:
             raise ModelError(
-                f"{self.pretrained} is a {own_type} checkpoint, not {model_type}; see `infthor-eval ls models`"
+                f"{self.pretrained} is a {own_type} checkpoint, not {model_type}; see "
+                "`infthor-eval ls models`"
             )
 
     def read(self, name: str, form: type[T]) -> T:
@@ -73,7 +74,8 @@ class PolicyCheckpoint:
         return (self.folder / name).is_file()
 
     def tokenizer(self) -> Tokenizer:
-        """Load the tokenizer from `tokenizer.json` directly; transformers would need the checkpoint's remote code.
+        """Load the tokenizer from `tokenizer.json` directly; transformers would need the
+        checkpoint's remote code.
 
         Raises:
             DataError: the file is missing.

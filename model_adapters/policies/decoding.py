@@ -11,7 +11,8 @@ __all__ = ["decode_greedily", "embed_ids"]
 
 
 def embed_ids(model: Any, ids: Sequence[int]) -> torch.Tensor:
-    """Return the embeddings of ids, (1, ids, hidden), as input of a transformers model's first layer."""
+    """Return the embeddings of ids, (1, ids, hidden), as input of a transformers model's first
+    layer."""
     layer = model.get_input_embeddings()
     return cast(torch.Tensor, layer(torch.tensor([ids], device=layer.weight.device)))
 
@@ -29,8 +30,9 @@ def decode_greedily(
         first: logits of the first token, (vocabulary,).
         step: feeds a token and returns the logits of the next, (vocabulary,).
         action_ids: ids that encode an action at each place of the sequence.
-        constrained: choose among these ids only. If false, choose among all ids and clip, as the original
-            implementations do. All places are decoded in either case: an end-of-text token does not end the sequence.
+        constrained: choose among these ids only. If false, choose among all ids and clip, as the
+            original implementations do. All places are decoded in either case: an end-of-text token
+            does not end the sequence.
 
     Raises:
         ModelError: the logits are not finite.

@@ -1,4 +1,5 @@
-"""Temporal ensembling: averages of the predictions that overlapping chunks make for the same step."""
+"""Temporal ensembling: averages of the predictions that overlapping chunks make for the same
+step."""
 
 from collections import deque
 
@@ -12,10 +13,11 @@ _RATE = 0.8
 
 
 class ExponentialEnsemble:
-    """Averages the predictions of this and earlier chunks for the current step, with the largest weight on the newest.
+    """Averages the predictions of this and earlier chunks for the current step, with the largest
+    weight on the newest.
 
-    The weight of prediction i, counted from the oldest, is exp(0.8 i), as in the published evaluations of SpatialVLA
-    (SimplerEnv's ActionEnsembler with a temperature of -0.8).
+    The weight of prediction i, counted from the oldest, is exp(0.8 i), as in the published
+    evaluations of SpatialVLA (SimplerEnv's ActionEnsembler with a temperature of -0.8).
     """
 
     def __init__(self) -> None:
@@ -29,7 +31,8 @@ class ExponentialEnsemble:
         """Return the current step, (1, 7).
 
         Args:
-            chunk: new predictions, (steps, 7), beginning with the current step; each call is one step later.
+            chunk: new predictions, (steps, 7), beginning with the current step; each call is one
+                step later.
         """
         self._chunks.append(chunk)
         while len(self._chunks) > len(chunk):

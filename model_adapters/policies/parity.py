@@ -113,7 +113,8 @@ def compare_policies(
     instructions: Sequence[str],
     tolerance: float,
 ) -> ParityReport:
-    """Compare the actions of both on the same frames and instructions, each frame as the first of an episode.
+    """Compare the actions of both on the same frames and instructions, each frame as the first of
+    an episode.
 
     Raises:
         ModelError: one of them cannot act.
@@ -143,7 +144,8 @@ def frames_in_folder(folder: Path) -> list[FrameRef]:
 
 @contextmanager
 def synthetic_frames() -> Iterator[list[FrameRef]]:
-    """Yield a black frame, a white one and some of noise, always the same, whose files exist within the context."""
+    """Yield a black frame, a white one and some of noise, always the same, whose files exist within
+    the context."""
     rng = np.random.default_rng(0)
     noise = [rng.integers(0, 256, (240, 320, 3), dtype=np.uint8) for _ in range(_NOISE)]
     with ScratchFolder() as folder:
@@ -166,7 +168,8 @@ def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: 
 
 
 def _difference(ours: Sequence[ArmDelta], theirs: Sequence[ArmDelta]) -> list[float]:
-    """Return the largest differences of translation, rotation and gripper; infinite if the numbers of steps differ."""
+    """Return the largest differences of translation, rotation and gripper; infinite if the numbers
+    of steps differ."""
     if len(ours) != len(theirs):
         return [float("inf")] * 3
     gaps = np.abs(_numbers(ours) - _numbers(theirs)).max(axis=0)

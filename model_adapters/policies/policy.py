@@ -44,7 +44,8 @@ def arm_deltas(name: str, actions: Actions) -> tuple[ArmDelta, ...]:
     """
     if actions.ndim != 2 or actions.shape[1] != ACTION_SIZE or not len(actions):
         raise ModelError(
-            f"{name} gave actions of shape {list(actions.shape)}, not one or more of {ACTION_SIZE} numbers"
+            f"{name} gave actions of shape {list(actions.shape)}, not one or more of {ACTION_SIZE} "
+            "numbers"
         )
     if not np.isfinite(actions).all():
         raise ModelError(f"{name} gave an action that is not finite: {actions.tolist()}")
@@ -89,7 +90,8 @@ class VlaPolicy:
         return Capabilities(counts_tokens=False, token_ids=False)
 
     def identity(self) -> dict[str, Any]:
-        """Return checkpoint, dataset of the statistics, precision, versions and use of chunks, as JSON values."""
+        """Return checkpoint, dataset of the statistics, precision, versions and use of chunks, as
+        JSON values."""
         options = self._options
         return self._identity | {
             "adapter": self.name,

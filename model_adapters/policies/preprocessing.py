@@ -8,7 +8,8 @@ __all__ = ["normalise", "resize"]
 
 
 def resize(image: Image.Image, size: int) -> torch.Tensor:
-    """Return an RGB frame, squashed to a square of pixels by PIL's bicubic filter, (3, size, size), from 0 to 1."""
+    """Return an RGB frame, squashed to a square of pixels by PIL's bicubic filter, (3, size, size),
+    from 0 to 1."""
     pixels = np.asarray(image.resize((size, size), Image.Resampling.BICUBIC), dtype=np.float32)
     return torch.from_numpy(pixels / 255).permute(2, 0, 1).contiguous()
 
@@ -16,6 +17,7 @@ def resize(image: Image.Image, size: int) -> torch.Tensor:
 def normalise(
     pixels: torch.Tensor, mean: tuple[float, float, float], std: tuple[float, float, float]
 ) -> torch.Tensor:
-    """Return pixels, (..., 3, height, width), minus the mean and divided by the deviation of each channel."""
+    """Return pixels, (..., 3, height, width), minus the mean and divided by the deviation of each
+    channel."""
     shape = (3, 1, 1)
     return (pixels - pixels.new_tensor(mean).view(shape)) / pixels.new_tensor(std).view(shape)

@@ -1,4 +1,5 @@
-"""De-normalisation of actions: from numbers between -1 and 1 to the metres and radians of a dataset's robot."""
+"""De-normalisation of actions: from numbers between -1 and 1 to the metres and radians of a
+dataset's robot."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,7 +23,8 @@ class ActionStatistics(msgspec.Struct, frozen=True):
     Attributes:
         q01: first percentile of each of the seven numbers, in the dataset's units.
         q99: 99th percentile of each.
-        mask: true for numbers that were scaled to -1..1 in training; the others (the gripper) are not scaled.
+        mask: true for numbers that were scaled to -1..1 in training; the others (the gripper) are
+            not scaled.
     """
 
     q01: list[float]
@@ -30,9 +32,11 @@ class ActionStatistics(msgspec.Struct, frozen=True):
     mask: list[bool] | None = None
 
     def unnormalise(self, actions: Actions) -> Actions:
-        """Return actions, (steps, 7), in the dataset's units: metres and radians per step for robot arms.
+        """Return actions, (steps, 7), in the dataset's units: metres and radians per step for robot
+        arms.
 
-        Training mapped q01 and q99 to -1 and 1, so this is the inverse; values beyond are not clipped.
+        Training mapped q01 and q99 to -1 and 1, so this is the inverse; values beyond are not
+        clipped.
         """
         low, high = np.array(self.q01), np.array(self.q99)
         scaled = 0.5 * (actions + 1) * (high - low) + low
@@ -50,7 +54,8 @@ def select_statistics(
         pretrained: name of the checkpoint, for messages.
 
     Raises:
-        UsageError: the dataset is unknown, or none is given and there are several; the message lists them.
+        UsageError: the dataset is unknown, or none is given and there are several; the message
+            lists them.
         ModelError: the statistics are not those of actions of seven numbers.
     """
     listed = ", ".join(sorted(known)) or "none"

@@ -1,8 +1,8 @@
 """Strict loading of a checkpoint's files into a module.
 
-A checkpoint and the module that reads it were written by different people at different times. So the expected keys are
-derived from the module, and a key that is missing, unknown or of another shape is an error: a part that silently stayed
-random would spoil all results.
+A checkpoint and the module that reads it were written by different people at different times. So
+the expected keys are derived from the module, and a key that is missing, unknown or of another
+shape is an error: a part that silently stayed random would spoil all results.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -29,7 +29,8 @@ _MOST_KEYS = 3  # keys that an error lists
 def empty_parameters() -> Iterator[None]:
     """Create modules whose parameters take no memory, but whose buffers are real.
 
-    Buffers are computed when a module is created and are not in a checkpoint; on the meta device they would be lost.
+    Buffers are computed when a module is created and are not in a checkpoint; on the meta device
+    they would be lost.
     """
     with init_empty_weights(include_buffers=False):
         yield
@@ -57,7 +58,8 @@ class Layout:
 
         Args:
             module: the module; its parameters need no memory.
-            key_of: returns the key of a parameter by its name, or None if the parameter is tied to another.
+            key_of: returns the key of a parameter by its name, or None if the parameter is tied to
+                another.
             unused: see `Layout.unused`.
         """
         entries = {
@@ -79,7 +81,8 @@ class Layout:
         """Check that files have exactly these keys, in these shapes.
 
         Raises:
-            ModelError: keys are missing, unknown or of another shape; the message has the first ones and their number.
+            ModelError: keys are missing, unknown or of another shape; the message has the first
+                ones and their number.
         """
         expected = self.all_shapes()
         faults = {
@@ -94,7 +97,8 @@ class Layout:
         complaints = [f"{fault} {_first_keys(keys)}" for fault, keys in faults.items() if keys]
         if complaints:
             raise ModelError(
-                f"the weights of {pretrained} are not this architecture's: the checkpoint {'; '.join(complaints)}"
+                f"the weights of {pretrained} are not this architecture's: the checkpoint "
+                f"{'; '.join(complaints)}"
             )
 
 
@@ -110,7 +114,8 @@ def load_weights(
     """Read a checkpoint's safetensors files into a module, one tensor at a time.
 
     Args:
-        module: a module created within `empty_parameters()`. It ends up on the device; buffers keep their types.
+        module: a module created within `empty_parameters()`. It ends up on the device; buffers keep
+            their types.
         folder: folder of the files.
         layout: expected keys.
         pretrained: name of the checkpoint, for messages.

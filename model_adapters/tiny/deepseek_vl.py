@@ -1,6 +1,8 @@
-"""A DeepSeek-VL hybrid of two layers with random weights; frames take as many tokens as in the real one.
+"""A DeepSeek-VL hybrid of two layers with random weights; frames take as many tokens as in the real
+one.
 
-Its high-resolution tower reads 256 pixels instead of 1024, and its features are interpolated to the same 24 x 24.
+Its high-resolution tower reads 256 pixels instead of 1024, and its features are interpolated to the
+same 24 x 24.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,5 @@
-"""A LLaVA-OneVision of two layers with random weights; frames take as many tokens as in the real one."""
+"""A LLaVA-OneVision of two layers with random weights; frames take as many tokens as in the real
+one."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -35,7 +35,8 @@ _CONFIG: dict[str, Any] = {
     "vision_towers": [msgspec.to_builtins(tower) for tower in _TOWERS],
     "text_config": {
         "model_type": "llama",
-        "vocab_size": 32_064,  # gives action ids and Llama's token of a space their published numbers
+        # gives action ids and Llama's token of a space their published numbers
+        "vocab_size": 32_064,
         "hidden_size": 64,
         "intermediate_size": 128,
         "num_hidden_layers": 2,

@@ -1,4 +1,5 @@
-"""Tiny twins of policies: a checkpoint in the published layout with random weights, read by the family's loader."""
+"""Tiny twins of policies: a checkpoint in the published layout with random weights, read by the
+family's loader."""
 
 import json
 import math
@@ -19,7 +20,8 @@ from model_adapters.policies.weights import Layout, Shape
 
 __all__ = ["BRIDGE", "PolicyTwin", "TinyPolicyAdapter"]
 
-# Statistics of the actions of Bridge in openvla/openvla-7b and SpatialVLA's checkpoints, to four digits.
+# Statistics of the actions of Bridge in openvla/openvla-7b and SpatialVLA's checkpoints, to four
+# digits.
 BRIDGE = {
     "action": {
         "q01": [-0.0287, -0.0417, -0.0261, -0.0809, -0.0929, -0.2072, 0.0],
@@ -48,7 +50,8 @@ class PolicyTwin:
     load: Callable[[str, PolicyCheckpoint, Any], VlaPolicy]
 
     def save(self, folder: Path, seed: int) -> None:
-        """Write a checkpoint with weights of this seed, which the family's adapter loads; the folder is created."""
+        """Write a checkpoint with weights of this seed, which the family's adapter loads; the
+        folder is created."""
         folder.mkdir(parents=True, exist_ok=True)
         for name, content in self.files.items():
             (folder / name).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")

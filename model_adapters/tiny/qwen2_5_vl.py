@@ -1,4 +1,5 @@
-"""A Qwen2.5-VL of two layers with random weights: the real classes, template and frame tokens, without a download."""
+"""A Qwen2.5-VL of two layers with random weights: the real classes, template and frame tokens,
+without a download."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -101,5 +102,6 @@ class Qwen25VLTiny(TinyAdapter):
 
 
 def save_tiny_checkpoint(folder: Path, seed: int) -> None:
-    """Write the tiny Qwen2.5-VL as a checkpoint, which `qwen2.5-vl` and transformers' auto classes load."""
+    """Write the tiny Qwen2.5-VL as a checkpoint, which `qwen2.5-vl` and transformers' auto classes
+    load."""
     Qwen25VLTiny.twin.save(folder, seed)

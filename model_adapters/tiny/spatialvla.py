@@ -23,7 +23,9 @@ _N_MERGED = 600
 _SPECIAL = ("<pad>", "<eos>", "<bos>", "<unk>", "<image>")
 _N_ACTIONS = 8194
 _BEGIN = _N_MERGED + len(_SPECIAL)  # id of the first action token; the image token precedes it
-_AXES = {  # number of bins, lowest and highest border, mean and deviation of the Gaussian with the borders as quantiles
+# number of bins, lowest and highest border, mean and deviation of the Gaussian with the borders as
+# quantiles
+_AXES = {
     "theta_bins": (16, 0.0, math.pi, 1.9, 0.7),
     "phi_bins": (32, -math.pi, math.pi, 0.1, 1.6),
     "r_bins": (8, 0.0, math.sqrt(3), 0.6, 0.5),

@@ -35,7 +35,8 @@ def train_tokenizer(
     """Train a tokenizer.
 
     Args:
-        special: special tokens, including those below; their ids follow those of the trained tokens in this order.
+        special: special tokens, including those below; their ids follow those of the trained tokens
+            in this order.
         end: token that ends a turn.
         pad: padding token.
         begin: token that begins every text, or None.

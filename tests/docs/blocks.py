@@ -10,7 +10,8 @@ _FENCE = re.compile(r'^```(\w*)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | r
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block: its language (empty for commands and what they print), the file that it is, its text."""
+    """A fenced block: its language (empty for commands and what they print), the file that it is,
+    its text."""
 
     language: str
     title: str

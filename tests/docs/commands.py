@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from .blocks import blocks_of
 
 FLOOR_PLANS = "needs recorded floor plans"
-# A command that matches is parsed and not run. Each has a reason; one that matches nothing any more fails a test.
+# A command that matches is parsed and not run. Each has a reason; one that matches nothing any more
+# fails a test.
 CANNOT_RUN = {
     r"--models? (qwen2\.5-vl|llava-onevision|openvla|deepseek-vl)[ ,]": "downloads weights",
     r" fetch nieh": "downloads the published set",
@@ -17,7 +18,8 @@ CANNOT_RUN = {
     r"thumbnails": "needs the example package installed; tests/examples does that",
     r"/RUN\b|-ID\b|RUN\.\.\.": "names a run of the reader's",
     r"DATA\b|FOLDER|FloorPlan": FLOOR_PLANS,
-    r"--data (DIR|TRAJECTORIES|trajectories) |--unity|--simulator unity": "needs Unity, or data of the reader's",
+    r"--data (DIR|TRAJECTORIES|trajectories) |--unity|--simulator unity": "needs Unity, or data of "
+    "the reader's",
     r"report results/\*/nieh_mini-\*|ls runs$": "shows runs that download weights",
     r"DIR$": "needs data of the reader's",
     r"--ray-address": "needs a cluster",
@@ -31,7 +33,8 @@ class Command:
 
     Attributes:
         text: without its comment.
-        words: as a shell would split them, globs as they are; variables of the environment before it left out.
+        words: as a shell would split them, globs as they are; variables of the environment before
+            it left out.
     """
 
     text: str

@@ -1,4 +1,5 @@
-"""The tables of settings in docs/own-tasks.md, from the code: `python -m tests.docs.settings_tables` writes them."""
+"""The tables of settings in docs/own-tasks.md, from the code: `python -m
+tests.docs.settings_tables` writes them."""
 
 import importlib
 import inspect
@@ -31,7 +32,8 @@ def _table(module: str, name: str) -> str:
     lines = ["| setting | is a | default | |", "|---|---|---|---|"]
     for item in fields(settings):
         lines.append(
-            f"| `{item.name}` | {_kind(hints[item.name])} | {_shown(_default(item))} | {said[item.name]} |"
+            f"| `{item.name}` | {_kind(hints[item.name])} | {_shown(_default(item))} | "
+            f"{said[item.name]} |"
         )
     return "\n".join(lines) + "\n"
 

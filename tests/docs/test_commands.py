@@ -41,7 +41,8 @@ BLOCKS = [
 
 @pytest.fixture(scope="module")
 def folder_of(tmp_path_factory):
-    """Gives the folder in which a page's reader is: each block finds what those before it have left."""
+    """Gives the folder in which a page's reader is: each block finds what those before it have
+    left."""
 
     @functools.cache
     def folder_of(page):
@@ -106,7 +107,8 @@ def test_the_options_of_every_command_are_known(command, monkeypatch):
 
 
 def _check_names(given):
-    """Models, their options and tasks are known, but for those of the example packages and of files beside a page."""
+    """Models, their options and tasks are known, but for those of the example packages and of files
+    beside a page."""
     engine = given["engine"]
     for model, own in given["models"]:
         if model in ("thumbnails", "calculator") or model in baseline_suites():

@@ -84,8 +84,12 @@ def test_the_site_is_whole_and_takes_nothing_from_elsewhere(site):
 # -- in a browser
 
 # What is wider than its place: blocks of code, tables, the page.
-WIDER = """() => [document.documentElement, ...document.querySelectorAll("pre > code, .md-typeset__scrollwrap")]
-    .filter(place => place.scrollWidth > place.clientWidth + 1).map(place => place.textContent.slice(0, 60))"""
+WIDER = """() => [
+        document.documentElement,
+        ...document.querySelectorAll("pre > code, .md-typeset__scrollwrap"),
+    ]
+    .filter(place => place.scrollWidth > place.clientWidth + 1)
+    .map(place => place.textContent.slice(0, 60))"""
 
 
 @pytest.fixture
@@ -161,7 +165,13 @@ def test_it_is_dark_where_the_system_is_and_where_it_is_asked_to_be(browser, sit
 
 def test_blocks_with_columns_are_told_from_code():
     mark = load_hook("site_code").on_page_content
-    table = "<pre id=x><code>model     total\n<span>oracle</span>    100.00\nblind      28.69\n</code></pre>"
+    table = (
+        "<pre id=x><code>model     total\n<span>oracle</span>    100.00\nblind      "
+        "28.69\n</code></pre>"
+    )
     assert 'class="columns" style="--letters: 16"' in mark(table)
-    command = "<pre><span></span><code>infthor-eval --model oracle   # the key\n    --tasks nieh\n</code></pre>"
+    command = (
+        "<pre><span></span><code>infthor-eval --model oracle   # the key\n    --tasks "
+        "nieh\n</code></pre>"
+    )
     assert mark(command) == command

@@ -13,7 +13,8 @@ _OF_RUNS = ("tasks", "data", "output", "seed", "limit", "fresh", "recover")
 def preparer(default_model: str, **defaults: Any) -> Callable[..., PreparedRun]:
     """Return a function that prepares a run.
 
-    Its keyword arguments are the model, its options, those of `RunOptions`, which have these defaults, and the suite's.
+    Its keyword arguments are the model, its options, those of `RunOptions`, which have these
+    defaults, and the suite's.
     """
 
     def make(

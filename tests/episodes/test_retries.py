@@ -1,4 +1,5 @@
-"""Doing something again where the simulator failed for good; what it mends by itself is told too."""
+"""Doing something again where the simulator failed for good; what it mends by itself is told
+too."""
 
 import os
 import signal

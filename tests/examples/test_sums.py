@@ -1,4 +1,5 @@
-"""The example suite of another package runs, is resumed, compared and reported once pip has installed it."""
+"""The example suite of another package runs, is resumed, compared and reported once pip has
+installed it."""
 
 import json
 
@@ -14,7 +15,8 @@ MODELS = ("calculator", "qwen2.5-vl-tiny")
 
 @pytest.fixture(scope="module")
 def folders(install, tmp_path_factory):
-    """Folders of a run of the baseline and of a model; the package can be imported as long as the module is tested."""
+    """Folders of a run of the baseline and of a model; the package can be imported as long as the
+    module is tested."""
     output = tmp_path_factory.mktemp("sums")
     with pytest.MonkeyPatch.context() as patched:
         patched.syspath_prepend(install("sums"))

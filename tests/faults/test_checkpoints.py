@@ -1,4 +1,5 @@
-"""Checkpoints that somebody damaged, or made up: one line, before any question, and no code of theirs runs."""
+"""Checkpoints that somebody damaged, or made up: one line, before any question, and no code of
+theirs runs."""
 
 import json
 import os
@@ -151,7 +152,8 @@ DAMAGES = {
     ),
     "template doubles a text": (
         _template(
-            "{% set a = namespace(t='x') %}{% for i in range(40) %}{% set a.t = a.t ~ a.t %}{% endfor %}"
+            "{% set a = namespace(t='x') %}{% for i in range(40) %}{% set a.t = a.t ~ a.t %}{% "
+            "endfor %}"
         ),
         "set INFTHOR_EVAL_MAX_TEMPLATE_MB to more than 512",
     ),

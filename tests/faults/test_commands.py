@@ -38,7 +38,8 @@ MANIFEST = {"name": "x", "trajectories": [{"scene": "kitchen-1", "seed": 0, "min
 
 @pytest.fixture
 def typed(make_nieh_set, tmp_path, run, monkeypatch):
-    """Runs a command with SET, OUT and FILE put in, in an empty folder that has a set and a file."""
+    """Runs a command with SET, OUT and FILE put in, in an empty folder that has a set and a
+    file."""
     monkeypatch.chdir(tmp_path)
     data = make_nieh_set(size=56)
     (tmp_path / "file").write_text("of somebody's")
@@ -191,17 +192,19 @@ TYPED = [
             "--set",
             "prompt=plain",
         ],
-        "final_text.yaml: not a recipe (actions of the form text follow a system prompt; set prompt to chat); fix the",
+        "final_text.yaml: not a recipe (actions of the form text follow a system prompt; set "
+        "prompt to chat); fix the",
     ),
     (["bundle", "file", "--out", "OUT"], "not in its documented form"),
     (
         ["validate", "nowhere", "--models", "oracle", "--out", "OUT"],
-        "nowhere: no such folder; give the folder of an NIEH set, "
-        "or download the published one with `infthor-eval fetch nieh`",
+        "nowhere: no such folder; give the folder of an NIEH set, or download the published one "
+        "with `infthor-eval fetch nieh`",
     ),
     (
         ["validate", ".", "--models", "oracle", "--out", "OUT"],
-        "has no qa_set*.csv, as an NIEH set has beside metadata/; give the folder of an NIEH set, or download",
+        "has no qa_set*.csv, as an NIEH set has beside metadata/; give the folder of an NIEH set, "
+        "or download",
     ),
     (
         [*RUN[:-1], "nowhere", "--output", "OUT"],
@@ -213,7 +216,8 @@ TYPED = [
     ),
     (
         [*VIDEO, "--prompt", "published-logs"],
-        "prompt published-logs: the context video is asked in words of its own; it is for clues, trajectory",
+        "prompt published-logs: the context video is asked in words of its own; it is for clues, "
+        "trajectory",
     ),
     (
         [*PUBLISHED, "--prompt", "published-main"],

@@ -1,4 +1,5 @@
-"""A run survives its worst sample, its disk and its end; nothing that counts is lost, and nothing wrong counts."""
+"""A run survives its worst sample, its disk and its end; nothing that counts is lost, and nothing
+wrong counts."""
 
 import csv
 import errno
@@ -47,7 +48,8 @@ def _twice(data):
     Image.new("RGB", (56, 56)).save(_frame(data, "traj_b", 0).with_suffix(".jpg"))
 
 
-# What is done to a set of five sound questions, and how many of them are answered, are skipped, and fail then.
+# What is done to a set of five sound questions, and how many of them are answered, are skipped, and
+# fail then.
 SETS = {
     "a frame is missing that no question shows": (
         lambda data: _frame(data, "traj_a", 5).unlink(),

@@ -42,7 +42,8 @@ FILES = [
     ),
     (
         HEAD + "dataset_kwargs: {context: video, prompt: published-logs}",
-        f"{SETTING} prompt published-logs: the context video is asked in words of its own; it is for clues, trajectory",
+        f"{SETTING} prompt published-logs: the context video is asked in words of its own; it is "
+        "for clues, trajectory",
     ),
     (
         CLUES + "}\nmetric_list: [{metric: exact}]",

@@ -23,7 +23,8 @@ def refused(do: Callable[[], object], said: str) -> None:
 
 
 def said_in_one_line(ended: tuple[int, str, str], said: str, code: int = 2) -> None:
-    """Hold that a command ended with an exit code, without output, and with one line that says why."""
+    """Hold that a command ended with an exit code, without output, and with one line that says
+    why."""
     found, out, err = ended
     assert "Traceback" not in err
     (line,) = [line for line in err.splitlines() if line.startswith("infthor-eval: ")]

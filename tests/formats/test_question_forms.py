@@ -1,4 +1,5 @@
-"""Types of questions by their words, against files that name them and against the published ones."""
+"""Types of questions by their words, against files that name them and against the published
+ones."""
 
 from collections import Counter
 from pathlib import Path
@@ -46,9 +47,11 @@ def test_every_published_question_has_a_type():
     single, multi = (read_questions(path) for path in sorted(PUBLISHED.glob("qa_set*.csv")))
     # Counted by hand from the files: single clue, several clues.
     assert Counter(type_of(item.text) for item in single) == {
-        "object_presence": 166, "open_state": 28, "location_tracing": 179, "slicing": 6, "container_content": 2,
+        "object_presence": 166, "open_state": 28, "location_tracing": 179, "slicing": 6,
+        "container_content": 2,
         "put_action": 54, "final_state": 394,
     }  # fmt: skip
     assert Counter(type_of(item.text) for item in multi) == {
-        "location_tracing": 222, "slicing": 3, "container_content": 2, "final_state": 213, "movement_counting": 34,
+        "location_tracing": 222, "slicing": 3, "container_content": 2, "final_state": 213,
+        "movement_counting": 34,
     }  # fmt: skip

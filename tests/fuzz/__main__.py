@@ -72,14 +72,15 @@ def _campaign(reader: Reader, minutes: float, first_seed: int) -> int:
                 _note(reader, error, content, findings)
 
         quiet = settings(
-            max_examples=_BATCH, deadline=None, database=None, phases=(Phase.generate,), verbosity=Verbosity.quiet,
+            max_examples=_BATCH, deadline=None, database=None, phases=(Phase.generate,),
+            verbosity=Verbosity.quiet,
             suppress_health_check=list(HealthCheck),
         )  # fmt: skip
         while time.monotonic() < end:
             seed(number)(quiet(given(damaged(sound, reader.form))(attempt)))()
             number += 1
-    print(f"{reader.name}: {counts['tried']:,} inputs in {minutes:g} min, {counts['refused']:,} refused; "
-          f"{len(findings)} different findings")  # fmt: skip
+    print(f"{reader.name}: {counts['tried']:,} inputs in {minutes:g} min, {counts['refused']:,} "
+          f"refused; {len(findings)} different findings")  # fmt: skip
     return len(findings)
 
 

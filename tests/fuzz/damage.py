@@ -1,7 +1,8 @@
-"""Hypothesis strategies that damage a sound input: in its structure, so that it keeps its format, or in its bytes.
+"""Hypothesis strategies that damage a sound input: in its structure, so that it keeps its format,
+or in its bytes.
 
-A huge list and a deep nesting are written by name (`DEEP`, `MANY`) and put in as text at the end: Python's own encoder
-would not take them.
+A huge list and a deep nesting are written by name (`DEEP`, `MANY`) and put in as text at the end:
+Python's own encoder would not take them.
 """
 
 import copy
@@ -33,11 +34,14 @@ class Form(StrEnum):
 DEEP, MANY = "@deep@", "@many@"
 _RAW = {DEEP: "[" * 100_000 + "]" * 100_000, MANY: "[" + ",".join(["0"] * 100_000) + "]"}
 _TEXTS = (
-    "", " ", "\0", "\n", "a\nb", "\r", "\x1b[31m", "\u202e", "\ud800", "x" * 5_000, "../../etc/passwd", "/dev/zero",
-    "é" * 300, "|", "||||", "Mug|a|b|c", "Mug|nan|inf|1e999", "1e999", "{0}", "%s", "__class__", "-1", "NaN", "=1+1",
+    "", " ", "\0", "\n", "a\nb", "\r", "\x1b[31m", "\u202e", "\ud800", "x" * 5_000,
+    "../../etc/passwd", "/dev/zero",
+    "é" * 300, "|", "||||", "Mug|a|b|c", "Mug|nan|inf|1e999", "1e999", "{0}", "%s", "__class__",
+    "-1", "NaN", "=1+1",
 )  # fmt: skip
 _NUMBERS = (
-    0, -1, 1, 2**31, 2**63 - 1, 2**63, -(2**63) - 1, 2**64, 10**30, 10**400, 0.5, -0.0, 1e18, 1e308, 5e-324,
+    0, -1, 1, 2**31, 2**63 - 1, 2**63, -(2**63) - 1, 2**64, 10**30, 10**400, 0.5, -0.0, 1e18,
+    1e308, 5e-324,
     math.nan, math.inf, -math.inf,
 )  # fmt: skip
 _OTHERS = (
@@ -56,8 +60,10 @@ _OTHERS = (
 )
 _ODD = (*_TEXTS, *_NUMBERS, *_OTHERS)
 _PIECES = (
-    b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b",", b"{", b"}", b"[", b"]", b"\\", b"&a ",
-    b"*a", b"!!python/object:os.system ", b"\x80", b"\xed\xa0\x80", b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"9" * 40,
+    b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b",", b"{", b"}", b"[",
+    b"]", b"\\", b"&a ",
+    b"*a", b"!!python/object:os.system ", b"\x80", b"\xed\xa0\x80", b"\xff\xff\xff\xff",
+    b"\x7f\xff\xff\xff", b"9" * 40,
     b"\x1b[2J",
 )  # fmt: skip
 _MOST_PATHS = 3000

@@ -29,7 +29,8 @@ class Reader:
         name: name of what it reads.
         form: format of the input, which is damaged in this form or as bytes.
         make: writes a sound input into an empty folder, and returns the file that is to be damaged.
-        read: reads what is in the folder, with the damaged file; raises AssertionError if sound items do not come.
+        read: reads what is in the folder, with the damaged file; raises AssertionError if sound
+            items do not come.
     """
 
     name: str
@@ -60,7 +61,8 @@ class Reader:
 
 @contextmanager
 def _at_most(seconds: float) -> Iterator[None]:
-    """Raise TooSlowError after some seconds of this process's processor time: a busy machine is no fault."""
+    """Raise TooSlowError after some seconds of this process's processor time: a busy machine is no
+    fault."""
 
     def stop(*_: Any) -> None:
         raise TooSlowError(f"takes more than {seconds} s")

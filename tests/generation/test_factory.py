@@ -137,7 +137,8 @@ def test_five_thousand_steps_are_made_and_replayed(simulator):
 
 
 def _refused(trajectory, simulator):
-    """The actions that a replay of the trajectory refuses, and the first frame whose log differs."""
+    """The actions that a replay of the trajectory refuses, and the first frame whose log
+    differs."""
     restore(simulator, trajectory.scene)
     grounding = Grounding(simulator.view)
     refused = []

@@ -39,7 +39,8 @@ def test_an_exhausted_pool_begins_again_unless_nothing_was_drawn():
 
 
 def test_a_small_variable_leads_more_often_than_a_large_one():
-    # Weights are shares of their variable's sum: of 2 goals one soon leads by far, of 20 objects none does.
+    # Weights are shares of their variable's sum: of 2 goals one soon leads by far, of 20 objects
+    # none does.
     tasks = [
         Task(kind, f"Item{number:02d}", "Table") for kind in ("a", "b") for number in range(20)
     ]
@@ -58,8 +59,8 @@ def test_what_is_drawn_is_among_the_candidates(seed, chosen):
     assert TaskPool(random.Random(seed)).draw(candidates) in candidates
 
 
-# Per cent of 1,200 first draws of the published `sample_task` (July 2026) that have a goal or movable receptacle, for
-# these objects; seeds 0 to 1,199.
+# Per cent of 1,200 first draws of the published `sample_task` (July 2026) that have a goal or
+# movable receptacle, for these objects; seeds 0 to 1,199.
 _PUBLISHED = {
     "pick_and_place_simple": 8.6,
     "pick_and_place_with_movable_recep": 57.8,
@@ -77,10 +78,15 @@ _PUBLISHED = {
     "Drawer": 2.3,
 }
 _OBJECTS = (
-    "Apple AppleSliced Bowl Bread BreadSliced ButterKnife Cup DishSponge Egg Fork Knife Lettuce LettuceSliced Mug Pan"
-    " PepperShaker Plate Pot Potato PotatoSliced SaltShaker SoapBottle Spatula Spoon Tomato TomatoSliced"
+    "Apple AppleSliced Bowl Bread BreadSliced ButterKnife Cup DishSponge Egg Fork Knife Lettuce "
+    "LettuceSliced Mug Pan"
+    " PepperShaker Plate Pot Potato PotatoSliced SaltShaker SoapBottle Spatula Spoon Tomato "
+    "TomatoSliced"
 )
-_RECEPTACLES = "Cabinet CoffeeMachine CounterTop DiningTable Drawer Fridge GarbageCan Microwave SinkBasin StoveBurner"
+_RECEPTACLES = (
+    "Cabinet CoffeeMachine CounterTop DiningTable Drawer Fridge GarbageCan Microwave SinkBasin "
+    "StoveBurner"
+)
 
 
 def published_candidates():

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-# lm-eval reads all of its own thousands of task files at each start, 20 seconds: it looks for ours alone here, and for
-# all of them where a test is about that.
+# lm-eval reads all of its own thousands of task files at each start, 20 seconds: it looks for ours
+# alone here, and for all of them where a test is about that.
 _OWN_TASKS_ALONE = """
 import lm_eval.tasks
 class OwnTasksAlone(lm_eval.tasks.TaskManager):

@@ -87,7 +87,8 @@ def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, our
 
 def test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own(tmp_path, ours, start):
     data, found = ours("qwen2.5-vl-tiny")
-    # Named by their files, as lm-eval 0.4.13 imports a task's functions, and so ours, before it looks for the model.
+    # Named by their files, as lm-eval 0.4.13 imports a task's functions, and so ours, before it
+    # looks for the model.
     tasks = f"{TASKS / 'nieh' / 'nieh_gt.yaml'},{TASKS / 'nieh' / 'nieh_full.yaml'}"
     arguments = ["--model", "infthor", "--model_args", "adapter=qwen2.5-vl-tiny", "--tasks", tasks]
     arguments += ["--metadata", json.dumps({"data": str(data)})]
@@ -128,7 +129,8 @@ def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(
 
 
 def write_adapter(site):
-    """An installed package with a model that has no option `device`, counts no tokens and knows no ids."""
+    """An installed package with a model that has no option `device`, counts no tokens and knows no
+    ids."""
     info = site / "constant-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: constant\nVersion: 1.0\n")

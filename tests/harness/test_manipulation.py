@@ -1,4 +1,5 @@
-"""Manipulation with lm-eval as the host: an episode is one request, which our policies alone can answer."""
+"""Manipulation with lm-eval as the host: an episode is one request, which our policies alone can
+answer."""
 
 import json
 import os

@@ -113,7 +113,8 @@ def sum_requests(*sums):
 
 @pytest.fixture
 def install(monkeypatch):
-    """Makes the toy suite another package's, with an adapter for lm-eval of that name in this module, or none."""
+    """Makes the toy suite another package's, with an adapter for lm-eval of that name in this
+    module, or none."""
 
     def install(adapter):
         points = [EntryPoint("toy", "tests.runs.toy:ToySuite", "infthor_eval.suites")]
@@ -147,7 +148,8 @@ def test_a_suite_of_another_package_answers_its_docs_and_no_others(install, requ
         (None, "unknown lm-eval adapter of suite 'toy'; there are manipulation, nieh, plans"),
         (
             "Incomplete",
-            "adapter of suite toy of another package lacks prepare, doc_id_of_unit, response; see docs/",
+            "adapter of suite toy of another package lacks prepare, doc_id_of_unit, response; see "
+            "docs/",
         ),
     ],
 )

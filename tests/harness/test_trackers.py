@@ -91,7 +91,8 @@ def test_each_run_of_a_command_is_sent_by_its_name_once_it_is_finished(asked, ru
 
 
 def test_the_hub_is_given_results_and_samples(asked, run, hub, tmp_path):
-    pushed = "hub_results_org=us,details_repo_name=runs,push_results_to_hub=True,push_samples_to_hub=True"
+    where = "hub_results_org=us,details_repo_name=runs"
+    pushed = f"{where},push_results_to_hub=True,push_samples_to_hub=True"
     files = {}
     hub.upload_folder.side_effect = lambda **given: files.update(read(given["folder_path"]))
     code, _, err = run(*asked, "--hf-hub-log-args", pushed)
@@ -117,8 +118,8 @@ def test_what_a_tracker_does_not_take_is_told_and_the_run_is_whole(asked, run, h
     assert "oracle" in out
     said = " ".join(err.split())
     assert (
-        "could not be sent to the hub (Could not save results aggregated OSError('the network is down'))"
-        in said
+        "could not be sent to the hub (Could not save results aggregated OSError('the network is "
+        "down'))" in said
     )
     assert "run the same command again" in said
     assert "hf_of_nobody" not in out + err

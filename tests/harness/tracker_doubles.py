@@ -1,6 +1,7 @@
 """Doubles of wandb and trackio: they take the arguments that the real ones take, and remember them.
 
-`tracker_signatures.json` has the names of the real ones' parameters, read from the releases that it names.
+`tracker_signatures.json` has the names of the real ones' parameters, read from the releases that it
+names.
 """
 
 import io
@@ -15,7 +16,8 @@ SIGNATURES = json.loads((Path(__file__).parent / "tracker_signatures.json").read
 
 
 class Double:
-    """A package, and what it was called with: `calls` has the name of each function and its arguments by name."""
+    """A package, and what it was called with: `calls` has the name of each function and its
+    arguments by name."""
 
     def __init__(self, package):
         self.calls = []

@@ -10,7 +10,9 @@ from typing import Any
 import pytest
 
 DATA = Path(__file__).resolve().parents[2] / ".." / "shared" / "data"
-_START = 60.0  # seconds after which a constructor that hangs (ai2thor waits for ever on a dead player) fails the test
+# seconds after which a constructor that hangs (ai2thor waits for ever on a dead player) fails the
+# test
+_START = 60.0
 
 
 def need_data() -> Path:

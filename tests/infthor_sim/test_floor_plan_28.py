@@ -96,10 +96,12 @@ def test_the_hand_turns_by_its_own_angles(bench, turn, rotation, tilt):
     assert after["position"] == before["position"]
 
 
-@pytest.mark.parametrize(("angle", "axis", "sign"), [(0, "z", 1), (90, "x", 1), (180, "z", -1), (270, "x", -1),
+@pytest.mark.parametrize(("angle", "axis", "sign"),
+                         [(0, "z", 1), (90, "x", 1), (180, "z", -1), (270, "x", -1),
                                                      (-1, "z", 1), (-90, "x", -1)])  # fmt: skip
 def test_a_push_moves_a_tomato_far_and_what_is_in_its_way_along(bench, angle, axis, sign):
-    bench.ok("TeleportFull", position={"x": -3.25, "y": FLOOR, "z": -1.25}, rotation={"x": 0, "y": 0, "z": 0},
+    bench.ok("TeleportFull", position={"x": -3.25, "y": FLOOR, "z": -1.25},
+             rotation={"x": 0, "y": 0, "z": 0},
              horizon=30, standing=True)  # fmt: skip
     tomato, bread = bench.first("Tomato"), bench.first("Bread")
     before, stood = bench.object(tomato)["position"], bench.object(bread)["position"]

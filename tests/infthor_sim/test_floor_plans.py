@@ -1,4 +1,5 @@
-"""Floor plans from a data folder: any folder of the documented form, and what trajectories add to it."""
+"""Floor plans from a data folder: any folder of the documented form, and what trajectories add to
+it."""
 
 import gzip
 import json
@@ -17,7 +18,8 @@ from .harness import Bench
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A data folder with one floor plan, written from a procedural kitchen as the metadata reports it."""
+    """A data folder with one floor plan, written from a procedural kitchen as the metadata reports
+    it."""
     bench = Bench(size=40)
     entries = bench.reset("kitchen-1")["objects"]
     for entry in entries:  # the public form has boxes without corner points
@@ -128,9 +130,11 @@ def test_poses_rearrange_the_loose_objects(folder):
     bench.ok(
         "SetObjectPoses",
         objectPoses=[
-            {"objectName": mug["name"] + "(Clone)", "position": here, "rotation": {"x": 0, "y": 90, "z": 0}},
+            {"objectName": mug["name"] + "(Clone)", "position": here,
+             "rotation": {"x": 0, "y": 90, "z": 0}},
             {"objectName": mug["name"], "position": there, "rotation": {"x": 0, "y": 0, "z": 0}},
-            {"objectName": "AlarmClock_ead726ec", "position": {"x": 0.5, "y": 0.1, "z": 0.5}, "rotation": {}},
+            {"objectName": "AlarmClock_ead726ec", "position": {"x": 0.5, "y": 0.1, "z": 0.5},
+             "rotation": {}},
         ],
     )  # fmt: skip
     loose = [o for o in bench.metadata["objects"] if o["pickupable"]]

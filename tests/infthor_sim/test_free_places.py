@@ -1,4 +1,5 @@
-"""Things are put where there is room for them, by what is drawn: counted by points in solids, and by hand."""
+"""Things are put where there is room for them, by what is drawn: counted by points in solids, and
+by hand."""
 
 import numpy as np
 import pytest

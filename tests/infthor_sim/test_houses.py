@@ -40,7 +40,8 @@ def room(name: str, room_type: str, *corners: tuple[float, float]) -> dict[str, 
 def thing(
     name: str, asset: str, x: float, y: float, z: float, yaw: float = 0, children: Any = ()
 ) -> dict[str, Any]:
-    return {"id": name, "assetId": asset, "position": point(x, z, y), "rotation": {"x": 0, "y": yaw, "z": 0},
+    return {"id": name, "assetId": asset, "position": point(x, z, y),
+            "rotation": {"x": 0, "y": yaw, "z": 0},
             "kinematic": True, "children": list(children)}  # fmt: skip
 
 
@@ -49,12 +50,21 @@ def house() -> dict[str, Any]:
     kitchen = room("room|2", "Kitchen", (0, 0), (0, 6), (3, 6), (3, 4), (5, 4), (5, 0))
     bedroom = room("room|3", "Bedroom", (5, 0), (5, 4), (9, 4), (9, 0))
     walls = [
-        wall("room|2", 0, 0, 0, 6), wall("room|2", 0, 6, 3, 6), wall("room|2", 3, 6, 3, 4), wall("room|2", 3, 4, 5, 4),
-        wall("room|2", 5, 0, 5, 4), wall("room|2", 5, 0, 0, 0), wall("room|3", 5, 0, 5, 4), wall("room|3", 5, 4, 9, 4),
+        wall("room|2", 0, 0, 0, 6), wall("room|2", 0, 6, 3, 6), wall("room|2", 3, 6, 3, 4),
+        wall("room|2", 3, 4, 5, 4),
+        wall("room|2", 5, 0, 5, 4), wall("room|2", 5, 0, 0, 0), wall("room|3", 5, 0, 5, 4),
+        wall("room|3", 5, 4, 9, 4),
         wall("room|3", 9, 4, 9, 0), wall("room|3", 9, 0, 5, 0), wall("exterior", 0, 0, 0, 6),
     ]  # fmt: skip
-    door = {"id": "door|2|3", "assetId": "Doorway_1", "room0": "room|2", "room1": "room|3", "wall0": walls[4]["id"],
-            "wall1": walls[6]["id"], "holePolygon": [point(1.0, 0), point(2.0, 0, 2.1)]}  # fmt: skip
+    door = {
+        "id": "door|2|3",
+        "assetId": "Doorway_1",
+        "room0": "room|2",
+        "room1": "room|3",
+        "wall0": walls[4]["id"],
+        "wall1": walls[6]["id"],
+        "holePolygon": [point(1.0, 0), point(2.0, 0, 2.1)],
+    }
     apple = thing("Apple|surface|2|4", "Apple_11", 1.0, 0.86, 2.0)
     objects = [
         thing("Fridge|2|1", "Fridge_11", 0.5, 0.93, 5.4, 180),
@@ -67,8 +77,15 @@ def house() -> dict[str, Any]:
         "horizon": 30,
         "standing": True,
     }
-    return {"rooms": [kitchen, bedroom], "walls": walls, "doors": [door], "windows": [], "objects": objects,
-            "metadata": {"agent": agent, "schema": "1.0.0"}, "proceduralParameters": {}}  # fmt: skip
+    return {
+        "rooms": [kitchen, bedroom],
+        "walls": walls,
+        "doors": [door],
+        "windows": [],
+        "objects": objects,
+        "metadata": {"agent": agent, "schema": "1.0.0"},
+        "proceduralParameters": {},
+    }
 
 
 def test_a_house_through_the_controller(launch):

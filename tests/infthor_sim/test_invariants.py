@@ -10,10 +10,27 @@ from infthor_sim.player.fifo import FieldType
 from .harness import Bench
 from .schema import check
 
-MOVES = ("MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight", "LookUp", "LookDown", "Pass",
-         "Crouch", "Stand", "DropHandObject", "ThrowObject", "MoveHeldObject", "RandomizeColors")  # fmt: skip
-ON_OBJECTS = ("PickupObject", "PutObject", "OpenObject", "CloseObject", "ToggleObjectOn", "ToggleObjectOff",
-              "SliceObject", "BreakObject", "DirtyObject", "CleanObject", "CookObject", "UseUpObject",
+MOVES = (
+    "MoveAhead",
+    "MoveBack",
+    "MoveLeft",
+    "MoveRight",
+    "RotateLeft",
+    "RotateRight",
+    "LookUp",
+    "LookDown",
+    "Pass",
+    "Crouch",
+    "Stand",
+    "DropHandObject",
+    "ThrowObject",
+    "MoveHeldObject",
+    "RandomizeColors",
+)
+ON_OBJECTS = ("PickupObject", "PutObject", "OpenObject", "CloseObject", "ToggleObjectOn",
+              "ToggleObjectOff",
+              "SliceObject", "BreakObject", "DirtyObject", "CleanObject", "CookObject",
+              "UseUpObject",
               "PushObject", "PullObject")  # fmt: skip
 STEP = st.one_of(
     st.tuples(st.sampled_from(MOVES), st.just(0), st.just(False)),

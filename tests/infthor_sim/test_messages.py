@@ -18,20 +18,27 @@ def bench() -> Bench:
     ("call", "message", "code"),
     [
         ({"action": "Fly"}, "Invalid action: Fly", "InvalidAction"),
-        ({"action": "Reset"}, "action: Reset is missing the following arguments: sceneName", "MissingArguments"),
-        ({"action": "OpenObject"}, "action: OpenObject is missing the following arguments: objectId",
+        ({"action": "Reset"}, "action: Reset is missing the following arguments: sceneName",
          "MissingArguments"),
-        ({"action": "OpenObject", "x": 0.5}, "action: OpenObject is missing the following arguments: y",
+        ({"action": "OpenObject"}, "action: OpenObject is missing the following arguments: "
+                                   "objectId",
+         "MissingArguments"),
+        ({"action": "OpenObject", "x": 0.5}, "action: OpenObject is missing the following "
+                                             "arguments: y",
          "MissingArguments"),
         ({"action": "TeleportFull", "x": 0.5, "z": 1.0, "horizon": 0},
-         "action: TeleportFull is missing the following arguments: rotation,standing,y", "MissingArguments"),
+         "action: TeleportFull is missing the following arguments: rotation,standing,y",
+         "MissingArguments"),
         ({"action": "AddThirdPartyCamera", "orthographicSize": {"x": 0}},
-         'action: AddThirdPartyCamera has an invalid argument: orthographicSize (=={"x": 0}). Cannot convert to: float',
+         'action: AddThirdPartyCamera has an invalid argument: orthographicSize (=={"x": 0}). '
+         'Cannot convert to: float',
          "InvalidArgument"),
         ({"action": "LookUp", "degrees": "a"},
-         "action: LookUp has an invalid argument: degrees (==a). Cannot convert to: float", "InvalidArgument"),
+         "action: LookUp has an invalid argument: degrees (==a). Cannot convert to: float",
+         "InvalidArgument"),
         ({"action": "ChangeResolution", "x": 1.5, "y": 2},
-         "action: ChangeResolution has an invalid argument: x (==1.5). Cannot convert to: int", "InvalidArgument"),
+         "action: ChangeResolution has an invalid argument: x (==1.5). Cannot convert to: int",
+         "InvalidArgument"),
         ({"action": "AddThirdPartyCamera", "position": 5},
          "Error converting value 5 to type 'Vector3'. Path 'position'.", None),
     ],
@@ -48,8 +55,8 @@ def test_unknown_arguments_are_named_with_the_accepted_ones(kitchen):
         kitchen.step("PutObject", x=0.0, y=0.0, z=1.0, forceAction=False, placeStationary=True)
     message = str(raised.value)
     assert (
-        "Expected arguments: String objectId = , float x = , float y = , Boolean forceAction = False"
-        in message
+        "Expected arguments: String objectId = , float x = , float y = , Boolean forceAction = "
+        "False" in message
     )
     assert "Your arguments: 'x', 'y', 'z', 'forceAction', 'placeStationary'" in message
     with pytest.raises(ValueError, match="invalid arguments: 'noise', 'pace'"):

@@ -111,8 +111,17 @@ def test_old_keys_are_there_and_empty(kitchen):
     metadata = kitchen.reset("kitchen-1").metadata
     assert metadata["actionIntReturn"] == metadata["actionFloatReturn"] == 0
     assert metadata["visibleRange"] is metadata["colorBounds"] is None
-    for key in ("distances", "normals", "flatSurfacesOnGrid", "isOpenableGrid", "segmentedObjectIds",
-                "objectIdsInBox", "actionFloatsReturn", "actionStringsReturn", "actionVector3sReturn"):  # fmt: skip
+    for key in (
+        "distances",
+        "normals",
+        "flatSurfacesOnGrid",
+        "isOpenableGrid",
+        "segmentedObjectIds",
+        "objectIdsInBox",
+        "actionFloatsReturn",
+        "actionStringsReturn",
+        "actionVector3sReturn",
+    ):
         assert metadata[key] == []
 
 

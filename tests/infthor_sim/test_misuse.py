@@ -11,7 +11,8 @@ from infthor_sim.errors import ActionError
 from .harness import Bench
 
 NONSENSE: list[Any] = [
-    None, "a", "", 0, -1, 1e12, math.nan, math.inf, True, [], [1], ["a"], [{}], {}, {"x": "a"}, {"y": None},
+    None, "a", "", 0, -1, 1e12, math.nan, math.inf, True, [], [1], ["a"], [{}], {}, {"x": "a"},
+    {"y": None},
     {"x": math.nan}, {"y": [1]}, [{"objectName": "Mug_1", "position": "a"}], [{"objectType": 1}],
 ]  # fmt: skip
 
@@ -26,10 +27,14 @@ def test_every_argument_of_every_action(name):
     except ActionError as error:
         listed = error.message.split("Expected arguments: ")[1].split("\n")[0]
         parameters = [part.split(" = ")[0].split()[-1] for part in listed.split(", ") if part]
-    usual = {"objectId": some, "sceneName": "bathroom-1", "fillLiquid": "water", "StateChange": "CanBeDirty", "seed": 1,
-             "x": 100, "y": 100, "position": {"x": 0, "y": 1, "z": 0}, "rotation": {"y": 0}, "horizon": 0,
-             "standing": True, "quality": "Low", "objectPoses": [], "objectToggles": [], "house": {},
-             "SetObjectStates": {"stateChange": "openable"}, "rvalue": "a", "moveMagnitude": 0.1, "pushAngle": 0,
+    usual = {"objectId": some, "sceneName": "bathroom-1", "fillLiquid": "water",
+             "StateChange": "CanBeDirty", "seed": 1,
+             "x": 100, "y": 100, "position": {"x": 0, "y": 1, "z": 0}, "rotation": {"y": 0},
+             "horizon": 0,
+             "standing": True, "quality": "Low", "objectPoses": [], "objectToggles": [],
+             "house": {},
+             "SetObjectStates": {"stateChange": "openable"}, "rvalue": "a", "moveMagnitude": 0.1,
+             "pushAngle": 0,
              "objectIds": [some], "maxPoses": 1}  # fmt: skip
     for parameter in parameters:
         given = {key: usual[key] for key in parameters if key in usual}

@@ -1,4 +1,5 @@
-"""A type of object is one record: what the records say holds together, and a new one needs nothing else."""
+"""A type of object is one record: what the records say holds together, and a new one needs nothing
+else."""
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from infthor_sim.render.shapes.catalogue import SHAPES, shape
 from .harness import Bench
 
 WHISK = ObjectType(
-    "Whisk", (0.06, 0.05, 0.28), pickupable=True, mass=0.1, materials=("Metal",), categories=("cutlery",)
+    "Whisk", (0.06, 0.05, 0.28), pickupable=True, mass=0.1, materials=("Metal",),
+    categories=("cutlery",)
 )  # fmt: skip
 CRATE = ObjectType("Crate", (0.4, 0.3, 0.4), receptacle=True, takes=("food", "Whisk"), open_top=1.0)
 
@@ -27,7 +29,8 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 
 def lay_on_table(bench: Bench, object_type: str) -> tuple[str, str]:
-    """Puts an object of a type that the scene lacks on the table and keeps the first mug; ids of both."""
+    """Puts an object of a type that the scene lacks on the table and keeps the first mug; ids of
+    both."""
     mug, table = (
         bench.object(bench.first("Mug")),
         bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"],
@@ -101,10 +104,14 @@ def test_records_name_only_what_there_is():
 @pytest.mark.parametrize(
     ("receptacle", "taken", "refused"),
     [
-        ("CoffeeMachine", "Mug", "Cup"), ("Toaster", "BreadSliced", "Bread"), ("StoveBurner", "Pan", "Plate"),
-        ("Microwave", "Potato", "Fork"), ("Fridge", "WineBottle", "Book"), ("SinkBasin", "Spoon", "Book"),
-        ("Drawer", "Pencil", "Pillow"), ("Pot", "Lettuce", "Bread"), ("TowelHolder", "Towel", "HandTowel"),
-        ("Sofa", "RemoteControl", "Mug"), ("Safe", "CreditCard", "Laptop"), ("DiningTable", "Laptop", "Chair"),
+        ("CoffeeMachine", "Mug", "Cup"), ("Toaster", "BreadSliced", "Bread"),
+        ("StoveBurner", "Pan", "Plate"),
+        ("Microwave", "Potato", "Fork"), ("Fridge", "WineBottle", "Book"),
+        ("SinkBasin", "Spoon", "Book"),
+        ("Drawer", "Pencil", "Pillow"), ("Pot", "Lettuce", "Bread"),
+        ("TowelHolder", "Towel", "HandTowel"),
+        ("Sofa", "RemoteControl", "Mug"), ("Safe", "CreditCard", "Laptop"),
+        ("DiningTable", "Laptop", "Chair"),
     ],
 )  # fmt: skip
 def test_receptacles_take_what_ai2thor_documents(receptacle, taken, refused):

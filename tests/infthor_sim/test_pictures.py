@@ -1,4 +1,5 @@
-"""The renderer: exact depth and ids, the same picture from both implementations, lights, the held object."""
+"""The renderer: exact depth and ids, the same picture from both implementations, lights, the held
+object."""
 
 import numpy as np
 import pytest
@@ -59,9 +60,11 @@ def test_both_renderers_draw_the_same_picture():
     random = np.random.default_rng(3)
     parts = [
         rows(
-            [ShapePart(Form(i % len(Form)), (0, 0, 0), random.uniform(0.03, 0.3, 3), tuple(random.uniform(0.2, 1, 3)),
+            [ShapePart(Form(i % len(Form)), (0, 0, 0), random.uniform(0.03, 0.3, 3),
+                       tuple(random.uniform(0.2, 1, 3)),
                   Material(i % len(Material)), bottom=0.6, emission=0.5 * (i % 7 == 0))],
-            random.uniform((-1.5, -1.5, 0.5), (1.5, 1.5, 3.5)), euler_matrix(random.uniform(0, 360, 3)), i,
+            random.uniform((-1.5, -1.5, 0.5), (1.5, 1.5, 3.5)),
+            euler_matrix(random.uniform(0, 360, 3)), i,
         ) for i in range(120)
     ]  # fmt: skip
     prims, names = np.concatenate(parts), tuple(map(str, range(120)))
@@ -116,9 +119,11 @@ def _corners(part: ShapePart) -> np.ndarray:
 @pytest.mark.parametrize(
     ("object_type", "change"),
     [
-        ("Fridge", {"openness": 1.0}), ("DeskLamp", {"toggled": True}), ("Mug", {"fill_liquid": "coffee"}),
+        ("Fridge", {"openness": 1.0}), ("DeskLamp", {"toggled": True}),
+        ("Mug", {"fill_liquid": "coffee"}),
         ("Plate", {"dirty": True}), ("Potato", {"cooked": True}), ("Drawer", {"openness": 0.5}),
-        ("Television", {"toggled": True}), ("Microwave", {"toggled": True}), ("StoveBurner", {"toggled": True}),
+        ("Television", {"toggled": True}), ("Microwave", {"toggled": True}),
+        ("StoveBurner", {"toggled": True}),
         ("Vase", {"broken": True}),
     ],
 )  # fmt: skip
@@ -237,7 +242,8 @@ def test_what_the_hand_holds_hides_little_of_the_room(scene, object_type):
     bench.ok("PickupObject", objectId=held, forceAction=True)
     before = bench.object(held)["position"]
     for horizon in (0.0, 30.0, 60.0):
-        bench.ok("TeleportFull", position=bench.metadata["agent"]["position"], rotation={"y": 90.0}, horizon=horizon,
+        bench.ok("TeleportFull", position=bench.metadata["agent"]["position"],
+                 rotation={"y": 90.0}, horizon=horizon,
                  standing=True)  # fmt: skip
         pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(150, 150, 4)[
             ::-1, :, :3

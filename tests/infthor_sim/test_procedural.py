@@ -1,4 +1,5 @@
-"""Procedural rooms are furnished as their type needs, connected, and different from seed to seed."""
+"""Procedural rooms are furnished as their type needs, connected, and different from seed to
+seed."""
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from infthor_sim.scenes.procedural import SCENE_TYPES
 from .harness import Bench
 
 NEEDED = {
-    "kitchen": "Fridge Microwave CounterTop SinkBasin Faucet Cabinet Drawer DiningTable StoveBurner CoffeeMachine Knife"
+    "kitchen": "Fridge Microwave CounterTop SinkBasin Faucet Cabinet Drawer DiningTable "
+    "StoveBurner CoffeeMachine Knife"
     " Mug Plate Apple Tomato Potato Egg Pan Pot GarbageCan",
     "living-room": "Sofa CoffeeTable TVStand Television FloorLamp Drawer ArmChair GarbageCan",
     "bedroom": "Bed Desk DeskLamp Dresser Drawer SideTable Chair",
-    "bathroom": "Toilet Bathtub BathtubBasin SinkBasin Faucet CounterTop Cabinet SoapBar Cloth TowelHolder",
+    "bathroom": "Toilet Bathtub BathtubBasin SinkBasin Faucet CounterTop Cabinet SoapBar Cloth "
+    "TowelHolder",
 }
 
 
@@ -81,7 +84,8 @@ def test_a_house_is_connected(seed):
 @pytest.mark.parametrize(
     "task",
     [
-        "pick Apple put CounterTop", "pick Mug heat Microwave put DiningTable", "pick Apple cool Fridge put CounterTop",
+        "pick Apple put CounterTop", "pick Mug heat Microwave put DiningTable",
+        "pick Apple cool Fridge put CounterTop",
         "pick Plate clean SinkBasin put CounterTop", "pick Knife slice Tomato put CounterTop",
     ],
 )  # fmt: skip

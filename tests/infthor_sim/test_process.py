@@ -69,7 +69,10 @@ def test_it_goes_when_the_controller_hangs_up(pipes):
 
 
 def test_it_goes_when_its_parent_dies_before_the_handshake(pipes):
-    script = f"import subprocess,sys,time; p=subprocess.Popen({COMMAND!r}); print(p.pid, flush=True); time.sleep(60)"
+    script = (
+        f"import subprocess,sys,time; p=subprocess.Popen({COMMAND!r}); print(p.pid, flush=True); "
+        "time.sleep(60)"
+    )
     parent = subprocess.Popen(
         [sys.executable, "-c", script], env=os.environ | pipes, stdout=subprocess.PIPE, text=True
     )

@@ -1,4 +1,5 @@
-"""What can be asked of a scene: standing places, poses, outlines, points; and what replies tell of."""
+"""What can be asked of a scene: standing places, poses, outlines, points; and what replies tell
+of."""
 
 import math
 from itertools import product

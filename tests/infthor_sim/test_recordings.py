@@ -1,4 +1,5 @@
-"""Expert trajectories recorded in AI2-THOR are accepted, and what they point at is where the recording saw it."""
+"""Expert trajectories recorded in AI2-THOR are accepted, and what they point at is where the
+recording saw it."""
 
 import gzip
 import json
@@ -89,7 +90,8 @@ def drawn_box(bench: Bench, object_id: str) -> list[int] | None:
 
 
 def modern(pose: dict[str, Any], known: set[str]) -> dict[str, Any]:
-    """A pose of AI2-THOR 2.1.0 as one of 5.0.0; names that both versions have are of things that did not change."""
+    """A pose of AI2-THOR 2.1.0 as one of 5.0.0; names that both versions have are of things that
+    did not change."""
     if pose["objectName"] in known:
         return pose
     return {
@@ -103,11 +105,13 @@ def start(bench: Bench, scene: dict[str, Any]) -> None:
     outcome = bench.server.run({"action": "Reset", "sceneName": scene["floor_plan"]})[0]
     assert not outcome.error, outcome.error
     known = {item.name for item in bench.sim.world.objects.values()}
+    poses = [modern(pose, known) for pose in scene["object_poses"]]
     calls: list[dict[str, Any]] = [
         {"action": "Initialize", **INIT},
         {"action": "SetObjectToggles", "objectToggles": scene["object_toggles"]},
-        {"action": "SetObjectPoses", "objectPoses": [modern(pose, known) for pose in scene["object_poses"]]},
-        {"action": "TeleportFull", "position": {k: init[k] for k in "xyz"}, "rotation": {"y": init["rotation"]},
+        {"action": "SetObjectPoses", "objectPoses": poses},
+        {"action": "TeleportFull", "position": {k: init[k] for k in "xyz"},
+         "rotation": {"y": init["rotation"]},
          "horizon": init["horizon"], "standing": True, "forceAction": True},
     ]  # fmt: skip
     for call in calls:

@@ -1,4 +1,5 @@
-"""The shapes of objects: within their boxes, the same outside whether open or closed, floors where contents stand."""
+"""The shapes of objects: within their boxes, the same outside whether open or closed, floors where
+contents stand."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -22,7 +23,8 @@ from infthor_sim.render.shapes import shape
 
 _OUT = 0.02  # metres that handles and the like may stand out
 _STYLES = 12
-# What lies in a bowl rests on its sides; a pan's box has its handle, so that its middle is not the pan's.
+# What lies in a bowl rests on its sides; a pan's box has its handle, so that its middle is not the
+# pan's.
 _UNEVEN = {"Bowl", "Pan"}
 _RASTERIZER = choose_rasterizer("numpy")
 
@@ -56,7 +58,8 @@ def reach(part: ShapePart) -> Array:
 
 
 def allowed(item: SimObject) -> tuple[Array, Array]:
-    """Return the corners of the box that an object may fill in its own frame, with the way of its door or drawer."""
+    """Return the corners of the box that an object may fill in its own frame, with the way of its
+    door or drawer."""
     low, high = (
         item.box_center - item.box_size / 2 - _OUT,
         item.box_center + item.box_size / 2 + _OUT,
@@ -133,7 +136,8 @@ def test_outside_looks_the_same_open_and_closed(object_type: str, style: int) ->
 def test_contents_stand_on_what_is_drawn(
     object_type: str, share_x: float, share_z: float, grown: float
 ) -> None:
-    """Under each place where contents stand is a drawn floor, at most a few millimetres above or below it."""
+    """Under each place where contents stand is a drawn floor, at most a few millimetres above or
+    below it."""
     usual = default_object(object_type, np.zeros(3)).box_size
     item = default_object(object_type, np.zeros(3), size=usual * grown)
     item.hinge = -1
@@ -148,7 +152,8 @@ def test_contents_stand_on_what_is_drawn(
         place -= item.position
         tops = [
             float(at[1] + out[1]) for at, out in parts
-            if (np.abs(place - at)[[0, 2]] <= out[[0, 2]]).all() and at[1] - out[1] <= place[1] + 0.003
+            if (np.abs(place - at)[[0, 2]] <= out[[0,
+                                                   2]]).all() and at[1] - out[1] <= place[1] + 0.003
         ]  # fmt: skip
         assert tops and abs(max(tops) - place[1]) < 0.006, (
             f"{max(tops, default=None)} under {place[1]}"

@@ -1,4 +1,5 @@
-"""The surface on which things are put is the surface that is drawn: measured by points below each thing, by hand."""
+"""The surface on which things are put is the surface that is drawn: measured by points below each
+thing, by hand."""
 
 import numpy as np
 import pytest
@@ -52,7 +53,8 @@ def in_solid(row: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def parts_below(world: World, placed: SimObject, deep: float) -> np.ndarray:
-    """The drawn primitives of other things that reach into the space below a thing, `deep` metres down."""
+    """The drawn primitives of other things that reach into the space below a thing, `deep` metres
+    down."""
     low, high = placed.bounds()
     around = np.array([SLIDE, deep, SLIDE])
     near = []
@@ -64,7 +66,8 @@ def parts_below(world: World, placed: SimObject, deep: float) -> np.ndarray:
 
 
 def gap_below(world: World, placed: SimObject) -> float:
-    """Metres from the underside of a thing down to the first drawn solid under one of 25 points of it."""
+    """Metres from the underside of a thing down to the first drawn solid under one of 25 points of
+    it."""
     low, high = placed.bounds()
     shares = np.linspace(0.05, 0.95, 5)
     depths = np.arange(-RISE, 0.3, 0.002)

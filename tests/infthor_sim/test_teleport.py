@@ -74,8 +74,16 @@ def test_a_move_needs_a_positive_length(bench, move):
 
 
 def test_a_move_takes_all_of_unitys_arguments(bench):
-    terms = {"speed": 2.0, "returnToStart": True, "disableRendering": True, "manualInteract": False, "objectId": "",
-             "maxAgentsDistance": -1.0, "allowAgentsToIntersect": False, "forceAction": False}  # fmt: skip
+    terms = {
+        "speed": 2.0,
+        "returnToStart": True,
+        "disableRendering": True,
+        "manualInteract": False,
+        "objectId": "",
+        "maxAgentsDistance": -1.0,
+        "allowAgentsToIntersect": False,
+        "forceAction": False,
+    }
     assert not bench.step("MoveAhead", moveMagnitude=0.25, **terms)["errorCode"]
     assert not bench.step("RotateLeft", speed=2.0, returnToStart=True, disableRendering=True)[
         "errorCode"

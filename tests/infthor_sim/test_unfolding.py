@@ -1,4 +1,5 @@
-"""What opening does to the boxes of things without doors and drawers: expectations written by hand."""
+"""What opening does to the boxes of things without doors and drawers: expectations written by
+hand."""
 
 import numpy as np
 import pytest

@@ -186,7 +186,8 @@ def test_knobs_light_burners_that_cook(bench):
 
 @pytest.mark.parametrize(
     ("action", "object_type", "flag"),
-    [("DirtyObject", "Plate", "isDirty"), ("BreakObject", "Cup", "isBroken"), ("UseUpObject", "SoapBottle", "isUsedUp"),
+    [("DirtyObject", "Plate", "isDirty"), ("BreakObject", "Cup", "isBroken"),
+     ("UseUpObject", "SoapBottle", "isUsedUp"),
      ("CookObject", "Potato", "isCooked")],
 )  # fmt: skip
 def test_direct_changes_of_state(bench, action, object_type, flag):

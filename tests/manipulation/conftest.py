@@ -1,4 +1,5 @@
-"""Runs and episodes of arms on trajectories that are cut down, in simulators that all tests share."""
+"""Runs and episodes of arms on trajectories that are cut down, in simulators that all tests
+share."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -31,7 +32,8 @@ def shared_simulators(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def arena(pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Arena]]:
-    """Makes the arena of a bundled trajectory, cut to so many plans; each has an arm's simulator of its own."""
+    """Makes the arena of a bundled trajectory, cut to so many plans; each has an arm's simulator of
+    its own."""
     made: dict[tuple[str, int], Arena] = {}
     with ExitStack() as opened:
 

@@ -1,4 +1,5 @@
-"""A policy's steps as movements of AI2-THOR's arm: what they ask for, and what the simulated hand does."""
+"""A policy's steps as movements of AI2-THOR's arm: what they ask for, and what the simulated hand
+does."""
 
 import math
 
@@ -47,7 +48,8 @@ def simulator():
 
 @pytest.fixture
 def arm(simulator):
-    """Faces a direction with its arm at rest, does steps, and tells of the wrist and of the sphere seen from it."""
+    """Faces a direction with its arm at rest, does steps, and tells of the wrist and of the sphere
+    seen from it."""
 
     class Arm:
         def face(self, rotation):
@@ -80,8 +82,8 @@ def arm(simulator):
     return Arm()
 
 
-# By hand. Robot: x forward, y left, z up, right-handed. Unity: y up; at 0 degrees the agent looks along +z and its left
-# is -x; at 90 degrees it looks along +x and its left is +z.
+# By hand. Robot: x forward, y left, z up, right-handed. Unity: y up; at 0 degrees the agent looks
+# along +z and its left is -x; at 90 degrees it looks along +x and its left is +z.
 MOVES = [
     (0, (1, 0, 0), (0, 0, 1)),
     (0, (-1, 0, 0), (0, 0, -1)),
@@ -109,9 +111,9 @@ def test_a_unit_move_moves_the_hand_along_its_axis_by_its_length(arm, facing, as
     assert still_looking == pytest.approx(looking, abs=1e-4)
 
 
-# A turn by 0.4 rad about the robot's axes, right-handed, takes the hand's looking direction, forward at rest:
-# about z (up) to cos forward + sin left; about y (left) to cos forward + sin down; about x (forward) nowhere.
-# (forward, left, up) shares of the looking direction after it:
+# A turn by 0.4 rad about the robot's axes, right-handed, takes the hand's looking direction,
+# forward at rest: about z (up) to cos forward + sin left; about y (left) to cos forward + sin down;
+# about x (forward) nowhere. (forward, left, up) shares of the looking direction after it:
 C, S = math.cos(0.4), math.sin(0.4)
 TURNS = [
     ("yaw left", (0, 0, 0.4), (C, S, 0)),
@@ -150,7 +152,8 @@ def test_a_unit_turn_turns_the_hand_about_its_axis_by_its_angle(arm, facing, ask
 def test_a_roll_lifts_the_hands_left_side_as_a_right_handed_turn_about_forward_does(
     arm, facing, roll, up
 ):
-    """It shows in where the hand's own left is: a quarter's roll makes that the world's up, or down."""
+    """It shows in where the hand's own left is: a quarter's roll makes that the world's up, or
+    down."""
     arm.face(facing)
     _, looking = arm.does(step(rotation=(roll * math.pi / 2, 0, 0)), step(rotation=(0, 0, 0.4)))
     length = math.hypot(*looking)

@@ -1,4 +1,5 @@
-"""Episodes in the simulator: how they begin, what counts as success, and what baselines make of them."""
+"""Episodes in the simulator: how they begin, what counts as success, and what baselines make of
+them."""
 
 import math
 from dataclasses import replace
@@ -305,7 +306,8 @@ def test_distances_are_from_the_spheres_centre_to_the_targets_box(room):
                 outcome.view.arm.sphere_center,
             )
             nearest = (
-                min(max(getattr(center, axis), getattr(box.center, axis) - getattr(box.size, axis) / 2),
+                min(max(getattr(center, axis), getattr(box.center, axis) - getattr(box.size,
+                                                                                   axis) / 2),
                     getattr(box.center, axis) + getattr(box.size, axis) / 2)
                 for axis in "xyz"
             )  # fmt: skip

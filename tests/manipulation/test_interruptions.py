@@ -1,4 +1,5 @@
-"""Runs that are killed, simulators that die under them, and episodes at the same time: no number changes."""
+"""Runs that are killed, simulators that die under them, and episodes at the same time: no number
+changes."""
 
 import json
 import os
@@ -97,7 +98,8 @@ def lines(output):
 
 
 class Calls:
-    """Calls of simulators in this process: counted by agent mode, and processes killed before some of them."""
+    """Calls of simulators in this process: counted by agent mode, and processes killed before some
+    of them."""
 
     def __init__(self):
         self.n = {"arm": 0, "default": 0}

@@ -17,7 +17,8 @@ OPEN = ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.9)
 
 @pytest.fixture
 def picking(prepared, monkeypatch, tmp_path):
-    """The record of a pick-up of a clock beside the expert, by a policy that holds its hand still and open."""
+    """The record of a pick-up of a clock beside the expert, by a policy that holds its hand still
+    and open."""
     data = write(tmp_path / "clock", cut(MUG, 6))
 
     def picking(model=TWIN, **changes):

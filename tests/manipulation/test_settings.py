@@ -42,8 +42,10 @@ def test_what_a_policy_is_told(data, kind, template, episode, said):
 
 
 @pytest.mark.parametrize("template", [
-    "", "pick it up", "{{object}}", "{}", "{0}", "{object", "object}", "{object!r}", "{object:>9}", "{object.real}",
-    "{object[0]}", "{object} to {receptacle}", "{object} {colour}", "Short", "{Object}", "{object:{object}}",
+    "", "pick it up", "{{object}}", "{}", "{0}", "{object", "object}", "{object!r}", "{object:>9}",
+    "{object.real}",
+    "{object[0]}", "{object} to {receptacle}", "{object} {colour}", "Short", "{Object}",
+    "{object:{object}}",
 ])  # fmt: skip
 @pytest.mark.parametrize("by", ["file", "option"])
 def test_words_that_do_not_tell_the_object_are_refused(data, template, by):
@@ -110,8 +112,10 @@ def test_settings_have_defaults_and_all_of_them_act(data):
     assert plain.settings.camera == (300, 60.0)
     assert (plain.settings.max_steps, plain.settings.reward) == (60, 2.0)
     changed = task_of(
-        data, radius=0.06, grasps="all", hold="palm", gripper_threshold=0.7, translation_scale=2, max_step=0.05,
-        rotation=False, return_to_start=False, image_size=224, field_of_view=90, max_steps=9, reward=1,
+        data, radius=0.06, grasps="all", hold="palm", gripper_threshold=0.7, translation_scale=2,
+        max_step=0.05,
+        rotation=False, return_to_start=False, image_size=224, field_of_view=90, max_steps=9,
+        reward=1,
     )  # fmt: skip
     assert changed.settings.grasp == Grasp(0.06, takes_all=True, at_palm=True, threshold=0.7)
     assert (

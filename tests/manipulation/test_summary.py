@@ -9,7 +9,10 @@ from infthor_eval.runs import RunHeader, RunSummary, UnitRecord
 
 PICK, PUT = "manipulathor_pickup", "manipulathor_put"
 COLLIDED = "Collided with static sim object: 'Table|1', could not reach target: 'x'."
-EMBEDDED = "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR in Unity."
+EMBEDDED = (
+    "Made in the embedded simulator: not comparable with the published rows, which are of AI2-THOR "
+    "in Unity."
+)
 
 
 def about(kind, radius=0.5, broken=()):
@@ -34,7 +37,8 @@ def episode(trajectory, index, ended="done", task=PICK, failure=None, excluded=N
         **payload,
     )
     return UnitRecord(
-        task=task, id=f"{trajectory}/{index:04d}", cluster=trajectory, fingerprint="f", payload=record,
+        task=task, id=f"{trajectory}/{index:04d}", cluster=trajectory, fingerprint="f",
+        payload=record,
         failure=failure, excluded=excluded,
     )  # fmt: skip
 
@@ -132,7 +136,8 @@ def test_nothing_counts_where_all_is_left_out():
 def test_table_6_has_the_published_columns_and_rows():
     found = table("Low-level manipulation, success %", run())
     names = [column.name for column in found.columns]
-    assert names == ["model", "radius, m", "Pick-up", "Put", "pick-ups", "puts", "trajectories", "excluded", "skipped",
+    assert names == ["model", "radius, m", "Pick-up", "Put", "pick-ups", "puts", "trajectories",
+                     "excluded", "skipped",
                      "failed", "Pick-up above still", "Put above still"]  # fmt: skip
     published = [cells(row, found) for row in found.rows if row.is_published]
     assert [(row["model"], row["radius, m"], row["Pick-up"], row["Put"]) for row in published] == [
@@ -142,7 +147,8 @@ def test_table_6_has_the_published_columns_and_rows():
     (row,) = own(found)
     assert (row["model"], row["radius, m"]) == ("a policy", "0.5")
     assert row["Pick-up"].startswith("25.0 [") and row["Put"].startswith("50.0 [")
-    assert [row[name] for name in ("pick-ups", "puts", "trajectories", "excluded", "skipped", "failed")] == [
+    assert [row[name] for name in ("pick-ups", "puts", "trajectories", "excluded", "skipped",
+                                   "failed")] == [
         "4", "2", "2", "2", "0", "1",
     ]  # fmt: skip
 

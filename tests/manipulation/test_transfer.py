@@ -1,4 +1,5 @@
-"""Bringing an arm's simulator to where the expert's is: every thing lies where it should, and is as it should be."""
+"""Bringing an arm's simulator to where the expert's is: every thing lies where it should, and is as
+it should be."""
 
 import math
 from dataclasses import replace
@@ -10,7 +11,8 @@ from infthor_eval.episodes.errors import InfeasibleError
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.transfer import transfer
 
-# What calls can bring about; the temperature is not among them, it changes with what a thing is put into.
+# What calls can bring about; the temperature is not among them, it changes with what a thing is put
+# into.
 STATES = ("openness", "is_open", "is_toggled", "is_sliced", "is_broken", "is_dirty", "is_cooked",
           "is_filled_with_liquid")  # fmt: skip
 
@@ -19,7 +21,8 @@ FORK = "Fork|+00.44|+01.52|+02.22"
 
 @pytest.fixture(scope="module")
 def kitchen(arena):
-    """A kitchen: a tomato is cut, a drawer, the fridge and the microwave are opened, things are put into them."""
+    """A kitchen: a tomato is cut, a drawer, the fridge and the microwave are opened, things are put
+    into them."""
     return arena("kitchen-1-seed7", 99)
 
 
@@ -36,7 +39,8 @@ def start_of(arena):
 
 
 def differences(here, wanted, held):
-    """What is otherwise than wanted, of all things; where a hand holds something it lies nowhere."""
+    """What is otherwise than wanted, of all things; where a hand holds something it lies
+    nowhere."""
     found = []
     for key in here.objects.keys() ^ wanted.objects.keys():
         found.append((key, "is there in one alone"))
@@ -77,9 +81,8 @@ def test_the_moments_have_what_makes_it_hard(kitchen, drawers):
     assert any(
         key not in first.objects for view in views for key in view.objects if "TomatoSliced" in key
     )
-    assert {item.object_type for view in views for item in view.objects.values() if item.is_open} >= {
-        "Drawer", "Fridge", "Microwave",
-    }  # fmt: skip
+    opened = [item for view in views for item in view.objects.values() if item.is_open]
+    assert {item.object_type for item in opened} >= {"Drawer", "Fridge", "Microwave"}
     assert any(view.inventory for view in views)
     for number, opened in ((59, False), (87, True)):
         view = drawers.states.starts[number].view

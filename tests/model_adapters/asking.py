@@ -29,7 +29,8 @@ def talk_of(model: Any, turns: tuple[Turn, ...]) -> Any:
 def require_same(
     model: Any, turns: tuple[Turn, ...], ids: list[int], reply: list[int], n_new: int
 ) -> None:
-    """A model of `hf` reads these ids from the turns, and replies what is given, up to where it ends its turn."""
+    """A model of `hf` reads these ids from the turns, and replies what is given, up to where it
+    ends its turn."""
     talk = talk_of(model, turns)
     assert talk.n_tokens == len(ids)
     assert not hasattr(model, "pieces") or list(token_ids(model.pieces(turns))) == ids

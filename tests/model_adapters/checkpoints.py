@@ -1,4 +1,5 @@
-"""Tiny checkpoints of every family that is run: our twins, and for `hf-vlm` families without code of their own."""
+"""Tiny checkpoints of every family that is run: our twins, and for `hf-vlm` families without code
+of their own."""
 
 from collections.abc import Callable
 from functools import partial
@@ -37,7 +38,8 @@ __all__ = ["FAMILIES", "OTHERS", "save", "twin"]
 TEMPLATE = """\
 {%- for message in messages -%}
 {{- message.role + ': ' -}}
-{%- for part in message.content -%}{{- 'IMAGE' if part.type == 'image' else part.text -}}{%- endfor -%}
+{%- for part in message.content -%}{{- 'IMAGE' if part.type == 'image' else part.text -}}{%- \
+endfor -%}
 {{- '\\n' -}}
 {%- endfor -%}
 {%- if add_generation_prompt -%}{{- 'assistant:' -}}{%- endif -%}
@@ -133,7 +135,8 @@ def _deepseek_vl(folder: Path) -> None:
 def _gemma3(folder: Path, line_breaks: tuple[str, ...] = ()) -> None:
     """Attends in both directions within an image, which no shared prefix of ours does.
 
-    The published vocabulary has several line breaks as one token, which then joins frames and words.
+    The published vocabulary has several line breaks as one token, which then joins frames and
+    words.
     """
     names = {
         "boi_token": "<start_of_image>",

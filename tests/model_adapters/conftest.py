@@ -1,4 +1,5 @@
-"""Frames, tiny models and their checkpoints for the tests of adapters, and transformers' own way of running these."""
+"""Frames, tiny models and their checkpoints for the tests of adapters, and transformers' own way of
+running these."""
 
 import json
 import os
@@ -19,7 +20,8 @@ from .checkpoints import FAMILIES, OTHERS, save
 
 PEERS = Path(sys.prefix) / "test-peers"  # torchvision's Python half, kept out of the environment
 
-# Runs in a process of its own, because the stand-ins for torchvision's compiled half must come before transformers.
+# Runs in a process of its own, because the stand-ins for torchvision's compiled half must come
+# before transformers.
 PLAINLY = """
 import json, sys
 import torch
@@ -31,30 +33,37 @@ from transformers import AutoImageProcessor, AutoModelForImageTextToText, AutoPr
 
 def content(processor, model, parts):
     types = [type for type, value in parts]
-    if model.config.model_type == "llava_onevision" and types != sorted(types, key=("image", "video", "text").index):
-        # Its template writes images and videos before texts; in between, their token is written into the text.
+    if model.config.model_type == "llava_onevision" and types != sorted(types, key=("image", \
+"video", "text").index):
+        # Its template writes images and videos before texts; in between, their token is written \
+into the text.
         tokens = {"image": processor.image_token, "video": processor.video_token}
         inline = "".join(tokens.get(type, value) for type, value in parts)
         return [{"type": "text", "text": inline}]
-    return [{"type": type, "text": value} if type == "text" else {"type": type} for type, value in parts]
+    return [{"type": type, "text": value} if type == "text" else {"type": type} for type, value \
+in parts]
 
 def answer(processor, model, turns, new):
-    messages = [{"role": role, "content": content(processor, model, parts)} for role, parts in turns]
+    messages = [{"role": role, "content": content(processor, model, parts)} for role, parts in \
+turns]
     text = processor.apply_chat_template(messages, add_generation_prompt=True)
-    images = [Image.open(value) for role, parts in turns for type, value in parts if type == "image"]
+    images = [Image.open(value) for role, parts in turns for type, value in parts if type == \
+"image"]
     videos = [value for role, parts in turns for type, value in parts if type == "video"]
     if videos:
         # No frame is sampled: the metadata say at which rate those that are given were.
         settings = {
             "videos": [[Image.open(path) for path in video["frames"]] for video in videos],
-            "video_metadata": [{"fps": video["fps"], "total_num_frames": len(video["frames"])} for video in videos],
+            "video_metadata": [{"fps": video["fps"], "total_num_frames": len(video["frames"])} \
+for video in videos],
         }
     else:
         settings = {}
     begin = processor.tokenizer.bos_token
     begun = begin is not None and text.startswith(begin)
     inputs = processor(
-        text=[text], images=images or None, add_special_tokens=not begun, return_tensors="pt", **settings
+        text=[text], images=images or None, add_special_tokens=not begun, return_tensors="pt", \
+**settings
     )
     output = model.generate(**inputs, do_sample=False, max_new_tokens=new)
     ids = inputs["input_ids"][0].tolist()
@@ -126,10 +135,11 @@ def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.fixture(scope="session")
 def answer_plainly() -> Answers:
-    """Has checkpoints answer by their own whole processor and `generate`, every prompt from its beginning.
+    """Has checkpoints answer by their own whole processor and `generate`, every prompt from its
+    beginning.
 
-    Takes conversations by checkpoint and the number of new tokens; gives token ids of prompt and reply, end
-    token included.
+    Takes conversations by checkpoint and the number of new tokens; gives token ids of prompt and
+    reply, end token included.
     """
 
     def answer(prompts: Mapping[Path, Sequence[Sequence[Turn]]], new: int) -> dict[Path, list[Any]]:

@@ -1,8 +1,9 @@
-"""A device that is not the CPU, on any machine: what a GPU would refuse is refused, what it waits for is counted.
+"""A device that is not the CPU, on any machine: what a GPU would refuse is refused, what it waits
+for is counted.
 
-Its tensors hold CPU tensors and say that they are torch's `meta` device, which every build of torch has. They compute
-what the CPU computes, so that replies can be compared; but as on a GPU, two devices do not meet in one operation, and
-what is read or copied from one to the other is seen.
+Its tensors hold CPU tensors and say that they are torch's `meta` device, which every build of torch
+has. They compute what the CPU computes, so that replies can be compared; but as on a GPU, two
+devices do not meet in one operation, and what is read or copied from one to the other is seen.
 """
 
 from collections import Counter
@@ -36,9 +37,11 @@ class Seen:
     """What happened on the device, by the name of the operation.
 
     Attributes:
-        reads: how often something was read from it, which waits for all that it has been given to do.
+        reads: how often something was read from it, which waits for all that it has been given to
+            do.
         brought: how often something was brought to it.
-        allocated: bytes of new memory; what attention takes within itself depends on the kernel and is left out.
+        allocated: bytes of new memory; what attention takes within itself depends on the kernel and
+            is left out.
     """
 
     reads: Counter[str] = field(default_factory=Counter)
@@ -108,7 +111,8 @@ def _storage(tensor: torch.Tensor) -> int:
 
 
 def _wrapped(out: Any, ours: Sequence[_Elsewhere], seen: Seen, name: str) -> Any:
-    """Results as tensors of the device; what an operation wrote in place is the tensor that was given."""
+    """Results as tensors of the device; what an operation wrote in place is the tensor that was
+    given."""
     known = {_storage(tensor.held) for tensor in ours}
 
     def wrap(leaf: Any) -> Any:

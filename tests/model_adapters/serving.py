@@ -27,7 +27,8 @@ def free_port() -> int:
 
 
 def wait_for_server(url: str, server: "subprocess.Popen[bytes]", log: Path) -> None:
-    """Return once a server answers at an address; the test fails with the end of its log if it does not."""
+    """Return once a server answers at an address; the test fails with the end of its log if it does
+    not."""
     end = time.monotonic() + START_S
     while time.monotonic() < end and server.poll() is None:
         try:

@@ -50,7 +50,8 @@ def test_a_good_policy_passes() -> None:
     ("step", "clause"),
     [
         ("left", "is not an ArmDelta"),
-        (ArmDelta((0.0, 0.0), (0.0, 0.0, 0.0), 0.0), "is not three numbers"),  # type: ignore[arg-type]
+        (ArmDelta((0.0, 0.0), (0.0, 0.0, 0.0), 0.0), "is not three numbers"),
+        # type: ignore[arg-type]
         (ArmDelta((0.0, math.nan, 0.0), (0.0, 0.0, 0.0), 0.0), "finite floats"),
         (ArmDelta((0, 0, 0), (0.0, 0.0, 0.0), 0.0), "finite floats"),
         (ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, math.inf), 0.0), "finite floats"),

@@ -28,7 +28,8 @@ from model_adapters.registry import model_description
 
 def test_names_and_help_need_neither_torch_nor_transformers() -> None:
     code = (
-        "import sys, model_adapters as m; [m.options(name) for name in m.names()]; m.label('hf-vlm', {});"
+        "import sys, model_adapters as m; [m.options(name) for name in m.names()]; "
+        "m.label('hf-vlm', {});"
         "sys.exit(bool({'torch', 'transformers'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
@@ -161,7 +162,8 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: Dummy-Robot\nVersion: 1.2\n")
     (info / "entry_points.txt").write_text(
-        f"[{registry.ENTRY_POINTS}]\ndummy = dummy_robot.arms.left:Arm\nsingle = dummy_module:A\nlost = no_such:A\n"
+        f"[{registry.ENTRY_POINTS}]\ndummy = dummy_robot.arms.left:Arm\nsingle = "
+        "dummy_module:A\nlost = no_such:A\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     return tmp_path

@@ -18,7 +18,8 @@ def data(make_nieh_set: Callable[..., Path]) -> Path:
 
 @pytest.fixture
 def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
-    """A run on that set, ready to be executed; keyword arguments are the model's and those of `RunOptions`."""
+    """A run on that set, ready to be executed; keyword arguments are the model's and those of
+    `RunOptions`."""
 
     def make(
         model: str = "oracle", model_options: dict[str, str] | None = None, **changes: object

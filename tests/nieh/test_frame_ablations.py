@@ -17,7 +17,8 @@ QUESTIONS = [
 
 @pytest.fixture
 def requests(make_nieh_set):
-    """All requests of a context: a list of frames, by trajectory and number, and the text, for each sample."""
+    """All requests of a context: a list of frames, by trajectory and number, and the text, for each
+    sample."""
     root = make_nieh_set(QUESTIONS, n_frames=6, size=24)
 
     def find(frames, context="trajectory", seed=0):

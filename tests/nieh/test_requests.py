@@ -9,8 +9,8 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import Catalog
 from infthor_eval.storage.digests import digest
 
-# By task: samples asked, samples skipped, digest of all requests (frames by name). Contexts that a CLIP model or a
-# memory chooses are not among them.
+# By task: samples asked, samples skipped, digest of all requests (frames by name). Contexts that a
+# CLIP model or a memory chooses are not among them.
 EXPECTED = {
     "nieh_haystack_128k": (0, 601, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),
     "nieh_haystack_16k": (0, 601, "7ebb3c7c2a87b1a2f8a7ed729ecb040d"),

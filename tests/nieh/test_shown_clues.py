@@ -57,7 +57,8 @@ def test_the_haystack_shows_its_needle_at_every_depth(shown):
 
 
 def test_clues_that_follow_each_other_can_reach_out_of_the_haystack(shown):
-    # Three and more lie at the last depth: a window of five frames starts four before the first of five clues.
+    # Three and more lie at the last depth: a window of five frames starts four before the first of
+    # five clues.
     settings = {"ctx_size": 5, "tokens_per_frame": 1000, "depths": [0.0]}
     assert shown("haystack", (4, 5, 6, 7, 8), **settings) == [clues(1, 5, 1)]
 
@@ -74,7 +75,8 @@ def test_retrieved_frames_show_the_clues_among_them(make_nieh_set):
     ) == clues(2, 3, 2)
 
 
-# A frame a second of a film of 50 frames would be five, and is rounded down to four: 0, 16, 33 and 49.
+# A frame a second of a film of 50 frames would be five, and is rounded down to four: 0, 16, 33 and
+# 49.
 @pytest.mark.parametrize(
     ("fps", "numbers", "expected"),
     [

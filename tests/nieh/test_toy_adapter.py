@@ -1,4 +1,5 @@
-"""An adapter that counts no tokens and knows no ids keeps the contract, and is evaluated like any other."""
+"""An adapter that counts no tokens and knows no ids keeps the contract, and is evaluated like any
+other."""
 
 import json
 from pathlib import Path
@@ -53,11 +54,14 @@ def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(
         "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
     )
     place = f"{Path(__file__).name}:{reply.__code__.co_firstlineno + 1} (reply)"
-    failure = f"toy fails on the request (IndexError in {place}: tuple index out of range); fix the adapter, or report it"
+    failure = (
+        f"toy fails on the request (IndexError in {place}: tuple index out of range); fix the "
+        "adapter, or report it"
+    )
     assert code == 1
     assert (
-        f"nieh_gt: 5 sample(s) failed, counted as wrong: {failure}; traceback in journal/tracebacks.txt"
-        in err
+        f"nieh_gt: 5 sample(s) failed, counted as wrong: {failure}; traceback in "
+        "journal/tracebacks.txt" in err
     )
     (text,) = [path.read_text() for path in (tmp_path / "out").rglob("journal/tracebacks.txt")]
     assert text.count("Traceback (most recent call last)") == 1

@@ -1,4 +1,5 @@
-"""The units of NIEH: what can be guessed of a question is learned for its record, and no question waits for it."""
+"""The units of NIEH: what can be guessed of a question is learned for its record, and no question
+waits for it."""
 
 import pytest
 

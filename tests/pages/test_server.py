@@ -53,7 +53,8 @@ def ask(
     body: str | None = None,
     **headers: str,
 ) -> http.client.HTTPResponse:
-    """The answer to a request; its path is one below the first page's, or any that begins with a slash."""
+    """The answer to a request; its path is one below the first page's, or any that begins with a
+    slash."""
     first = urlsplit(server.address).path
     connection = http.client.HTTPConnection("127.0.0.1", server.port)
     path = first + (path or "") if not (path or "").startswith("/") else path

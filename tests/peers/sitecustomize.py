@@ -1,6 +1,8 @@
-"""Lets torchvision's Python half load without its compiled one, for peers that insist on it (there is no CPU build).
+"""Lets torchvision's Python half load without its compiled one, for peers that insist on it (there
+is no CPU build).
 
-On the path of test subprocesses only: transformers must find these operators declared before it looks at torchvision.
+On the path of test subprocesses only: transformers must find these operators declared before it
+looks at torchvision.
 """
 
 import torch

@@ -1,7 +1,7 @@
 """Trajectories cut down to their first plans.
 
-They are those of a bundled set as it once was, kept here: the bundled sets are made again when rooms change, and tests
-name plans by number.
+They are those of a bundled set as it once was, kept here: the bundled sets are made again when
+rooms change, and tests name plans by number.
 """
 
 import gzip

@@ -1,7 +1,9 @@
-"""Trajectories in which what is held after a task is put away in a sub-goal of its own, as the published ones have it.
+"""Trajectories in which what is held after a task is put away in a sub-goal of its own, as the
+published ones have it.
 
-Ours have a walk and a put between two tasks, which belong to none. The published generator of July 2026 makes a task of
-them, with one PutObject that names types, and with its walk among its actions. Older files have its sub-goal alone.
+Ours have a walk and a put between two tasks, which belong to none. The published generator of July
+2026 makes a task of them, with one PutObject that names types, and with its walk among its actions.
+Older files have its sub-goal alone.
 """
 
 import json
@@ -12,7 +14,8 @@ from infthor_eval.formats.trajectory import Trajectory, TrajectorySource
 
 from .cut import FORK, cut
 
-PEN = "living-room-1-seed3"  # look at a pen under the desk lamp; the pen goes to the dining table; look at a mug
+# look at a pen under the desk lamp; the pen goes to the dining table; look at a mug
+PEN = "living-room-1-seed3"
 _N_PLANS = 10  # of PEN, of which 4 and 5 put the pen away
 
 
@@ -35,7 +38,8 @@ def pen_put_away(**changes: Any) -> dict[str, Any]:
 
 
 def put_away_without_actions(name: str = FORK, n_plans: int = 6, **changes: Any) -> dict[str, Any]:
-    """A document with a sub-goal without actions behind its first task, as files of before July 2026."""
+    """A document with a sub-goal without actions behind its first task, as files of before July
+    2026."""
     document = cut(name, n_plans, **changes)
     before, *later = document["sub_trajs"]
     first, low = before["high_pddl_idx"][1], before["low_pddl_idx"][1]

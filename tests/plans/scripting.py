@@ -36,7 +36,8 @@ class Talk(Transcript):
 
 
 class ScriptedModel:
-    """Replies by a function of what was asked and the decoding; keeps what it was asked, and last told by a system."""
+    """Replies by a function of what was asked and the decoding; keeps what it was asked, and last
+    told by a system."""
 
     name, capabilities = "qwen2.5-vl-tiny", CAPABILITIES
 

@@ -1,4 +1,5 @@
-"""What any environment of plans must hold to: ours does, and broken ones are told what they broke."""
+"""What any environment of plans must hold to: ours does, and broken ones are told what they
+broke."""
 
 from dataclasses import replace
 

@@ -66,7 +66,8 @@ def test_the_expert_earns_all_there_is(simulator):
 
 
 def test_a_goal_that_comes_to_hold_when_the_way_is_over_is_not_counted_on(simulator):
-    """The lamp is on, and in view from the first step of the way on; often it is from the last steps on only."""
+    """The lamp is on, and in view from the first step of the way on; often it is from the last
+    steps on only."""
     environment, plan = PlanEnvironment(whole(LAMP), simulator), 8
     assert environment.reset(plan)[1]["max_reward"] == pytest.approx(9.8)
     assert sum(outcome.reward for outcome in play(environment, plan)) == pytest.approx(9.8)

@@ -1,4 +1,5 @@
-"""Runs of plans that are killed, and simulators that die under them: nothing that counts changes."""
+"""Runs of plans that are killed, and simulators that die under them: nothing that counts
+changes."""
 
 import json
 import os
@@ -75,7 +76,8 @@ def wait_for(n, output, process):
 
 
 def kill_and_go_on(data, output, n_kills, draw):
-    """Kill runs at a random moment, each a bit further than the one before; then let one end. Returns the kills."""
+    """Kill runs at a random moment, each a bit further than the one before; then let one end.
+    Returns the kills."""
     killed = 0
     for _ in range(n_kills):
         process = start(data, output)
@@ -99,7 +101,8 @@ def test_a_run_that_is_killed_again_and_again_ends_as_one_that_is_not(tmp_path):
 
 
 class Calls:
-    """The calls of simulators in this process: counted, and their processes killed before some of them.
+    """The calls of simulators in this process: counted, and their processes killed before some of
+    them.
 
     Attributes:
         n: how many there were so far.

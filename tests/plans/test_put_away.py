@@ -1,4 +1,5 @@
-"""Putting away what is held, as a task of its own: read, rewarded by both rule sets, evaluated, in the history."""
+"""Putting away what is held, as a task of its own: read, rewarded by both rule sets, evaluated, in
+the history."""
 
 import pytest
 
@@ -27,7 +28,8 @@ def simulator():
 
 
 def by_expert(environment, plan):
-    """What the expert's actions earn in a plan, and how it ends; `None` where they do not end it."""
+    """What the expert's actions earn in a plan, and how it ends; `None` where they do not end
+    it."""
     _, info = environment.reset(plan)
     outcomes = []
     for action in environment.expert_actions(plan):
@@ -108,8 +110,8 @@ def test_the_published_history_has_its_goal_and_its_plan(simulator, tmp_path):
     shown = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
     begins = "<|goal|>Your main goal: put the Pen on the DiningTable<|goal|><image>"
     assert (
-        f"{begins}<|plan|>Plan: put the Pen in the DiningTable<|plan|><|act|><|act|>RotateLeft<|act|>"
-        in shown
+        f"{begins}<|plan|>Plan: put the Pen in the "
+        "DiningTable<|plan|><|act|><|act|>RotateLeft<|act|>" in shown
     )
     assert (
         "<|act|>PutObject Pen DiningTable<|act|><image><|goal|>Your main goal: look at a mug"

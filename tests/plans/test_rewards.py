@@ -1,4 +1,5 @@
-"""Rewards of plans on events written by hand: each table has the action, the world after it, and what it gives."""
+"""Rewards of plans on events written by hand: each table has the action, the world after it, and
+what it gives."""
 
 import msgspec
 import pytest
@@ -223,7 +224,8 @@ OTHERS = [
         [("SliceObject", PLATE, kitchen()), ("SliceObject", APPLE, kitchen(without=[APPLE]))],
         [(0.0, GOES_ON), (1.0, DONE)],
     ),
-    ("slice refused", PlanTarget(PlanKind.SLICE, APPLE), kitchen(), [("SliceObject", APPLE, kitchen(refused=True))],
+    ("slice refused", PlanTarget(PlanKind.SLICE, APPLE), kitchen(),
+     [("SliceObject", APPLE, kitchen(refused=True))],
      [(0.0, FAILED)]),
 ]  # fmt: skip
 
@@ -360,7 +362,8 @@ TREATED = [
         "cool twice",
         COOL,
         HOLDING,
-        [*COOLING, ("CloseObject", FRIDGE, STOWED), COOLING[-1], ("PickupObject", CUP, kitchen(held=CUP))],
+        [*COOLING, ("CloseObject", FRIDGE, STOWED), COOLING[-1],
+         ("PickupObject", CUP, kitchen(held=CUP))],
         [(0.0, GOES_ON), (0.0, GOES_ON), (2.0, GOES_ON), (2.0, GOES_ON), *[(0.0, GOES_ON)] * 3],
     ),
     (
@@ -408,31 +411,37 @@ CLEAN_MUG = Task(TaskType.CLEAN, "Mug", "SinkBasin")
 TOGGLE = PlanTarget(PlanKind.TOGGLE, LAMP)
 
 TASKS = [
-    ("done with the plan", PLACE, PUT, HOLDING, [("PutObject", OTHER_TABLE, kitchen({MUG: OTHER_TABLE}))],
+    ("done with the plan", PLACE, PUT, HOLDING,
+     [("PutObject", OTHER_TABLE, kitchen({MUG: OTHER_TABLE}))],
      [(7.0, DONE)]),
     ("wrong place, right task", PLACE, PUT, HOLDING, [("PutObject", TABLE, kitchen())],
      [(5.0, GOES_ON)]),
     ("once", IN_THE_FRIDGE, STOW, HOLDING,
-     [("OpenObject", FRIDGE, OPEN_FRIDGE), ("PutObject", FRIDGE, IN_FRIDGE), ("CloseObject", FRIDGE, STOWED)],
+     [("OpenObject", FRIDGE, OPEN_FRIDGE), ("PutObject", FRIDGE, IN_FRIDGE),
+      ("CloseObject", FRIDGE, STOWED)],
      [(2.0, GOES_ON), (7.0, GOES_ON), (2.0, DONE)]),
     ("held already", PLACE, TOGGLE, kitchen(), [("ToggleObjectOn", LAMP, kitchen(on=[LAMP]))],
      [(1.0, DONE)]),
-    ("looked at", EXAMINE, TOGGLE, HOLDING, [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP]))],
+    ("looked at", EXAMINE, TOGGLE, HOLDING,
+     [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP]))],
      [(6.0, DONE)]),
-    ("looked at on the way", EXAMINE, PICKUP, kitchen(on=[LAMP]), [("PickupObject", MUG, kitchen(held=MUG, on=[LAMP]))],
+    ("looked at on the way", EXAMINE, PICKUP, kitchen(on=[LAMP]),
+     [("PickupObject", MUG, kitchen(held=MUG, on=[LAMP]))],
      [(7.0, DONE)]),
     ("out of sight", EXAMINE, TOGGLE, HOLDING,
      [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP], hidden=[LAMP]))], [(1.0, DONE)]),
     ("with an action of no use", EXAMINE, PICKUP, kitchen({MUG: DRAWER}, held=CUP),
      [("ToggleObjectOn", LAMP, kitchen(held=MUG, on=[LAMP]))], [(0.0, GOES_ON)]),
-    ("washed", CLEAN_MUG, CLEAN, HOLDING, [("PutObject", BASIN, IN_SINK), ("ToggleObjectOn", FAUCET, WASHED)],
+    ("washed", CLEAN_MUG, CLEAN, HOLDING,
+     [("PutObject", BASIN, IN_SINK), ("ToggleObjectOn", FAUCET, WASHED)],
      [(0.0, GOES_ON), (7.0, DONE)]),
     ("washed, found there", CLEAN_MUG, CLEAN, IN_SINK, [("ToggleObjectOn", FAUCET, WASHED)],
      [(7.0, DONE)]),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("task", "target", "start", "events", "expected"), [row[1:] for row in TASKS],
+@pytest.mark.parametrize(("task", "target", "start", "events", "expected"),
+                         [row[1:] for row in TASKS],
                          ids=[row[0] for row in TASKS])  # fmt: skip
 def test_the_task_is_paid_once_when_its_goal_comes_to_hold(task, target, start, events, expected):
     assert run(DEFAULT, target, start, events, task) == expected
@@ -514,8 +523,10 @@ def test_a_way_is_over_before_its_end_and_other_plans_go_on():
 # -- the rules, and what does not fit
 
 PUBLISHED = {
-    "GotoLocation": 4.0, "PickupObject": 2.0, "PutObject": 2.0, "OpenObject": 2.0, "CloseObject": 1.0,
-    "ToggleObject": 1.0, "SliceObject": 1.0, "CleanObject": 2.0, "HeatObject": 2.0, "CoolObject": 2.0,
+    "GotoLocation": 4.0, "PickupObject": 2.0, "PutObject": 2.0, "OpenObject": 2.0,
+    "CloseObject": 1.0,
+    "ToggleObject": 1.0, "SliceObject": 1.0, "CleanObject": 2.0, "HeatObject": 2.0,
+    "CoolObject": 2.0,
 }  # fmt: skip
 
 

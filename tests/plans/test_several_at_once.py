@@ -1,4 +1,5 @@
-"""Several episodes at once: each has a simulator to itself, and they find what one after the other finds."""
+"""Several episodes at once: each has a simulator to itself, and they find what one after the other
+finds."""
 
 import msgspec
 import psutil

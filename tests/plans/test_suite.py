@@ -42,8 +42,8 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
     write(data / "more", cut(MUG, 2))
     outcome = execute(prepared())
     found = {(record.cluster, record.payload.index): record.payload for record in outcome.records}
-    # By hand, from the expert's actions: eleven steps and a look, the last of which leaves a step (done with fewer
-    # than three to go); what is closed is opened and closed around a thing.
+    # By hand, from the expert's actions: eleven steps and a look, the last of which leaves a step
+    # (done with fewer than three to go); what is closed is opened and closed around a thing.
     assert {
         key: (plan.ended, len(plan.steps), plan.n_expert_steps) for key, plan in found.items()
     } == {
@@ -449,7 +449,8 @@ SETTINGS = [
     ("rewards: generous", "unknown reward rules 'generous'; there are default, published"),
     (
         "history: all",
-        "history all: there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+        "history all: there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "
+        "goals and plans",
     ),
     ("bundled: nothing", "the installation lacks its data folder 'sets/nothing'"),
 ]

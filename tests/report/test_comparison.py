@@ -38,7 +38,8 @@ def test_further_scores_are_those_above_guessing_where_guessing_does_not_solve_t
 
 
 def test_runs_are_compared_above_guessing_on_the_questions_that_have_it():
-    # Question 0 has no guess and 1 is solved by guessing; the others count, of one form with a guess of 0.5 each.
+    # Question 0 has no guess and 1 is solved by guessing; the others count, of one form with a
+    # guess of 0.5 each.
     replies = (
         ("mug", "mug", "cup", "cup", "mug", "mug"),
         ("mug", "cup", "mug", "mug", "mug", "cup"),
@@ -74,7 +75,8 @@ def test_a_question_that_only_one_run_has_it_for_is_not_compared_in_it():
 
 
 def test_a_metric_that_one_run_has_not_is_not_compared():
-    """A task may have the reference scorer alone; to a run without any result, every metric is 0."""
+    """A task may have the reference scorer alone; to a run without any result, every metric is
+    0."""
     alone = [asked(0, "mug"), asked(1, None)]
     alone[0] = replace(alone[0], payload=replace(alone[0].payload, scores={"reference": 1.0}))
     both = [asked(0, "mug"), asked(1, "mug")]

@@ -35,7 +35,8 @@ def test_csv_reads_back(rows):
 
 @given(st.lists(st.tuples(st.none() | st.floats(-1e6, 1e6), st.floats(0, 10)), max_size=4))
 def test_every_number_of_csv_has_a_column_of_its_own_and_a_missing_one_is_empty(values):
-    rates = [None if mean is None else Rate(mean, *((mean - off, mean + off) if off else (None, None)), 7)
+    rates = [None if mean is None else Rate(mean,
+                                            *((mean - off, mean + off) if off else (None, None)), 7)
              for mean, off in values]  # fmt: skip
     ends = [(None, None) if rate is None else (rate.low, rate.high) for rate in rates]
     columns = (Column("a"), Column("95 %"), Column("n"))

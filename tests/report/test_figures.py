@@ -69,7 +69,8 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
         "mean over 3 trajectories, 95 % intervals shaded",
         "embedded simulator: not comparable with the paper's curves",
         "context tokens are not reported: _random",
-        "planner, context of the plan's last request (tokens): its plans are where the first of the runs has them",
+        "planner, context of the plan's last request (tokens): its plans are where the first of "
+        "the runs has them",
     ):
         assert words in said
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figure7.png", "figure7.svg"]
@@ -107,7 +108,8 @@ def test_the_label_names_the_embedded_runs_where_not_all_are():
 
 def test_the_table_has_the_ends():
     table = curves_table(plan_curves(runs()))
-    # Of the first run, 4 plans in each of three trajectories: 4, 8 and 12 points; 8, 12 and 16 of the planner.
+    # Of the first run, 4 plans in each of three trajectories: 4, 8 and 12 points; 8, 12 and 16 of
+    # the planner.
     assert table.rows[0].cells == (
         "model $x$ & <y>",
         "8.00",
@@ -159,7 +161,8 @@ def test_panels_of_another_form_are_refused(tmp_path, content):
 
 
 FT = {length: f"llava-ft{length}k" for length in (32, 64, 130)}  # the checkpoints of Table 5
-# Panels of Figure 7 by its caption and section C.1: methods at x4, YaRN's factors, lengths of training, both, the best.
+# Panels of Figure 7 by its caption and section C.1: methods at x4, YaRN's factors, lengths of
+# training, both, the best.
 FIGURE_7 = {
     "(a)": [FT[32], *(f"{FT[32]}-{method}4" for method in ("dynamic", "longrope", "yarn"))],
     "(b)": [FT[32], *(f"{FT[32]}-yarn{factor}" for factor in (4, 8, 16))],
@@ -189,7 +192,8 @@ def test_runs_beyond_the_number_of_lines_take_them_again():
 
 
 def long_records(done: float, *, tokens: bool = True):
-    """Two trajectories of plans of thirty steps of 700 tokens, up to half a million; a part of them is done."""
+    """Two trajectories of plans of thirty steps of 700 tokens, up to half a million; a part of them
+    is done."""
     return [
         plan(
             name,
@@ -219,7 +223,8 @@ def test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_e
 
 
 def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run, monkeypatch):
-    """The whole way of docs/figures.md: a checkpoint trained under YaRN, runs with its names, and their figure."""
+    """The whole way of docs/figures.md: a checkpoint trained under YaRN, runs with its names, and
+    their figure."""
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "data", cut(CANDLE, 2))
     asked = ("--tasks", "infthor_plans", "--data", "data", "--rewards", "published")
@@ -275,7 +280,8 @@ def _replies(folder: Path) -> list[list[str | None]]:
 
 
 def _asked_as(name: str, *asked: str) -> tuple[str, ...]:
-    """The command of docs/figures.md that makes the run of this name, with a tiny model in the place of the large."""
+    """The command of docs/figures.md that makes the run of this name, with a tiny model in the
+    place of the large."""
     _, trained, extended = re.fullmatch(r"(llava-ft\d+k)(@yarn4)?(?:-(.+))?", name).groups(
         default=""
     )

@@ -1,4 +1,5 @@
-"""What a limit takes: evenly from all trajectories, the same for a seed, and more of the same with a larger one."""
+"""What a limit takes: evenly from all trajectories, the same for a seed, and more of the same with
+a larger one."""
 
 from collections import Counter
 

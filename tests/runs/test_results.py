@@ -36,7 +36,8 @@ def test_the_hit_rate_is_a_share_of_what_was_read(counts: list[tuple[int, int]])
         (Usage(2), "2 requests, 0 tokens read (0 of them cached), 0 written"),
         (
             Usage(2, 1000, 0, 10, 0.5),
-            "2 requests, 1,000 tokens read (0 of them cached, 0.0 %), 10 written, 0.5000 US dollars",
+            "2 requests, 1,000 tokens read (0 of them cached, 0.0 %), 10 written, 0.5000 US "
+            "dollars",
         ),
     ],
 )

@@ -1,4 +1,5 @@
-"""The toy suite as a command: OUTPUT [GATE]; unit N waits until the folder GATE holds the file open-N."""
+"""The toy suite as a command: OUTPUT [GATE]; unit N waits until the folder GATE holds the file
+open-N."""
 
 import itertools
 import sys

@@ -9,7 +9,10 @@ import pytest
 from infthor_eval.storage import scratch
 from infthor_eval.storage.scratch import ScratchFolder
 
-_HOLD = "import time\nfrom infthor_eval.storage.scratch import ScratchFolder\nfolder = ScratchFolder()\n{}\n"
+_HOLD = (
+    "import time\nfrom infthor_eval.storage.scratch import ScratchFolder\nfolder = "
+    "ScratchFolder()\n{}\n"
+)
 
 
 @pytest.fixture

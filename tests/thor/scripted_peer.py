@@ -1,8 +1,8 @@
 """A stand-in for a simulator that misbehaves on cue; run as a process by the tests.
 
-Usage: scripted_peer.py FAULT ACTION NUMBER MARKER [unity arguments]. At the NUMBER-th ACTION (or "handshake")
-it commits FAULT, provided MARKER does not exist yet or FAULT ends with "!"; MARKER is then made, so that a
-restarted peer behaves.
+Usage: scripted_peer.py FAULT ACTION NUMBER MARKER [unity arguments]. At the NUMBER-th ACTION (or
+"handshake") it commits FAULT, provided MARKER does not exist yet or FAULT ends with "!"; MARKER is
+then made, so that a restarted peer behaves.
 """
 
 import json

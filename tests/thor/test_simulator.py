@@ -18,7 +18,8 @@ PEER = Path(__file__).with_name("scripted_peer.py")
 
 def scripted(tmp_path, fault="none", action="-", number=1):
     words = [sys.executable, str(PEER), fault, action, str(number), str(tmp_path / "marker")]
-    # One second where a peer falls silent, as that is waited for; else time enough for a busy machine.
+    # One second where a peer falls silent, as that is waited for; else time enough for a busy
+    # machine.
     return Launch(
         shlex.join(words),
         timeout=1.0 if fault.rstrip("!") in ("hang", "close") else PATIENCE_S,

@@ -1,4 +1,5 @@
-"""What each of several processes does in `test_many_processes.py`; started once for all its tests."""
+"""What each of several processes does in `test_many_processes.py`; started once for all its
+tests."""
 
 import os
 from dataclasses import dataclass
@@ -51,7 +52,8 @@ class Case:
     Attributes:
         family: of the model.
         n_frames: in the sequence.
-        answer_only: whether loss is taken on the answer alone, which stands in the last chunk; on all text else.
+        answer_only: whether loss is taken on the answer alone, which stands in the last chunk; on
+            all text else.
         frozen: parts.
         recomputed: whether activations are computed again for the gradient.
     """
@@ -117,9 +119,11 @@ def gradients_of(model: SequenceModel) -> dict[str, Tensor]:
 def train(
     checkpoint: LoadedCheckpoint, folder: Path, frames: list[FrameRef], ranks: Ranks
 ) -> list[Progress]:
-    """Two steps of a loop, the first at learning rate 0: so the optimizer has the sum of gradients at equal weights.
+    """Two steps of a loop, the first at learning rate 0: so the optimizer has the sum of gradients
+    at equal weights.
 
-    In double precision: what differs in how a processor adds up single ones is as large as a small fault would be.
+    In double precision: what differs in how a processor adds up single ones is as large as a small
+    fault would be.
     """
     model = SequenceModel(checkpoint).requires_grad_(True).double()
     model.zero_grad()

@@ -1,4 +1,5 @@
-"""Windows of a history: what is in them, where loss is taken, and that agents are asked with the same tokens."""
+"""Windows of a history: what is in them, where loss is taken, and that agents are asked with the
+same tokens."""
 
 import itertools
 import re
@@ -54,7 +55,8 @@ def test_a_recorded_history_says_what_the_replay_wrote(bundled_set):
         assert text_of(parts) == (bundled_set / "metadata" / name / "traj.txt").read_text().strip()
         frames = [part for part in parts if isinstance(part, FrameRef)]
         shown = NiehSet(bundled_set).frames(name)
-        # One frame per action, the last one of it, and the first; those at the start of a task come again.
+        # One frame per action, the last one of it, and the first; those at the start of a task come
+        # again.
         assert set(frames) <= set(shown)
         assert [frame for frame, _ in itertools.groupby(frames)] == sorted(
             set(frames), key=lambda frame: frame.path
@@ -131,7 +133,8 @@ def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
 
 
 def test_an_agent_is_asked_with_what_it_was_trained_on(bundled_set, encoder):
-    """By the model's own prompts: an agent's at each action is the window up to the mark that opens it."""
+    """By the model's own prompts: an agent's at each action is the window up to the mark that opens
+    it."""
     name = names_in(bundled_set)[1]
     history = segments_of(bundled_set, name)[:3]
     window = encoder.actions(name, history)

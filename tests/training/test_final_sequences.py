@@ -1,7 +1,8 @@
-"""Sequences of the published trainers behind the table of final tasks, against what their classes gave.
+"""Sequences of the published trainers behind the table of final tasks, against what their classes
+gave.
 
-The golden file has a small trajectory made by hand, and for each sequence the turns, the frames in order, and the texts
-with loss (`tests/goldens/README.md`).
+The golden file has a small trajectory made by hand, and for each sequence the turns, the frames in
+order, and the texts with loss (`tests/goldens/README.md`).
 """
 
 import gzip
@@ -42,7 +43,8 @@ def encoder():
 
 @pytest.fixture
 def make_set(tmp_path, golden):
-    """Writes the golden trajectory, with changes, as a set whose frames all differ; returns the folder."""
+    """Writes the golden trajectory, with changes, as a set whose frames all differ; returns the
+    folder."""
 
     def make(**changes):
         document = golden[0]["trajectory"] | changes
@@ -131,7 +133,8 @@ def test_sequences_are_those_of_the_published_classes(golden, make_set, encoder,
     for sequence, line in zip(data.sequences, expected, strict=True):
         text, frames = shown(encoder, sequence)
         of_turns = written(line["messages"])
-        # A turn without a reply is asked for one; behind a reply the line break is left out. Neither matters.
+        # A turn without a reply is asked for one; behind a reply the line break is left out.
+        # Neither matters.
         assert text == (
             f"{of_turns}<|im_start|>assistant\n" if form == "goals" else of_turns.removesuffix("\n")
         )

@@ -1,4 +1,5 @@
-"""Training runs as a whole: what they write, that they go on where they ended, and what they refuse."""
+"""Training runs as a whole: what they write, that they go on where they ended, and what they
+refuse."""
 
 import json
 import shutil
@@ -87,7 +88,8 @@ from pathlib import Path
 from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 from infthor_eval.training.recipe import read_recipe
 told = []
-fine_tune(prepare_run(read_recipe(sys.argv[1]), [Path(sys.argv[2])]), Path(sys.argv[3]), told.append)
+fine_tune(prepare_run(read_recipe(sys.argv[1]), [Path(sys.argv[2])]), Path(sys.argv[3]), \
+told.append)
 print(told[0].step, told[-1].step)
 """
 

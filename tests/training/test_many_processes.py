@@ -68,7 +68,8 @@ def _assert_equal(
     assert result.keys() == expected.keys()
     whole = torch.stack([one.norm() for one in expected.values()]).norm()
     for name, one in expected.items():
-        # Some gradients are 0 but for rounding (those of the biases of keys): these are held against the whole.
+        # Some gradients are 0 but for rounding (those of the biases of keys): these are held
+        # against the whole.
         scale = max(one.norm(), 1e-3 * whole)
         assert (result[name] - one).norm() <= tolerance * scale, name
 
@@ -88,7 +89,8 @@ def test_the_cases_are_the_hard_ones(results: Any, frames: list[FrameRef]) -> No
     n_tokens = batch["input_ids"].shape[1]
     assert n_tokens % 4
     assert n_tokens % 8
-    # With the vision tower alone trained, a rank without features has nothing of its own that wants a gradient.
+    # With the vision tower alone trained, a rank without features has nothing of its own that wants
+    # a gradient.
     parts = [SequenceSplit(rank, 4).local_part(batch["slots"], False) for rank in range(4)]
     assert [bool(part.any()) for part in parts] == [False, True, True, True]
     borders = [-(-n_tokens // 8) * number for number in range(1, 8)]

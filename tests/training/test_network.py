@@ -1,4 +1,5 @@
-"""Losses of whole models: against transformers' own, with parts frozen, with activations computed again."""
+"""Losses of whole models: against transformers' own, with parts frozen, with activations computed
+again."""
 
 from pathlib import Path
 from typing import Any

@@ -22,7 +22,8 @@ PROGRAM = Path(sys.executable).with_name("infthor-eval")
 
 
 def scaled(name: str, n_processes: int) -> Recipe:
-    """A recipe of the paper for a sixteenth of its length and two steps, on as many processes as there are."""
+    """A recipe of the paper for a sixteenth of its length and two steps, on as many processes as
+    there are."""
     published = read_recipe(name)
     assert isinstance(published, Recipe)
     return msgspec.structs.replace(
@@ -52,7 +53,8 @@ def started(recipe: Recipe, n_processes: int, data: Path, out: Path) -> "subproc
 
 
 def launcher(n_processes: int) -> list[str]:
-    """What stands before the command; a place to meet is given, as finding one asks for names of machines."""
+    """What stands before the command; a place to meet is given, as finding one asks for names of
+    machines."""
     if n_processes == 1:
         return []
     with socket.socket() as free:

@@ -62,7 +62,8 @@ def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, pre
 def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_published_trainer(
     tmp_path, model, renamed
 ):
-    """As the hub's files name them: `visual.`, `model.layers.`; `language_model.model.layers.`, `vision_tower.`."""
+    """As the hub's files name them: `visual.`, `model.layers.`; `language_model.model.layers.`,
+    `vision_tower.`."""
     trained, other = (load_starting_model(model, {}, "plain", seed) for seed in (1, 0))
 
     def old(name):

@@ -1,4 +1,5 @@
-"""A replayed trajectory in which something is put away as a task of its own, as training sequences."""
+"""A replayed trajectory in which something is put away as a task of its own, as training
+sequences."""
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words

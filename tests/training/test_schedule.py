@@ -31,7 +31,8 @@ def test_a_number_of_steps_takes_the_place_of_epochs() -> None:
     assert len(settings.sequences_of(6, 8)) == 4
 
 
-# By hand from the published `linear_warmup_linear_decay`: (k + 1) / (warm + 1) while warming up, then down to 1 / rest.
+# By hand from the published `linear_warmup_linear_decay`: (k + 1) / (warm + 1) while warming up,
+# then down to 1 / rest.
 PUBLISHED = {
     0.0: [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1],
     0.03: [1 / 2, 1.0, 8 / 9, 7 / 9, 6 / 9, 5 / 9, 4 / 9, 3 / 9, 2 / 9, 1 / 9],

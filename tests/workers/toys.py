@@ -22,7 +22,8 @@ class Job:
         once: a file that says that a worker has died of it already; None dies every time.
         raises: what is raised in the end.
         slow: seconds before each result.
-        meets: an empty folder in which each worker leaves its name before its first result, and waits for another's.
+        meets: an empty folder in which each worker leaves its name before its first result, and
+            waits for another's.
     """
 
     number: int

@@ -73,7 +73,8 @@ class BoundSums:
     def __init__(self, evaluation: SumsEvaluation, subject: Subject) -> None:
         """Put the units into groups."""
         self._evaluation, self._subject = evaluation, subject
-        # A group is done in one place and shares what is expensive: here nothing, in NIEH a trajectory's frames.
+        # A group is done in one place and shares what is expensive: here nothing, in NIEH a
+        # trajectory's frames.
         groups = [
             Group(list(units))
             for _, units in groupby(evaluation.units, key=lambda unit: unit.cluster)

@@ -1,6 +1,7 @@
 """The presenter: what people see of the suite on the page of `infthor-eval report`.
 
-A suite without one gets `PlainPresenter` itself: its tables, and the fields of its records as samples.
+A suite without one gets `PlainPresenter` itself: its tables, and the fields of its records as
+samples.
 """
 
 from collections.abc import Mapping, Sequence

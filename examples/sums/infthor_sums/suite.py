@@ -1,6 +1,7 @@
 """The suite: its options, records, baselines, summary and tables. `evaluation.py` does the work.
 
-The command line imports this module for its options (`infthor-eval run --help`), so nothing heavy is imported here.
+The command line imports this module for its options (`infthor-eval run --help`), so nothing heavy
+is imported here.
 """
 
 import re

@@ -18,7 +18,8 @@ from model_adapters import (
 
 __all__ = ["Options", "Thumbnails"]
 
-# It counts tokens (a colour and a word are one each) and has no ids; what is not named here it cannot do.
+# It counts tokens (a colour and a word are one each) and has no ids; what is not named here it
+# cannot do.
 _CAPABILITIES = Capabilities(token_ids=False)
 
 
@@ -68,7 +69,8 @@ class Thumbnails:
 
 
 class Talk(Transcript):
-    """A conversation; `Transcript` keeps its turns and marks, so that only counting and answering are left to do."""
+    """A conversation; `Transcript` keeps its turns and marks, so that only counting and answering
+    are left to do."""
 
     def __init__(self, model: Thumbnails) -> None:
         super().__init__()

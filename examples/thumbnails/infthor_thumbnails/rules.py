@@ -32,7 +32,8 @@ def thumbnail(frame: Image.Image, side: int) -> Thumbnail:
 
 
 def answer(prompt: str, seen: Sequence[Thumbnail]) -> str:
-    """A word from some thumbnails in time order; a number, yes or no, or a colour, as the question wants it."""
+    """A word from some thumbnails in time order; a number, yes or no, or a colour, as the question
+    wants it."""
     question = prompt.rpartition("Question:")[2].strip().lower()
     if not seen:
         return "nothing"

@@ -1,1 +1,2 @@
-"""The commands, one module each, imported when the command is called: `infthor_eval.cli.commands.NAME.command`."""
+"""The commands, one module each, imported when the command is called:
+`infthor_eval.cli.commands.NAME.command`."""

@@ -28,8 +28,9 @@ __all__ = ["command"]
 def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> None:
     """Print what can be guessed of a set's answers without a frame, and what runs got beside that.
 
-    SET is a folder with question files, or one of them. It needs no frames. Guessers know the words of a question, the
-    number of its clue frames or their place, and learn from questions on other trajectories.
+    SET is a folder with question files, or one of them. It needs no frames. Guessers know the words
+    of a question, the number of its clue frames or their place, and learn from questions on other
+    trajectories.
     """
     from infthor_eval.cli.progress.left_out import print_left_out
     from infthor_eval.cli.progress.notes import print_note
@@ -66,7 +67,8 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
         print_table(balanced_table(part), console)
         if not part.questions:
             raise UsageError(
-                f"--balanced {balanced}: no form of this set has a balanced part; nothing is written"
+                f"--balanced {balanced}: no form of this set has a balanced part; nothing is "
+                "written"
             )
         refuse_overwrite(balanced, encode_questions(part.questions))
         write_questions(balanced, part.questions)

@@ -20,8 +20,8 @@ __all__ = ["command"]
 def command(manifest: Path, out: Path) -> int:
     """Build the question set that MANIFEST describes: trajectories, frames, questions.
 
-    If the manifest has digests, as that of a bundled set does, the files are compared with them; exit code 1 if one
-    differs.
+    If the manifest has digests, as that of a bundled set does, the files are compared with them;
+    exit code 1 if one differs.
     """
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.bundle import build_bundle, differing_files, read_manifest
@@ -37,7 +37,8 @@ def command(manifest: Path, out: Path) -> int:
         built, questions = build_bundle(expected, simulator, out, bar.advance)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
     print_line(
-        f"{len(questions.questions)} questions on {questions.trajectories} trajectories, {size / 1e6:.1f} MB: {out}"
+        f"{len(questions.questions)} questions on {questions.trajectories} trajectories, "
+        f"{size / 1e6:.1f} MB: {out}"
     )
     print_line(questions.summary_text())
     if not expected.files:

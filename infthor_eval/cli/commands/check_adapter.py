@@ -20,8 +20,8 @@ __all__ = ["command"]
 def command(model: str, model_args: str) -> int:
     """Check MODEL, a name or your own FILE.py:CLASS, against the adapter contract.
 
-    The model gets a few dozen short requests with frames of one colour. Each clause of the contract has a line of
-    output; docs/own-models.md explains them. Exit code 1 if a clause is broken.
+    The model gets a few dozen short requests with frames of one colour. Each clause of the contract
+    has a line of output; docs/own-models.md explains them. Exit code 1 if a clause is broken.
     """
     from infthor_eval.cli.options.checks import print_checks
     from model_adapters import run_checks

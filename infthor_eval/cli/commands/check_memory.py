@@ -17,8 +17,9 @@ __all__ = ["command"]
 def command(memory: str, memory_args: str) -> int:
     """Check MEMORY, a name or your own FILE.py:CLASS, against the contract of memories.
 
-    The memory observes short trajectories of plain frames and is asked on them. Each clause of the contract has a line
-    of output; docs/memories.md explains them. Exit code 1 if a clause is broken.
+    The memory observes short trajectories of plain frames and is asked on them. Each clause of the
+    contract has a line of output; docs/memories.md explains them. Exit code 1 if a clause is
+    broken.
     """
     from infthor_eval.cli.options.checks import print_checks
     from infthor_eval.memory import open_memory, parse_options

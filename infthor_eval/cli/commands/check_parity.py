@@ -1,4 +1,5 @@
-"""`infthor-eval check-parity`: compare a policy with another implementation of it behind a server."""
+"""`infthor-eval check-parity`: compare a policy with another implementation of it behind a
+server."""
 
 from contextlib import nullcontext
 from pathlib import Path
@@ -50,7 +51,8 @@ def command(
     model_args: str,
     tolerance: float,
 ) -> int:
-    """Compare the actions of MODEL (openvla, spatialvla) with those of a reference server on the same frames.
+    """Compare the actions of MODEL (openvla, spatialvla) with those of a reference server on the
+    same frames.
 
     Exit code 1 if one differs.
     """

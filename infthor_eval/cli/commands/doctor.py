@@ -59,7 +59,8 @@ _EXTRAS = {
 def command(data: Path | None, trajectories: Path | None, as_json: bool) -> int:
     """Check the installation and suggest fixes: Python, torch, simulators, the hub, disk, data.
 
-    With --data it checks an NIEH set: its questions, frames and logs, and what each task can ask of it.
+    With --data it checks an NIEH set: its questions, frames and logs, and what each task can ask of
+    it.
 
     Exit code 1 if something is missing that every use needs, or if nothing can be asked of the set.
     """
@@ -111,7 +112,10 @@ def _torch() -> Check:
             "ok",
             f"{torch.__version__}, {properties.name}, {properties.total_memory / _GB:.0f} GB",
         )
-    hint = "large models need a GPU and a torch built for it; tiny models, baselines and served ones do not"
+    hint = (
+        "large models need a GPU and a torch built for it; tiny models, baselines and served ones "
+        "do not"
+    )
     return Check(
         "torch",
         "optional",
@@ -170,7 +174,10 @@ def _display() -> Check:
     available += ["Vulkan"] if ctypes.util.find_library("vulkan") is not None else []
     if available:
         return Check("display", "ok", " and ".join(available))
-    hint = "AI2-THOR's own build needs one: start an X server, or install Vulkan; the embedded simulator needs none"
+    hint = (
+        "AI2-THOR's own build needs one: start an X server, or install Vulkan; the embedded "
+        "simulator needs none"
+    )
     return Check("display", "optional", "neither an X server (DISPLAY) nor Vulkan", hint)
 
 
@@ -190,7 +197,10 @@ def _token() -> Check:
 def _hub() -> Check:
     from huggingface_hub import constants
 
-    hint = "put checkpoints and data of the hub into its cache, or into folders (pretrained=DIR, --data DIR)"
+    hint = (
+        "put checkpoints and data of the hub into its cache, or into folders (pretrained=DIR, "
+        "--data DIR)"
+    )
     if constants.HF_HUB_OFFLINE:
         return Check("hub", "optional", "not tried: HF_HUB_OFFLINE is set", hint)
     problem = _call_with_timeout(_HUB_TIMEOUT_S, lambda: _connection_problem(constants.ENDPOINT))
@@ -215,7 +225,8 @@ def _connection_problem(url: str) -> str:
 def _call_with_timeout(seconds: float, function: Callable[[], str]) -> str:
     """Return the result of a function, or that there was none in time.
 
-    The timeout of a request does not cover the name look-up, which can take minutes, so it runs in a thread.
+    The timeout of a request does not cover the name look-up, which can take minutes, so it runs in
+    a thread.
     """
     results: list[str] = []
     thread = threading.Thread(target=lambda: results.append(function()), daemon=True)
@@ -229,7 +240,10 @@ def _disks() -> Iterator[Check]:
         folder = next(path for path in (place, *place.parents) if path.exists())
         free = shutil.disk_usage(folder).free / _GB
         if free < _MIN_DISK_GB:
-            hint = "a checkpoint of 7 billion parameters takes 16 GB: make room, or set HF_HOME and XDG_CACHE_HOME"
+            hint = (
+                "a checkpoint of 7 billion parameters takes 16 GB: make room, or set HF_HOME and "
+                "XDG_CACHE_HOME"
+            )
             yield Check(name, "optional", f"{free:.1f} GB free in {folder}", hint)
         else:
             yield Check(name, "ok", f"{free:.0f} GB free in {folder}")

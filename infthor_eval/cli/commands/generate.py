@@ -58,7 +58,8 @@ __all__ = ["command"]
     type=click.IntRange(0),
     default=0,
     show_default=True,
-    help="Keep a trajectory that gives up as far as it got, if it has so many low-level actions; 0: never.",
+    help="Keep a trajectory that gives up as far as it got, if it has so many low-level actions; "
+    "0: never.",
 )
 @click.option(
     "--seed",
@@ -105,7 +106,8 @@ def command(
     as_json: bool,
     **workers: Any,
 ) -> None:
-    """Generate trajectories: sample tasks, plan them, and execute the plans in the embedded simulator.
+    """Generate trajectories: sample tasks, plan them, and execute the plans in the embedded
+    simulator.
 
     Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
     """
@@ -153,7 +155,8 @@ def _print(summary: GenerationSummary, out: Path, output: Console) -> None:
     from infthor_eval.report.terminal import print_table
 
     output.print(
-        f"{summary.trajectories} trajectories ({summary.resumed} generated earlier), {summary.steps} steps: {out}"
+        f"{summary.trajectories} trajectories ({summary.resumed} generated earlier), "
+        f"{summary.steps} steps: {out}"
     )
     print_table(tasks_table(summary), output)
     for note in generation_notes(summary):

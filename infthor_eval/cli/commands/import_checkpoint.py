@@ -30,14 +30,15 @@ __all__ = ["command"]
     type=click.Choice(("plain", "chat")),
     default="plain",
     show_default=True,
-    help="Its prompts: the bare sequence, or for the Qwen2.5-VL of branch dev the base model's chat template.",
+    help="Its prompts: the bare sequence, or for the Qwen2.5-VL of branch dev the base model's "
+    "chat template.",
 )
 @click.option("--out", required=True, type=PATH, help="Folder of the new checkpoint.")
 def command(folder: Path, model: str, model_args: str, prompt: str, out: Path) -> int:
     """Convert FOLDER, a distributed checkpoint of the published trainer, into one that models load.
 
-    The new checkpoint has safetensors, tokenizer and processor. Weights that FOLDER lacks, because they were frozen,
-    come from the model that the training started from.
+    The new checkpoint has safetensors, tokenizer and processor. Weights that FOLDER lacks, because
+    they were frozen, come from the model that the training started from.
     """
     from infthor_eval.formats.object_ids import Words
     from infthor_eval.storage.files import prepare_folder
@@ -50,6 +51,9 @@ def command(folder: Path, model: str, model_args: str, prompt: str, out: Path) -
     loaded = load_starting_model(model, parse_model_args(model_args), prompt, seed=0)
     weights = import_weights(loaded, folder)
     export(loaded, out, title=f"{model}, weights of {folder.name}", words=Words.PUBLISHED)
-    counts = f"{weights.n_imported} weights imported, {weights.n_kept} kept, {weights.n_ignored} other tensors ignored"
+    counts = (
+        f"{weights.n_imported} weights imported, {weights.n_kept} kept, {weights.n_ignored} other "
+        "tensors ignored"
+    )
     print_line(f"{counts}: {out}")
     return 0

@@ -1,4 +1,5 @@
-"""`infthor-eval import-replies`: what others made, as runs: replies to questions, and counts of plans."""
+"""`infthor-eval import-replies`: what others made, as runs: replies to questions, and counts of
+plans."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -33,12 +34,13 @@ __all__ = ["command"]
     "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
 )
 def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path) -> int:
-    """Score replies to NIEH questions that others made, and store them as runs; counts of plans too.
+    """Score replies to NIEH questions that others made, and store them as runs; counts of plans
+    too.
 
-    LOG is a published log of replies or of plans, lm-eval's samples, or has a JSON object a line with question_id and
-    reply. SET needs no frames; logs of plans need no SET. Logs of one model in one mode become one run, which `show`,
-    `compare` and `report` read like any other. A row that answers no question of SET is counted and named; the exit
-    code is then 1.
+    LOG is a published log of replies or of plans, lm-eval's samples, or has a JSON object a line
+    with question_id and reply. SET needs no frames; logs of plans need no SET. Logs of one model in
+    one mode become one run, which `show`, `compare` and `report` read like any other. A row that
+    answers no question of SET is counted and named; the exit code is then 1.
     """
     from infthor_eval.cli.options.show import ShowOptions
     from infthor_eval.cli.results import print_results
@@ -61,7 +63,8 @@ def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output
 def _import_replies(
     logs: Sequence[Path], data: Path, model: str | None, output: Path
 ) -> Iterator[tuple["RunResults", int]]:
-    """Yield the results of the runs of logs of replies, and the number of rows that are not imported."""
+    """Yield the results of the runs of logs of replies, and the number of rows that are not
+    imported."""
     from infthor_eval.cli.progress.left_out import print_left_out
     from infthor_eval.cli.progress.notes import print_note
     from infthor_eval.cli.progress.refused_lines import print_refused
@@ -79,7 +82,10 @@ def _import_replies(
         counts = f"{run.n_missing} of {len(run.question_ids)} questions without one"
         print_note(f"{name}: {len(run.records)} replies imported, {counts}")
         if "prompt" in run.settings:
-            unknown = "not told by its counts of tokens, which fit no published prompt as Qwen2.5-VL counts"
+            unknown = (
+                "not told by its counts of tokens, which fit no published prompt as Qwen2.5-VL "
+                "counts"
+            )
             print_note(f"{name}: the prompt it was asked with: {run.settings['prompt'] or unknown}")
         for what, rows in (
             ("not imported", run.refused),
@@ -95,7 +101,8 @@ def _import_replies(
 def _import_plans(
     logs: Sequence[Path], model: str | None, output: Path
 ) -> Iterator[tuple["RunResults", int]]:
-    """Yield the results of the runs of logs of plans, and the number of rows that are not imported."""
+    """Yield the results of the runs of logs of plans, and the number of rows that are not
+    imported."""
     from infthor_eval.cli.progress.notes import print_note
     from infthor_eval.cli.progress.refused_lines import print_refused
     from infthor_eval.cli.results import RunResults
@@ -110,8 +117,8 @@ def _import_plans(
         name, path = run.header.name, run.log.path
         n_trajectories = len({record.cluster for record in run.records})
         print_note(
-            f"{name}: {len(run.records)} plans of {n_trajectories} trajectories imported; the set-up of "
-            f"{run.n_failed_set_ups} more failed"
+            f"{name}: {len(run.records)} plans of {n_trajectories} trajectories imported; the "
+            f"set-up of {run.n_failed_set_ups} more failed"
         )
         print_refused(name, "not imported", [(path, row.line, row.reason) for row in run.refused])
         yield RunResults(stored.folder, suite, stored.summary, stored.usage, 0), len(run.refused)

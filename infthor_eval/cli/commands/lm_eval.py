@@ -14,7 +14,8 @@ __all__ = ["command"]
 def command(arguments: tuple[str, ...]) -> None:
     """Run lm-eval's own command with ARGUMENTS, with `--model infthor` registered.
 
-    lm-eval 0.4.13 reads no entry points, so its own script finds this model only if a task is given as a file.
+    lm-eval 0.4.13 reads no entry points, so its own script finds this model only if a task is given
+    as a file.
     """
     from lm_eval.__main__ import cli_evaluate
 

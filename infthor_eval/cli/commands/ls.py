@@ -33,7 +33,8 @@ _COUNTS = ("done", "missing", "failed")
 @click.group("ls", cls=ExampleGroup, invoke_without_command=True, example="infthor-eval ls models")
 @click.pass_context
 def command(context: click.Context) -> None:
-    """List the models with their options, the memories, the tasks, the scenes, or the runs in a folder."""
+    """List the models with their options, the memories, the tasks, the scenes, or the runs in a
+    folder."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
@@ -123,7 +124,8 @@ def _scenes(data: Path | None) -> None:
 @command.command("runs", cls=ExampleCommand, example="infthor-eval ls runs results")
 @click.argument("folder", metavar="[DIR]", type=PATH, default=Path("results"))
 def _runs(folder: Path) -> None:
-    """Runs below DIR (default: results): units done, missing and failed, and the primary metric of each task."""
+    """Runs below DIR (default: results): units done, missing and failed, and the primary metric of
+    each task."""
     runs = list(find_runs(folder))
     stored = [run for run in runs if isinstance(run, StoredRun)]
     if not runs:

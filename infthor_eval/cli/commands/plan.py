@@ -86,7 +86,10 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
 
 
 def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
-    title = f"Estimate for {request.label}, from {sum(item.n_measured for item in tasks)} measured samples"
+    title = (
+        f"Estimate for {request.label}, from {sum(item.n_measured for item in tasks)} measured "
+        "samples"
+    )
     return Table(title, (Column("task", False), *map(Column, _COLUMNS)), tuple(map(_row, tasks)))
 
 

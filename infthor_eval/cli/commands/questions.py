@@ -46,7 +46,8 @@ __all__ = ["command"]
     type=click.Choice(["plain", "published"]),
     default="plain",
     show_default=True,
-    help="Plain English, or the published files' words with type names, to extend the published set.",
+    help="Plain English, or the published files' words with type names, to extend the published "
+    "set.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace a file that holds other questions.")
 @worker_options

@@ -56,9 +56,9 @@ def command(
 ) -> None:
     """Replay trajectories (.json, .jsonl, .jsonl.gz, directories) into an NIEH set.
 
-    Writes the first frame and one after each low-level action, the log of every frame, and the trajectory itself.
-    Trajectories in the set are not replayed again. Refused actions are reported, and the replay continues. Exit code 1
-    if a trajectory cannot be replayed at all.
+    Writes the first frame and one after each low-level action, the log of every frame, and the
+    trajectory itself. Trajectories in the set are not replayed again. Refused actions are reported,
+    and the replay continues. Exit code 1 if a trajectory cannot be replayed at all.
     """
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.generation.replay_set import replay_with_workers, select
@@ -95,8 +95,9 @@ def _print(summary: ReplaySummary, output: Console) -> None:
     from infthor_eval.report.terminal import print_table
 
     output.print(
-        f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans ({summary.resumed} replayed "
-        f"earlier, {summary.failed} failed), {summary.complete} complete, {summary.seconds} s"
+        f"{summary.trajectories} trajectories on {summary.floor_plans} floor plans "
+        f"({summary.resumed} replayed earlier, {summary.failed} failed), {summary.complete} "
+        f"complete, {summary.seconds} s"
     )
     for table in (refusals_table(summary), overlaps_table(summary)):
         if table is not None:

@@ -33,7 +33,8 @@ _PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
 @click.option(
     "--out",
     type=PATH,
-    help=f"The page, an .html file, or the folder of a figure's files.  [default: {_PAGE}, {_FOLDER}]",
+    help=f"The page, an .html file, or the folder of a figure's files.  [default: {_PAGE}, "
+    f"{_FOLDER}]",
 )
 @click.option(
     "--data",
@@ -54,7 +55,8 @@ _PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
 @click.option(
     "--figure",
     metavar="WHICH",
-    help="Draw a figure instead: 6 (reward of arms along trajectories), 7 (reward of plans over steps and context "
+    help="Draw a figure instead: 6 (reward of arms along trajectories), 7 (reward of plans over "
+    "steps and context "
     "tokens), radius (success of arms by the hand's radius).",
 )
 @click.option(
@@ -76,10 +78,12 @@ def command(
     panels: Path | None,
     task: str | None,
 ) -> None:
-    """Write the results of the runs in the folders RUN... as one page that works offline: numbers, charts, samples.
+    """Write the results of the runs in the folders RUN... as one page that works offline: numbers,
+    charts, samples.
 
-    With --figure, draw a figure of the paper instead, as PNG and SVG. A run of the baseline `planner`, or
-    `planner-arm`, among them is the upper bound. Only trajectories that all runs have are drawn.
+    With --figure, draw a figure of the paper instead, as PNG and SVG. A run of the baseline
+    `planner`, or `planner-arm`, among them is the upper bound. Only trajectories that all runs have
+    are drawn.
     """
     from infthor_eval.errors import UsageError
     from infthor_eval.report.presenter import FigureRequest
@@ -111,7 +115,8 @@ def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> N
         page = build_page(runs, request, _PageBars(progress))
     size = write_page(page, path)
     print_line(
-        f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: {path}"
+        f"{len(page.samples):,} samples, {len(page.pictures):,} pictures, {size / 1e6:.1f} MB: "
+        f"{path}"
     )
 
 
@@ -166,7 +171,8 @@ def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Pat
 def _require_figure(
     runs: Sequence[ReportRun], name: str, owners: Mapping[str, Mapping[str, Figure]]
 ) -> Figure:
-    """Return the figure of a name; two packages may offer different ones, so the first run decides."""
+    """Return the figure of a name; two packages may offer different ones, so the first run
+    decides."""
     from infthor_eval.errors import UsageError
 
     first = runs[0].suite.name
@@ -178,6 +184,7 @@ def _require_figure(
     for run in runs:
         if run.suite.name != owner:
             raise UsageError(
-                f"{run.folder}: is a run of {run.suite.name}, and figure {name} is of {owner}; leave it out"
+                f"{run.folder}: is a run of {run.suite.name}, and figure {name} is of {owner}; "
+                "leave it out"
             )
     return owners[owner][name]

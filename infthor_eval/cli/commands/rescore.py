@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-# Most tokens of a verdict by prompt. Those are the names of `infthor_eval.nieh.rescoring.judge_prompts`, which is slow to import.
+# Most tokens of a verdict by prompt. Those are the names of
+# `infthor_eval.nieh.rescoring.judge_prompts`, which is slow to import.
 _JUDGE_TOKENS = {"yes-no": 16, "published": 64}
 _JUDGE_PROMPT = "yes-no"
 
@@ -41,7 +42,8 @@ _JUDGE_PROMPT = "yes-no"
     "--judge",
     type=ModelList(),
     metavar="MODEL",
-    help="Ask this model where the rules are unsure (off by default; any model of `ls models`, usually openai).",
+    help="Ask this model where the rules are unsure (off by default; any model of `ls models`, "
+    "usually openai).",
 )
 @click.option(
     "--judge-args", type=ModelArgs(), default="", metavar="K=V,...", help="Options of the judge."
@@ -49,13 +51,15 @@ _JUDGE_PROMPT = "yes-no"
 @click.option(
     "--judge-prompt",
     type=click.Choice(tuple(_JUDGE_TOKENS)),
-    help="How the judge is asked: for yes or no, the default, or for a score in the words of the published judge.",
+    help="How the judge is asked: for yes or no, the default, or for a score in the words of the "
+    "published judge.",
 )
 @click.option(
     "--judge-tokens",
     type=WholeNumber(1),
     metavar="N",
-    help="Most tokens of a verdict; default: 16, and 64 for a score. A model that reasons first needs more.",
+    help="Most tokens of a verdict; default: 16, and 64 for a score. A model that reasons first "
+    "needs more.",
 )
 @click.option(
     "--seed",
@@ -77,10 +81,11 @@ def command(
     seed: int,
     output: Path,
 ) -> int:
-    """Score the replies in the journal of RUN, a run of NIEH, with today's scorers, and store them as a run.
+    """Score the replies in the journal of RUN, a run of NIEH, with today's scorers, and store them
+    as a run.
 
-    Neither the set nor the model is needed. Replies that are not there stay failed. The exit code is 1 if your scorer
-    fails on a reply, or the judge cannot be asked.
+    Neither the set nor the model is needed. Replies that are not there stay failed. The exit code
+    is 1 if your scorer fails on a reply, or the judge cannot be asked.
     """
     from infthor_eval.nieh.own_scorers import find_scorer
     from infthor_eval.nieh.rescoring.rescore import read_source, score_again

@@ -35,7 +35,8 @@ __all__ = ["command", "evaluate"]
 @tracker_options
 @click.option("--quiet", is_flag=True, help="Print only failures, and the runs' folders.")
 def command(**given: Any) -> int:
-    """Evaluate MODEL on TASKS and print the results; --full prints all of them, beside the published ones.
+    """Evaluate MODEL on TASKS and print the results; --full prints all of them, beside the
+    published ones.
 
     Stop it whenever you like: the same command continues where it stopped.
     """
@@ -53,11 +54,12 @@ def evaluate(
     Args:
         requests: the runs, each with its suite.
         show: how results are printed.
-        trackers: arguments of the trackers that finished runs are sent to (see `Trackers`); None for none.
+        trackers: arguments of the trackers that finished runs are sent to (see `Trackers`); None
+            for none.
 
     Returns:
-        Exit code: 130 where a run was stopped, 1 where a unit failed, all units of a run were excluded, or a tracker
-        refused a run, else 0.
+        Exit code: 130 where a run was stopped, 1 where a unit failed, all units of a run were
+        excluded, or a tracker refused a run, else 0.
     """
     from infthor_eval.harness.export import export
     from infthor_eval.harness.trackers import Trackers

@@ -22,10 +22,11 @@ __all__ = ["command"]
 @click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=PATH)
 @sample_options
 def command(folders: tuple[Path, ...], per_sample: bool, **given: Any) -> None:
-    """Print the results of the runs in the folders RUN..., made from their journals, as `run` prints them at its end.
+    """Print the results of the runs in the folders RUN..., made from their journals, as `run`
+    prints them at its end.
 
-    Several runs of one suite stand in one table. With `--per-sample` the samples are printed instead, for other
-    programs: `infthor-eval show RUN --format parquet > samples.parquet`.
+    Several runs of one suite stand in one table. With `--per-sample` the samples are printed
+    instead, for other programs: `infthor-eval show RUN --format parquet > samples.parquet`.
     """
     options = ShowOptions.from_click(given)
     if per_sample or options.form == "parquet":
@@ -42,7 +43,8 @@ def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
 
     if options.form not in FORMS or options.full:
         raise UsageError(
-            f"--per-sample: is for --format {' and --format '.join(FORMS)}, and --full is for tables"
+            f"--per-sample: is for --format {' and --format '.join(FORMS)}, and --full is for "
+            "tables"
         )
     if options.form == "parquet" and sys.stdout.isatty():
         raise UsageError(

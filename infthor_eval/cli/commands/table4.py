@@ -13,7 +13,8 @@ __all__ = ["command"]
 @click.command("table4", cls=ExampleCommand, example="infthor-eval table4 SET")
 @click.argument("set_folder", metavar="SET", type=PATH)
 def command(set_folder: Path) -> None:
-    """Compute the paper's Table 4 from the scores in the published question files, beside the printed table.
+    """Compute the paper's Table 4 from the scores in the published question files, beside the
+    printed table.
 
     SET is a folder with both files. It needs no frames.
     """

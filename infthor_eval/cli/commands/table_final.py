@@ -15,10 +15,11 @@ __all__ = ["command"]
 )
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
 def command(logs: tuple[Path, ...]) -> int:
-    """Compute the paper's table of final long-horizon tasks from the published plan logs, beside the printed table.
+    """Compute the paper's table of final long-horizon tasks from the published plan logs, beside
+    the printed table.
 
-    The name of a LOG says which row it is; a log of another name has a row of its own. A line without counts is counted
-    and named; the exit code is then 1.
+    The name of a LOG says which row it is; a log of another name has a row of its own. A line
+    without counts is counted and named; the exit code is then 1.
     """
     from infthor_eval.cli.progress.refused_lines import print_refused
     from infthor_eval.formats.plan_logs import read_plan_log

@@ -55,7 +55,8 @@ _STAGES = {
     multiple=True,
     type=PATH,
     metavar="SET",
-    help="Replayed set (`replay`) to train on, with a question file if the recipe needs questions; may be repeated. "
+    help="Replayed set (`replay`) to train on, with a question file if the recipe needs questions; "
+    "may be repeated. "
     "The recipe tiny generates its own by default.",
 )
 @click.option(
@@ -98,7 +99,8 @@ _STAGES = {
 @click.option(
     "--tflops",
     type=FiniteFloat(min=0, min_open=True),
-    help=f"TFLOP/s that a GPU reaches, for --dry-run (an H100 has 989 in bfloat16).  [default: {_TFLOPS:g}]",
+    help="TFLOP/s that a GPU reaches, for --dry-run (an H100 has 989 in bfloat16).  [default: "
+    f"{_TFLOPS:g}]",
 )
 @worker_options
 def command(
@@ -116,11 +118,13 @@ def command(
 ) -> None:
     """Fine-tune a model, and write a checkpoint that its family's adapter loads.
 
-    Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5), questions, and tiny, which
-    trains a small model from scratch. Others are YAML files of the same form.
+    Recipes of the package: infthor_32k, infthor_64k and infthor_130k (the paper's, Table 5),
+    questions, and tiny, which trains a small model from scratch. Others are YAML files of the same
+    form.
 
-    If it is stopped, the same command continues; tiny keeps its data and restarts the training. Workers share the
-    generation of its data. Several processes: torchrun --nproc-per-node N --no-python infthor-eval train ...
+    If it is stopped, the same command continues; tiny keeps its data and restarts the training.
+    Workers share the generation of its data. Several processes: torchrun --nproc-per-node N
+    --no-python infthor-eval train ...
     """
     from infthor_eval.training.nano.settings import NanoRecipe
     from infthor_eval.training.recipe import read_recipe
@@ -137,8 +141,8 @@ def command(
         raise click.UsageError("--gpus and --tflops are for --dry-run; add it, or leave them out")
     if not worker_settings.is_local and (folders or not isinstance(recipe, NanoRecipe)):
         raise click.UsageError(
-            "--workers and --ray-address share the generation of data, which only the recipe tiny without --data does; "
-            "leave them out, and train in several processes with torchrun"
+            "--workers and --ray-address share the generation of data, which only the recipe tiny "
+            "without --data does; leave them out, and train in several processes with torchrun"
         )
     if isinstance(recipe, NanoRecipe):
         if model is not None or model_args is not None or dry_run:
@@ -155,7 +159,8 @@ def command(
 def _fine_tune(
     recipe: Recipe, folders: Sequence[Path], out: Path, machine: tuple[int, float] | None
 ) -> None:
-    """Fine-tune a model and print its last loss; for a machine (GPUs, TFLOP/s of each), print an estimate instead."""
+    """Fine-tune a model and print its last loss; for a machine (GPUs, TFLOP/s of each), print an
+    estimate instead."""
     from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 
     run = prepare_run(recipe, folders)
@@ -186,8 +191,8 @@ def _print_data(run: TrainingRun) -> None:
     data = run.data
     longest = max(item.n_tokens for item in data.sequences)
     print_note(
-        f"{run.recipe.title}: {len(data.sequences):,} sequences, {data.n_tokens:,} tokens (the longest {longest:,}), "
-        f"loss on {data.n_loss_tokens:,}"
+        f"{run.recipe.title}: {len(data.sequences):,} sequences, {data.n_tokens:,} tokens (the "
+        f"longest {longest:,}), loss on {data.n_loss_tokens:,}"
     )
     for reason, n in data.skip_reasons().most_common(5):
         print_note(f"{n} skipped: {reason}", "yellow")
@@ -201,8 +206,8 @@ def _print_estimate(run: TrainingRun, n_gpus: int, tflops: float) -> None:
     freeze(network, run.recipe.freeze)
     cost = estimate_cost(run.recipe, network, run.data, n_gpus)
     console().print(
-        f"work: {cost.flop:.2e} FLOP, {cost.hours(n_gpus * tflops):,.1f} hours of {n_gpus} GPUs at {tflops:g} "
-        "TFLOP/s each"
+        f"work: {cost.flop:.2e} FLOP, {cost.hours(n_gpus * tflops):,.1f} hours of {n_gpus} GPUs at "
+        f"{tflops:g} TFLOP/s each"
     )
     parts = ("weights", "gradients", "optimizer", "activations")
     sizes = ", ".join(f"{name} {getattr(cost, name) / 1e9:,.1f}" for name in parts)
@@ -212,7 +217,8 @@ def _print_estimate(run: TrainingRun, n_gpus: int, tflops: float) -> None:
 def _train_small_model(
     recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_settings: WorkerSettings
 ) -> None:
-    """Train the small model on replayed sets with questions, or on sets generated in `out` if there are none."""
+    """Train the small model on replayed sets with questions, or on sets generated in `out` if there
+    are none."""
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.training.export import export
     from infthor_eval.training.nano.stages import train_small_model
@@ -235,7 +241,8 @@ def _train_small_model(
 def _generate_data(
     scenes: SceneSettings, seed: int, out: Path, worker_settings: WorkerSettings
 ) -> Path:
-    """Generate trajectories in procedural scenes, replay them, and write every question on them; return the set.
+    """Generate trajectories in procedural scenes, replay them, and write every question on them;
+    return the set.
 
     What is in the folder already is not generated again.
 

@@ -1,4 +1,5 @@
-"""`infthor-eval validate`: keep the questions of a set that at least one of several models can answer."""
+"""`infthor-eval validate`: keep the questions of a set that at least one of several models can
+answer."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -42,7 +43,8 @@ __all__ = ["command", "validate"]
     type=ModelList(),
     required=True,
     metavar="MODEL,...",
-    help="Model names with commas; the paper uses four. MODEL:K=V,... gives a model its own options.",
+    help="Model names with commas; the paper uses four. MODEL:K=V,... gives a model its own "
+    "options.",
 )
 @click.option("--out", type=PATH, required=True, help="Folder of the validated set.")
 @click.option("--decisions", type=PATH, help="inspection.csv with keep or drop filled in.")
@@ -66,11 +68,12 @@ def command(
     seed: int,
     **workers: Any,
 ) -> int:
-    """Ask each model every question of SET with its clue frames alone; keep what one of them answers.
+    """Ask each model every question of SET with its clue frames alone; keep what one of them
+    answers.
 
-    Rejected questions are written to rejected.jsonl with every reply. Questions with several clues that no model
-    answers are written to inspection.csv and inspection.html: decide on them, and pass the file as --decisions. If the
-    command is stopped, run it again to continue.
+    Rejected questions are written to rejected.jsonl with every reply. Questions with several clues
+    that no model answers are written to inspection.csv and inspection.html: decide on them, and
+    pass the file as --decisions. If the command is stopped, run it again to continue.
     """
     if published and scorer == "strict":
         raise UsageError("--published has the reference scorer; leave out --scorer strict")
@@ -128,14 +131,15 @@ def validate(
     earlier = write_validated_set(out, data, verdicts)
     if earlier is not None:
         print_note(
-            f"{earlier}: the earlier list; it has decisions on questions that need no inspection now"
+            f"{earlier}: the earlier list; it has decisions on questions that need no inspection "
+            "now"
         )
     write_inspection_page(out / "inspection.html", verdicts.to_inspect, data)
     console = table_console()
     print_table(clues_table([_summarise_kept(outcome, verdicts) for outcome in outcomes]), console)
     console.print(
-        f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} rejected, "
-        f"{len(verdicts.to_inspect)} to inspect: {out}"
+        f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} "
+        f"rejected, {len(verdicts.to_inspect)} to inspect: {out}"
     )
     return int(
         any(record.failure is not None for outcome in outcomes for record in outcome.records)

@@ -27,7 +27,8 @@ _FOLDER = Path("results/recordings")
 @click.command(
     "watch",
     cls=ExampleCommand,
-    example="infthor-eval watch results/scripted/RUN --trajectory kitchen-4-seed0 --out scripted.mp4",
+    example="infthor-eval watch results/scripted/RUN --trajectory kitchen-4-seed0 --out "
+    "scripted.mp4",
 )
 @click.argument("run", type=PATH)
 @click.option("--trajectory", metavar="NAME", help="A trajectory of the run, if it has several.")
@@ -79,8 +80,8 @@ def command(
 ) -> None:
     """Show the episodes of a run of plans or of manipulation, beside what the agent or the arm saw.
 
-    RUN is the run's folder. A journal has every action and no frame: the actions are replayed in the simulator of the
-    run. Where an action ends otherwise than recorded, a line says so.
+    RUN is the run's folder. A journal has every action and no frame: the actions are replayed in
+    the simulator of the run. Where an action ends otherwise than recorded, a line says so.
     """
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.animations import require_animation_name
@@ -118,7 +119,8 @@ def _require_replay(run: ReportRun) -> Replay:
             reverse=True,
         )
         raise UsageError(
-            f"{run.folder}: is a run of {run.suite.name}, and only runs of {' and '.join(others)} can be watched"
+            f"{run.folder}: is a run of {run.suite.name}, and only runs of {' and '.join(others)} "
+            "can be watched"
         )
     return run.presenter.replay
 
@@ -130,7 +132,8 @@ def _refuse_options(run: ReportRun, replay: Replay, options: Mapping[str, object
     for option, value in options.items():
         if value is not None and option not in replay.options:
             raise UsageError(
-                f"{option}: is not for runs of {run.suite.name}, and {run.folder} is one; leave it out"
+                f"{option}: is not for runs of {run.suite.name}, and {run.folder} is one; leave it "
+                "out"
             )
 
 
@@ -149,7 +152,8 @@ def _write(
     scenes: Path | None,
     fps: float | None,
 ) -> None:
-    """Replay the episodes of a recording and write their pictures: a film, or a sheet if `fps` is None."""
+    """Replay the episodes of a recording and write their pictures: a film, or a sheet if `fps` is
+    None."""
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.formats.animations import write_animation
     from infthor_eval.terminal import error_console, print_line, progress_bar

@@ -22,10 +22,12 @@ __all__ = ["command"]
     help="Port on 127.0.0.1.  [default: one that is free]",
 )
 def command(run: Path, port: int) -> None:
-    """Open a page on the run in the folder RUN: progress, accuracy so far, tokens and seconds, failures, new samples.
+    """Open a page on the run in the folder RUN: progress, accuracy so far, tokens and seconds,
+    failures, new samples.
 
-    RUN may be a folder above the run's, also before the run starts: the run below it that was written last is shown.
-    The page is read only, and the run does not notice it. It needs the extra `page`. Ctrl-C ends the page, not the run.
+    RUN may be a folder above the run's, also before the run starts: the run below it that was
+    written last is shown. The page is read only, and the run does not notice it. It needs the extra
+    `page`. Ctrl-C ends the page, not the run.
     """
     from infthor_eval.errors import UsageError
     from infthor_eval.pages.server import require_page_extra, serve_pages

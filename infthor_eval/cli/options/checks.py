@@ -9,7 +9,8 @@ __all__ = ["print_checks"]
 
 
 def print_checks(name: str, results: Iterable[CheckResult]) -> int:
-    """Print a line for each result and one for all; return the exit code, 1 if a clause is broken."""
+    """Print a line for each result and one for all; return the exit code, 1 if a clause is
+    broken."""
     n_broken = 0
     for result in results:
         verdict = "holds" if result.violation is None else "broken"

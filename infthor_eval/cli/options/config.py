@@ -36,7 +36,8 @@ config_option = click.option(
     expose_value=False,
     callback=_read_file,
     metavar="FILE.yaml",
-    help="Take options from a file, such as `run.yaml` in a run's folder; the command line overrides it.",
+    help="Take options from a file, such as `run.yaml` in a run's folder; the command line "
+    "overrides it.",
 )
 
 

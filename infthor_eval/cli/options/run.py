@@ -41,7 +41,8 @@ _OPTIONS = (
         type=ModelList(),
         required=True,
         metavar="MODEL,...",
-        help="Model name, or several with commas (see `ls models`); MODEL:K=V,... gives a model its own options, "
+        help="Model name, or several with commas (see `ls models`); MODEL:K=V,... gives a model "
+        "its own options, "
         "and it may be named again with others.",
     ),
     click.option(
@@ -64,13 +65,15 @@ _OPTIONS = (
     click.option(
         "--rope",
         metavar="TYPE:FACTOR",
-        help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8, longrope-scaled:8.",
+        help="Extend the model's context: yarn:4, linear:2, dynamic:4, longrope:8, "
+        "longrope-scaled:8.",
     ),
     click.option(
         "--threads",
         type=WholeNumber(1),
         metavar="N",
-        help="Processor threads of each model on a CPU; default: all, and one for models with -tiny or -nano.",
+        help="Processor threads of each model on a CPU; default: all, and one for models with "
+        "-tiny or -nano.",
     ),
     click.option(
         "--max-tokens-total",
@@ -92,8 +95,10 @@ _OPTIONS = (
         "--limit",
         type=WholeNumber(1),
         metavar="N",
-        help="Evaluate only N of each task (questions, trajectories of plans, episodes of arms), evenly from all "
-        "trajectories, drawn by --seed; a larger N includes these. lm-eval's own command takes the first N instead.",
+        help="Evaluate only N of each task (questions, trajectories of plans, episodes of arms), "
+        "evenly from all "
+        "trajectories, drawn by --seed; a larger N includes these. lm-eval's own command takes the "
+        "first N instead.",
     ),
     click.option(
         "--output", type=PATH, default=Path("results"), show_default=True, help="Results folder."
@@ -124,7 +129,8 @@ _AS_GIVEN = ("data", "output", "limit", "seed", "name", "fresh", "recover", "inc
 
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add all options of a run to a command, which passes its parameters to `RunOptions.from_click`."""
+    """Add all options of a run to a command, which passes its parameters to
+    `RunOptions.from_click`."""
     for option in reversed((config_option, *_OPTIONS, worker_options, suite_options)):
         command = option(command)
     refuse_duplicate_options(command)
@@ -200,16 +206,18 @@ class RunOptions:
         )
 
     def requests(self) -> list[tuple[RunRequest, Suite]]:
-        """Return the runs, each with its suite: one for each model, suite, and value of an option that takes several.
+        """Return the runs, each with its suite: one for each model, suite, and value of an option
+        that takes several.
 
         Raises:
-            UsageError: an unknown task, a name that cannot be a folder's, or a baseline or an option of a suite that
-                has none of the tasks.
+            UsageError: an unknown task, a name that cannot be a folder's, or a baseline or an
+                option of a suite that has none of the tasks.
             DataError: a task file is not what it should be.
         """
         if self.name is not None and not re.fullmatch(r"\w[\w.@+ -]*", self.name):
             raise UsageError(
-                f"--name {self.name!r}: names a folder; use letters, digits, '.', '_', '-', '@', '+' and blanks"
+                f"--name {self.name!r}: names a folder; use letters, digits, '.', '_', '-', '@', "
+                "'+' and blanks"
             )
         by_suite = split_by_suite(Catalog.find_installed(self.include).expand(self.tasks))
         requests = []
@@ -220,7 +228,8 @@ class RunOptions:
                     request = RunRequest(
                         model=model.name,
                         tasks=TaskRequest(tasks, options, self.data, self.limit, self.seed),
-                        # The folder of one suite's run has the tasks' names as typed; of several, each its own tasks.
+                        # The folder of one suite's run has the tasks' names as typed; of several,
+                        # each its own tasks.
                         asked=self.tasks
                         if len(by_suite) == 1
                         else tuple(task.name for task in tasks),
@@ -241,7 +250,8 @@ def _refuse_baseline_of_others(model: str, suite: str, task: str) -> None:
     suites = baseline_suites().get(model, (suite,))
     if suite not in suites and not is_known(model):
         raise UsageError(
-            f"{model} is a baseline of {', '.join(suites)}, and {task} is a task of {suite}; see `ls models`"
+            f"{model} is a baseline of {', '.join(suites)}, and {task} is a task of {suite}; see "
+            "`ls models`"
         )
 
 

@@ -27,7 +27,8 @@ class ShowOptions:
 
     @classmethod
     def from_click(cls, given: Mapping[str, Any]) -> "ShowOptions":
-        """Return the options among the parameters of a command; one with --quiet adds that option itself.
+        """Return the options among the parameters of a command; one with --quiet adds that option
+        itself.
 
         Raises:
             UsageError: --json with --format or --full.
@@ -40,7 +41,8 @@ class ShowOptions:
 
 
 def show_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --full, --format and --json to a command, which passes them to `ShowOptions.from_click`."""
+    """Add --full, --format and --json to a command, which passes them to
+    `ShowOptions.from_click`."""
     return _with_options(
         command, click.Choice(["csv", "latex", "markdown"]), "Write the tables in this form."
     )

@@ -44,14 +44,16 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def suite_values(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of all suites among the parameters of a command; None where not given."""
-    # A suite that was installed after the command was imported has options that the command does not know.
+    # A suite that was installed after the command was imported has options that the command does
+    # not know.
     return {name: given.get(name) for name in _options_by_name()}
 
 
 def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[str]) -> list[Any]:
     """Return the options of a suite for each of its runs.
 
-    An option with `each` in its metadata takes several values with commas, and there is a run for each of them.
+    An option with `each` in its metadata takes several values with commas, and there is a run for
+    each of them.
 
     Args:
         suite: name of the suite.
@@ -79,7 +81,8 @@ def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[
 
 
 def refuse_duplicate_options(command: Callable[..., Any]) -> None:
-    """Refuse options of another package's suite that the command, which has those of all suites, has already.
+    """Refuse options of another package's suite that the command, which has those of all suites,
+    has already.
 
     Raises:
         UsageError: an option is there twice.
@@ -90,7 +93,8 @@ def refuse_duplicate_options(command: Callable[..., Any]) -> None:
     if duplicates:
         suite = next(iter(_options_by_name()[duplicates[0]]))
         raise UsageError(
-            f"the option {duplicates[0]} of the suite {suite} is one of every run; give it another name"
+            f"the option {duplicates[0]} of the suite {suite} is one of every run; give it another "
+            "name"
         )
 
 
@@ -107,7 +111,8 @@ def _refuse_unused(given: Mapping[str, Any], used: Collection[str]) -> None:
     for name, by_suite in _options_by_name().items():
         if given.get(name) is not None and not set(by_suite) & set(used):
             raise UsageError(
-                f"--{name.replace('_', '-')} is for tasks of {' and '.join(by_suite)}; --tasks names none of these"
+                f"--{name.replace('_', '-')} is for tasks of {' and '.join(by_suite)}; --tasks "
+                "names none of these"
             )
 
 

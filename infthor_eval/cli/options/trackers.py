@@ -12,7 +12,8 @@ __all__ = ["parse_trackers", "tracker_options"]
 _HELP = {
     "wandb_args": "Send finished runs to Weights & Biases: arguments of wandb.init (project=NAME).",
     "trackio_args": "Send finished runs to trackio: arguments of trackio.init (project=NAME).",
-    "hf_hub_log_args": "Push finished runs to the hub: lm-eval's arguments (push_results_to_hub=True).",
+    "hf_hub_log_args": "Push finished runs to the hub: lm-eval's arguments "
+    "(push_results_to_hub=True).",
 }
 
 
@@ -24,7 +25,8 @@ def tracker_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def parse_trackers(given: Mapping[str, Any]) -> dict[str, dict[str, str]]:
-    """Return the arguments of each tracker that is used, by option; `given` are the parameters of the command."""
+    """Return the arguments of each tracker that is used, by option; `given` are the parameters of
+    the command."""
     return {
         name: parse_pairs(given[name].split(","), _option(name))
         for name in _HELP

@@ -65,7 +65,8 @@ class ModelSpec(NamedTuple):
 
 
 class WholeNumber(click.ParamType):
-    """A whole number that fits into a run's JSON. An `IntRange` would print that limit into every help text.
+    """A whole number that fits into a run's JSON. An `IntRange` would print that limit into every
+    help text.
 
     Args:
         minimum: the smallest number allowed.
@@ -87,7 +88,8 @@ class WholeNumber(click.ParamType):
 
 
 class FiniteFloat(click.FloatRange):
-    """A number within a range. `FloatRange` lets "nan" through, which is neither below nor above a bound."""
+    """A number within a range. `FloatRange` lets "nan" through, which is neither below nor above a
+    bound."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -100,7 +102,8 @@ class FiniteFloat(click.FloatRange):
 
 
 class SceneName(click.ParamType):
-    """The name of a procedural scene or of a floor plan; whether there is such a floor plan is not checked."""
+    """The name of a procedural scene or of a floor plan; whether there is such a floor plan is not
+    checked."""
 
     name = "SCENE"
 
@@ -134,7 +137,8 @@ class ModelArgs(click.ParamType):
 
 
 class ModelList(click.ParamType):
-    """Models by name, each with options where it has any: `A:k=v,k=v,B`. Each `A:` begins another model."""
+    """Models by name, each with options where it has any: `A:k=v,k=v,B`. Each `A:` begins another
+    model."""
 
     name = "MODEL[:K=V,...],..."
 

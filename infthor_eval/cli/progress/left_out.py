@@ -11,6 +11,7 @@ __all__ = ["print_left_out"]
 
 
 def print_left_out(root: Path, skipped: Iterable[SkippedQuestion]) -> None:
-    """Print how many questions of a set are left out, by reason; lines of a file are given as a range."""
+    """Print how many questions of a set are left out, by reason; lines of a file are given as a
+    range."""
     for _, reason, n in count_reasons(("", item.reason) for item in skipped):
         print_note(f"{root}: {n} question(s) left out: {reason}", "yellow")

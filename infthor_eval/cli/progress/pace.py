@@ -1,4 +1,5 @@
-"""How fast work goes: units a second, the time left, and the share of tokens that came from a cache."""
+"""How fast work goes: units a second, the time left, and the share of tokens that came from a
+cache."""
 
 __all__ = ["Pace", "format_duration"]
 
@@ -47,7 +48,8 @@ class Pace:
             self._cached_tokens += cached
 
     def speed(self, now: float) -> str:
-        """Return how fast it goes, `1.3 a second, 83 % of tokens cached`; empty before the first new unit."""
+        """Return how fast it goes, `1.3 a second, 83 % of tokens cached`; empty before the first
+        new unit."""
         rate = self._rate(now)
         if rate is None:
             return ""
@@ -62,13 +64,16 @@ class Pace:
         position = f"{n_done:,} of {self._n_units:,} ({100 * n_done / self._n_units:.0f} %)"
         if rate is None:
             return position
-        return f"{position}, {format_duration((self._n_units - n_done) / rate)} left, {self.speed(now)}"
+        return (
+            f"{position}, {format_duration((self._n_units - n_done) / rate)} left, "
+            f"{self.speed(now)}"
+        )
 
     def is_due(self, now: float) -> bool:
         """Return whether to print a line now.
 
-        Lines come at every step of 5 %, but at most one in 10 seconds and at least one a minute. There is none at the
-        end, where results follow.
+        Lines come at every step of 5 %, but at most one in 10 seconds and at least one a minute.
+        There is none at the end, where results follow.
         """
         if self._n_done >= self._n_units:
             return False

@@ -54,11 +54,13 @@ def execute_with_progress(run: PreparedRun) -> RunOutcome:
         outcome = execute(run, observer, stop)
     pace = observer.bar.pace
     print_note(
-        f"{run.request.label}: {pace.n_new} evaluated now, {pace.n_resumed} resumed from the journal"
+        f"{run.request.label}: {pace.n_new} evaluated now, {pace.n_resumed} resumed from the "
+        "journal"
     )
     if outcome.n_missing:
         print_note(
-            f"{run.request.label}: stopped, {outcome.n_missing} not attempted; run the same command to continue",
+            f"{run.request.label}: stopped, {outcome.n_missing} not attempted; run the same "
+            "command to continue",
             "yellow",
         )
     return outcome

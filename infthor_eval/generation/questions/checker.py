@@ -1,8 +1,10 @@
-"""An independent check of questions, which answers their text from the log in another way than the rules.
+"""An independent check of questions, which answers their text from the log in another way than the
+rules.
 
-The answer is computed from the facts of frames (see `solvers`). Facts of the whole log have the true states of all
-objects. Facts of clue frames have only what the frame's entry shows: the action before it, and the objects that are
-large enough to be seen. A question is sound if both give its gold answer, and no smaller set of clues does.
+The answer is computed from the facts of frames (see `solvers`). Facts of the whole log have the
+true states of all objects. Facts of clue frames have only what the frame's entry shows: the action
+before it, and the objects that are large enough to be seen. A question is sound if both give its
+gold answer, and no smaller set of clues does.
 """
 
 from collections.abc import Sequence
@@ -46,8 +48,8 @@ class Checker:
     def verdict(self, question: Question) -> Verdict:
         """Check one question.
 
-        The clues of an absence question, for which no frame is evidence, count as minimal. For a further count, the
-        number of necessary clues must be the answer, and there must be others.
+        The clues of an absence question, for which no frame is evidence, count as minimal. For a
+        further count, the number of necessary clues must be the answer, and there must be others.
         """
         gold = sorted(str(item) for item in question.answers)
         clues = question.clues

@@ -1,8 +1,10 @@
-"""The balanced choice of questions, so that the answers cannot be guessed from the words of the questions.
+"""The balanced choice of questions, so that the answers cannot be guessed from the words of the
+questions.
 
-No answer to a form is more frequent than the next ones: than the next for yes and no, the next two for numbers, the
-next four for other answers. The same holds for the answers on each object in each kind of room, as "the fridge was
-open" or "there is a sofa" would hold in most kitchens and living rooms, whatever the form.
+No answer to a form is more frequent than the next ones: than the next for yes and no, the next two
+for numbers, the next four for other answers. The same holds for the answers on each object in each
+kind of room, as "the fridge was open" or "there is a sofa" would hold in most kitchens and living
+rooms, whatever the form.
 """
 
 import random
@@ -19,14 +21,15 @@ _NEXT_ANSWERS = 6
 
 
 class Chooser:
-    """Chooses questions so that types, forms, answers, numbers of clues and subjects are balanced over a set."""
+    """Chooses questions so that types, forms, answers, numbers of clues and subjects are balanced
+    over a set."""
 
     def __init__(self, *, by_subject: bool = True) -> None:
         """Start a set.
 
         Args:
-            by_subject: False for more questions: no answer yes, no or number is more frequent than all others to its
-                form together, and that is all.
+            by_subject: False for more questions: no answer yes, no or number is more frequent than
+                all others to its form together, and that is all.
         """
         self._by_subject = by_subject
         self._types: Counter[str] = Counter()
@@ -42,7 +45,8 @@ class Chooser:
         remaining = list(candidates)
         rng.shuffle(remaining)  # ties are broken by this order
         chosen: list[Candidate] = []
-        # A limit per group: presence questions, which are always possible, must not fill up quiet trajectories.
+        # A limit per group: presence questions, which are always possible, must not fill up quiet
+        # trajectories.
         limits = Counter({_group(item): max(2, number // 5) for item in remaining})
         while len(chosen) < number:
             eligible = [

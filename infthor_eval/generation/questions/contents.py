@@ -1,7 +1,9 @@
-"""Slicing and container content: what was sliced, and what a receptacle held, at a given step or always.
+"""Slicing and container content: what was sliced, and what a receptacle held, at a given step or
+always.
 
-Table 3's forms do not define which objects count as being in or on something, so they are used only where every reading
-gives the same answer (see `readings`). Our forms define it: objects that can be picked up and are directly there.
+Table 3's forms do not define which objects count as being in or on something, so they are used only
+where every reading gives the same answer (see `readings`). Our forms define it: objects that can be
+picked up and are directly there.
 """
 
 from collections import Counter
@@ -33,7 +35,8 @@ __all__ = [
 CONTENT = "container_content"
 FURTHER = further_type(CONTENT)
 SLICING = "slicing"
-# They take objects of one type alone (AI2-THOR's list of what fits where), so their contents need no look.
+# They take objects of one type alone (AI2-THOR's list of what fits where), so their contents need
+# no look.
 _OF_ONE_TYPE = {
     "CoffeeMachine",
     "HandTowelHolder",
@@ -90,9 +93,11 @@ def at_slicing(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def contents(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on receptacles whose contents never change and that are the only ones of their types.
+    """Yield the questions on receptacles whose contents never change and that are the only ones of
+    their types.
 
-    A receptacle that takes one type of object alone is left out: its contents can be told without a frame.
+    A receptacle that takes one type of object alone is left out: its contents can be told without a
+    frame.
     """
     last = len(history) - 1
     places = {
@@ -110,7 +115,8 @@ def contents(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def at_opening(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on what was in the only receptacle of its type when it was first opened."""
+    """Yield the questions on what was in the only receptacle of its type when it was first
+    opened."""
     opened: set[str] = set()
     for event in history.events:
         first = event.action == "OpenObject" and event.target not in opened
@@ -133,7 +139,10 @@ def at_pickup(history: TrajectoryHistory) -> Iterator[Candidate]:
             and place in history.states(event.frame)
         ):
             place_type = history.states(event.frame)[place].type
-            form = "Which other things that can be picked up were directly {} when you picked up {} from it?"
+            form = (
+                "Which other things that can be picked up were directly {} when you picked up {} "
+                "from it?"
+            )
             asked = form, (in_or_on(place_type), with_the(event.object_type))
             yield from _loose_contents_question(history, asked, event, place)
 
@@ -143,7 +152,8 @@ def _loose_contents_question(
 ) -> Iterator[Candidate]:
     """Yield a question on the contents of a receptacle right after an event that can be picked up.
 
-    One of the clues shows the event: without it, nobody could tell that the others show what was there then.
+    One of the clues shows the event: without it, nobody could tell that the others show what was
+    there then.
     """
     items = can_be_picked_up(history, event.frame, history.contents(event.frame, place))
     if items is not None and history.shows(event.frame, event.target):

@@ -14,13 +14,14 @@ def minimal_cover(
     Args:
         items: ids of the objects.
         shown: the objects that each frame shows.
-        clarity: how well a frame shows some objects, as any comparable value; among frames that show equally many, the
-            clearest is chosen.
+        clarity: how well a frame shows some objects, as any comparable value; among frames that
+            show equally many, the clearest is chosen.
 
     Returns:
         The frames in order, or None if no set of frames shows all objects.
     """
-    # Greedy set cover: minimum covers are NP-hard, and the checker only demands that no clue can be removed.
+    # Greedy set cover: minimum covers are NP-hard, and the checker only demands that no clue can be
+    # removed.
     missing = set(items)
     chosen: list[int] = []
     while missing:

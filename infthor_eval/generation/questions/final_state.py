@@ -1,4 +1,5 @@
-"""Final object state, in Table 3's forms: is an object in a receptacle, what is in it, and how many, at the end."""
+"""Final object state, in Table 3's forms: is an object in a receptacle, what is in it, and how
+many, at the end."""
 
 from collections.abc import Iterator
 
@@ -19,7 +20,8 @@ QUESTION_TYPE = "final_state"
 
 
 def final_states(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield questions on receptacles that the agent put something into and that are the only ones of their types."""
+    """Yield questions on receptacles that the agent put something into and that are the only ones
+    of their types."""
     last = len(history) - 1
     targets = sorted({move.target for move in history.moves})
     singles = [
@@ -31,7 +33,8 @@ def final_states(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def _inside(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
-    """Yield questions on whether an object that was put in or taken out is in the receptacle in the end."""
+    """Yield questions on whether an object that was put in or taken out is in the receptacle in the
+    end."""
     last = len(history) - 1
     states = history.states(last)
     for item in sorted(
@@ -62,7 +65,8 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
     for frame in range(min(since.values(), default=0), len(history)):
         here = history.contents(frame, receptacle)
         held = {key for key in here if key in history.objects_in_frame(frame)}
-        # Frames with an object that left later, even if it returned, would be evidence for another answer.
+        # Frames with an object that left later, even if it returned, would be evidence for another
+        # answer.
         is_final = held <= inside and all(frame >= since[key] for key in held)
         if history.shows(frame, receptacle) and is_final:
             shown[frame] = frozenset(key for key in held if history.shows_inside(frame, key))

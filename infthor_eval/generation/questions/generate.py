@@ -1,6 +1,8 @@
-"""Generating questions on a whole set: all rules on all trajectories, then a balanced choice of the candidates.
+"""Generating questions on a whole set: all rules on all trajectories, then a balanced choice of the
+candidates.
 
-The rules are those of the paper's Table 3; our further forms are optional and have question types of their own.
+The rules are those of the paper's Table 3; our further forms are optional and have question types
+of their own.
 """
 
 import random
@@ -60,7 +62,8 @@ class GeneratedQuestions:
         return dict(sorted(Counter(item.question_type or "" for item in self.questions).items()))
 
     def by_clues(self) -> dict[str, int]:
-        """Return the number of questions by number of clues: 1, 2, >=3, and of absences, which have none."""
+        """Return the number of questions by number of clues: 1, 2, >=3, and of absences, which have
+        none."""
         counts = Counter(item.clue_column for item in self.questions)
         return {name: counts[name] for name in ("1", "2", ">=3", ABSENCE)}
 
@@ -92,8 +95,8 @@ def generate_questions(
         share: share of the frame's pixels that an object must fill to count as shown.
         further: True to add our further forms, which have no published words.
         published_words: True for the same questions in the words of the published files.
-        by_subject: True to balance the answers on each object in each kind of room, too; False leaves more questions,
-            for training.
+        by_subject: True to balance the answers on each object in each kind of room, too; False
+            leaves more questions, for training.
         worker_settings: number and place of the workers; they do not change the questions.
         say: called with messages about the workers.
 
@@ -207,7 +210,8 @@ def _share_out(
     say: Callable[[str], None],
     result: GeneratedQuestions,
 ) -> dict[Path, Any]:
-    """Return the results of the jobs by trajectory; a trajectory at which several workers were lost is skipped."""
+    """Return the results of the jobs by trajectory; a trajectory at which several workers were lost
+    is skipped."""
     results: dict[Path, Any] = {}
     for number, outcome in run_jobs(_QuestionWorker, jobs, worker_settings, say):
         if isinstance(outcome, InfthorError):
@@ -246,7 +250,8 @@ def candidates_of(
 ) -> list[Candidate]:
     """Return all questions of Table 3's forms on one trajectory.
 
-    Absence questions use the object types of the set's rooms of the same kind, `vocabulary`, and random frames.
+    Absence questions use the object types of the set's rooms of the same kind, `vocabulary`, and
+    random frames.
     """
     return [
         *presence.yes_questions(history),
@@ -263,7 +268,8 @@ def candidates_of(
 
 
 def further_candidates_of(history: TrajectoryHistory, rng: random.Random) -> list[Candidate]:
-    """Return all questions of our further forms on one trajectory; counting questions get random frames."""
+    """Return all questions of our further forms on one trajectory; counting questions get random
+    frames."""
     return [
         *open_state.further_open_states(history),
         *location.further_locations(history),

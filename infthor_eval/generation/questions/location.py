@@ -1,6 +1,7 @@
 """Object location tracing: where an object was, where it was moved, and where it is now.
 
-It must be clear which pick-up or put is meant: "before you picked it up" is ambiguous for an object picked up twice.
+It must be clear which pick-up or put is meant: "before you picked it up" is ambiguous for an object
+picked up twice.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,7 +43,8 @@ def _moves_by_type(history: TrajectoryHistory) -> Iterator[tuple[str, tuple[Obje
 def _before_put(
     history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
 ) -> Iterator[Candidate]:
-    # Only for the first move, and only if no other leads to such a container: then there is one place before it.
+    # Only for the first move, and only if no other leads to such a container: then there is one
+    # place before it.
     move = moves[0]
     to = history.target_type(move)
     once = [history.target_type(other) for other in moves].count(to) == 1
@@ -61,7 +63,8 @@ def _before_put(
 def _moved_from(
     history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
 ) -> Iterator[Candidate]:
-    # Only for the last move, and only if no other starts at such a container: then there is one place after it.
+    # Only for the last move, and only if no other starts at such a container: then there is one
+    # place after it.
     move = moves[-1]
     if (
         not _shows_origin(history, move)
@@ -132,7 +135,8 @@ def _start(history: TrajectoryHistory, move: ObjectMove) -> str | None:
 
 
 def _changes(history: TrajectoryHistory, move: ObjectMove) -> bool:
-    """Return True if a move led to another type of receptacle; otherwise the question would contain the answer."""
+    """Return True if a move led to another type of receptacle; otherwise the question would contain
+    the answer."""
     start = _start(history, move)
     return start is not None and canonical_type(start) != canonical_type(history.target_type(move))
 
@@ -143,7 +147,8 @@ def _is_down(history: TrajectoryHistory, move: ObjectMove) -> bool:
 
 
 def _shows_origin(history: TrajectoryHistory, move: ObjectMove) -> bool:
-    """Return True if the frame before the pick-up shows the object where it was, and no other of its type."""
+    """Return True if the frame before the pick-up shows the object where it was, and no other of
+    its type."""
     shown = move.origin is not None and history.shows(move.before, move.item, move.origin)
     return shown and history.is_alone_in_frame(move.before, move.item)
 

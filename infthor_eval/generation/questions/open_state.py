@@ -1,4 +1,5 @@
-"""Open state: "Was the fridge open?" (at any time); further forms: open when, open now, what was opened."""
+"""Open state: "Was the fridge open?" (at any time); further forms: open when, open now, what was
+opened."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -42,7 +43,8 @@ def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield questions on when an object that is the only one of its type was open, and on all that was opened."""
+    """Yield questions on when an object that is the only one of its type was open, and on all that
+    was opened."""
     phrases = Counter(_phrase(history, event) for event in history.events)
     for key in _singles(history):
         yield from _now(history, key)

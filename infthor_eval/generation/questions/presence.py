@@ -1,11 +1,12 @@
 """Object presence: "Is there any mug in this room?", "Have you seen a mug?"
 
-The clue of a yes-question is the first frame that shows such an object. A no-question names a type that the scene does
-not have, or, in the second form, one that no frame shows, and that is not easily mistaken for one that is there. The
-type is one of other rooms of the same kind in the set, so that neither its name nor a look at the room gives the answer
-away, or another that is common in AI2-THOR's rooms of the kind if there are few of these. No frame is evidence for an
-absence, so its clue is a sampled frame. It has one, like a yes-question, or the number of frames would give the answer
-away.
+The clue of a yes-question is the first frame that shows such an object. A no-question names a type
+that the scene does not have, or, in the second form, one that no frame shows, and that is not
+easily mistaken for one that is there. The type is one of other rooms of the same kind in the set,
+so that neither its name nor a look at the room gives the answer away, or another that is common in
+AI2-THOR's rooms of the kind if there are few of these. No frame is evidence for an absence, so its
+clue is a sampled frame. It has one, like a yes-question, or the number of frames would give the
+answer away.
 
 In a house of several rooms "this room" would be ambiguous, so only the second form is used.
 """
@@ -284,7 +285,8 @@ def yes_questions(history: TrajectoryHistory) -> Iterator[Candidate]:
 def no_questions(
     history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random
 ) -> Iterator[Candidate]:
-    """Yield no-questions with random frames on types of `vocabulary` that the scene does not have."""
+    """Yield no-questions with random frames on types of `vocabulary` that the scene does not
+    have."""
     frames = [frame for frame in range(len(history)) if _is_busy(history, frame)] or [0]
     absent = _other_types(history, vocabulary, history.all_object_types)
     for object_type in sorted(absent | _other_types(history, vocabulary, history.types_in_frames)):
@@ -317,7 +319,8 @@ def _questions(
 def _other_types(
     history: TrajectoryHistory, vocabulary: frozenset[str], there: frozenset[str]
 ) -> set[str]:
-    """Return the types of the vocabulary that are not there, nor like one that is; more if these are few."""
+    """Return the types of the vocabulary that are not there, nor like one that is; more if these
+    are few."""
     similar = {name for group in _SIMILAR_TYPES if group & there for name in group}
     rooms = rooms_of(history.all_object_types).split(", ")
     common = frozenset[str]().union(*(_COMMON[room] for room in rooms)) - history.all_object_types

@@ -1,8 +1,10 @@
-"""Questions in the words of the published files: type names, mostly without an article ("Where is Statue now?").
+"""Questions in the words of the published files: type names, mostly without an article ("Where is
+Statue now?").
 
-The words are those of the two published question files, counted there: containers of contents, puts and counts have one
-preposition each, whatever the container; "Is X in the Y?" has that of the container, as ours. Yes and no are written
-with a capital, numbers as numbers, objects as type names.
+The words are those of the two published question files, counted there: containers of contents, puts
+and counts have one preposition each, whatever the container; "Is X in the Y?" has that of the
+container, as ours. Yes and no are written with a capital, numbers as numbers, objects as type
+names.
 """
 
 import re
@@ -14,7 +16,8 @@ from infthor_eval.household.wording import canonical_type, object_type
 
 __all__ = ["in_published_words"]
 
-# By our form. The names of the candidate become type names; "a" and "preposition" are those of the last one.
+# By our form. The names of the candidate become type names; "a" and "preposition" are those of the
+# last one.
 _FORMS = {
     "Is there any {} in this room?": "Is there any {} in this room?",
     "Have you seen {}?": "Have you seen {a} {}?",
@@ -35,7 +38,8 @@ _BEFORE_NOUN = re.compile(r"^(?:(?:in|on) )?(?:(?:the|an|a) )?")
 
 
 def in_published_words(candidate: Candidate, traj_id: str) -> Question:
-    """Return a candidate of Table 3's forms as a question in the published words, with the same clues and type.
+    """Return a candidate of Table 3's forms as a question in the published words, with the same
+    clues and type.
 
     Raises:
         ValueError: the form is one of ours, which has no published words.

@@ -1,6 +1,7 @@
 """Put action: "What object did you put in the fridge?"; further forms ask about several puts.
 
-Table 3's form has two successive frames as clues: the object in the hand, and the object where it was put.
+Table 3's form has two successive frames as clues: the object in the hand, and the object where it
+was put.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +17,8 @@ FURTHER = candidates.further_type(QUESTION_TYPE)
 
 
 def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on what was put into a container, if there was only one put into any of its type."""
+    """Yield the questions on what was put into a container, if there was only one put into any of
+    its type."""
     for place_type, moves in sorted(_by_type(history).items()):
         (move, *others) = moves
         before = move.after - 1
@@ -32,7 +34,8 @@ def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield questions on all objects put into one receptacle, if they are several, and on all puts."""
+    """Yield questions on all objects put into one receptacle, if they are several, and on all
+    puts."""
     for place_type, moves in sorted(_by_type(history).items()):
         if len(moves) > 1 and len({move.target for move in moves}) == 1:
             yield from _what(history, "What did you put {}?", (place_type,), moves)

@@ -1,8 +1,8 @@
 """Whether "the objects in or on" a receptacle are unambiguous.
 
-On a counter top, do the objects in a pan count, and does the toaster? Table 3's forms do not define it, so they are
-used only where every reading gives the same answer. Our further forms define it: objects that can be picked up and are
-directly there.
+On a counter top, do the objects in a pan count, and does the toaster? Table 3's forms do not define
+it, so they are used only where every reading gives the same answer. Our further forms define it:
+objects that can be picked up and are directly there.
 """
 
 import math
@@ -45,7 +45,8 @@ _SPAN = 1.5  # maximum distance from the middle of a table to an object on it, m
 def can_be_picked_up(
     history: TrajectoryHistory, frame: int, keys: Iterable[str]
 ) -> frozenset[str] | None:
-    """Return the objects that can be picked up, or None if the log does not report this for one of them."""
+    """Return the objects that can be picked up, or None if the log does not report this for one of
+    them."""
     states = history.states(frame)
     types = {key: states[key].type for key in keys}
     if not history.reported_types.issuperset(types.values()):
@@ -56,7 +57,8 @@ def can_be_picked_up(
 
 
 def is_plain(history: TrajectoryHistory, frame: int, place: str) -> bool:
-    """Return True if a receptacle holds only objects that can be picked up, all empty, and has no fixture on it."""
+    """Return True if a receptacle holds only objects that can be picked up, all empty, and has no
+    fixture on it."""
     inside = history.contents(frame, place)
     loose = can_be_picked_up(history, frame, inside) == inside
     nested = any(history.contents(frame, key) for key in inside)

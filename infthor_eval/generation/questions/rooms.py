@@ -14,7 +14,8 @@ _MARKS = {
 
 
 def rooms_of(types: Set[str]) -> str:
-    """Return the kinds of a scene's rooms by the types of its objects: "Kitchen", or "Kitchen, Bedroom" for a house.
+    """Return the kinds of a scene's rooms by the types of its objects: "Kitchen", or "Kitchen,
+    Bedroom" for a house.
 
     A room without any mark is a living room. A bedroom with a sofa is a bedroom.
     """

@@ -1,7 +1,7 @@
 """Answering questions by their text, from the facts of frames, for the independent check.
 
-The solvers do not know how a question was generated and share no code with the rules, so they do not share their
-errors.
+The solvers do not know how a question was generated and share no code with the rules, so they do
+not share their errors.
 """
 
 import re
@@ -27,7 +27,8 @@ class FrameFacts:
         objects: states of the known objects by id.
         in_frame: ids of all objects in the frame, however small.
         everything: True if `objects` has all objects, False if only those in the frame.
-        loose: types that can be picked up, which is general knowledge and not restricted to the frame.
+        loose: types that can be picked up, which is general knowledge and not restricted to the
+            frame.
     """
 
     frame: int
@@ -42,7 +43,8 @@ class FrameFacts:
 def frame_facts(
     steps: Sequence[Step], share: float, frames: Container[int] | None = None
 ) -> list[FrameFacts]:
-    """Return the facts of the whole log, or what clue frames show: objects that fill a share of the frame's pixels."""
+    """Return the facts of the whole log, or what clue frames show: objects that fill a share of the
+    frame's pixels."""
     facts = []
     loose = frozenset(name for step in steps for name in step.object_log.pickupable)
     for step, states in zip(steps, iter_object_states(steps), strict=True):
@@ -97,8 +99,10 @@ def _is(state: ObjectState, words: str) -> bool:
 
 
 def _holder(glimpse: FrameFacts, key: str) -> str | None:
-    """Return what an object is directly in or on: the one of its parents that is in most of the others."""
-    # Not by `household.containment`, which the rules use: an independent check must not share its errors.
+    """Return what an object is directly in or on: the one of its parents that is in most of the
+    others."""
+    # Not by `household.containment`, which the rules use: an independent check must not share its
+    # errors.
     state = glimpse.objects[key]
     parents = [parent for parent in state.parents if parent in glimpse.objects]
     parents = [parent for parent in parents if glimpse.objects[parent].type != "Floor"]
@@ -226,7 +230,8 @@ def _journey(facts: Sequence[FrameFacts], words: str) -> list[str]:
 
 
 def _puts_at(facts: Sequence[FrameFacts], place: str, words: str | None = None) -> list[FrameFacts]:
-    """Return the facts right after puts (of an object of a type) into or onto a receptacle of a type."""
+    """Return the facts right after puts (of an object of a type) into or onto a receptacle of a
+    type."""
     events = [item for item in _events(facts, "PutObject", words) if item.target in item.objects]
     return [item for item in events if _place(item, item.target or "") == _type_name(place)]
 
@@ -349,7 +354,8 @@ def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) ->
 
 
 def _only_loose(item: FrameFacts) -> FrameFacts:
-    """Return the facts without the fixtures in or on others; objects without a parent remain, as possible holders."""
+    """Return the facts without the fixtures in or on others; objects without a parent remain, as
+    possible holders."""
     remaining = {
         key: state
         for key, state in item.objects.items()
@@ -373,7 +379,8 @@ def _is_in(facts: Sequence[FrameFacts], item: str, _preposition: str, place: str
 
 
 def _last_inside(facts: Sequence[FrameFacts], place: str) -> dict[str, str]:
-    """Return what is in a receptacle in the end, by id: where each object is at the last frame that shows it."""
+    """Return what is in a receptacle in the end, by id: where each object is at the last frame that
+    shows it."""
     if facts[-1].everything:
         return {key: _name(facts[-1].objects[key].type) for key in _inside(facts[-1], place)}
     names: dict[str, str] = {}
@@ -397,7 +404,8 @@ def _how_many(facts: Sequence[FrameFacts], _preposition: str, place: str) -> lis
 
 
 def _moves(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    """Return how often it was put down; with full knowledge, it must have been picked up as often."""
+    """Return how often it was put down; with full knowledge, it must have been picked up as
+    often."""
     count = len(_events(facts, "PutObject", words))
     paired = not facts[0].everything or count == len(_events(facts, "PickupObject", words)) > 1
     return [str(count)] if count and paired else []
@@ -445,7 +453,8 @@ _SOLVERS: tuple[tuple[str, Callable[..., list[str]]], ...] = (
     (r"Was the (.+) open when you (picked up|sliced|turned on) the (.+)\?", _open_then),
     (r"Was the (.+) open when you put the (.+) (in|on) the (.+)\?", _open_at_put),
     (
-        r"Which things that can be picked up were directly (in|on) the (.+) when you first opened it\?",
+        r"Which things that can be picked up were directly (in|on) the (.+) when you first opened "
+        r"it\?",
         _at_opening,
     ),
     (

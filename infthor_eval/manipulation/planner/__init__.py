@@ -1,1 +1,2 @@
-"""A planner of arms: `reaching.plan_steps` finds collision-free paths to pick up and to put down."""
+"""A planner of arms: `reaching.plan_steps` finds collision-free paths to pick up and to put
+down."""

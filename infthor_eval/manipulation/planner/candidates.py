@@ -1,4 +1,5 @@
-"""Candidate poses of a put, drawn at random: those in which to release the object, and those to pass on the way."""
+"""Candidate poses of a put, drawn at random: those in which to release the object, and those to
+pass on the way."""
 
 import itertools
 import math
@@ -16,8 +17,8 @@ from infthor_eval.manipulation.planner.stand import ArmStand
 
 __all__ = ["PutGoal", "ReleasePoses", "passing_poses", "release_poses"]
 
-# Release poses that are drawn, rated (of those within reach), tested for collisions (of the best), and kept. Each step
-# costs more a pose than the one before, so it sees fewer of them.
+# Release poses that are drawn, rated (of those within reach), tested for collisions (of the best),
+# and kept. Each step costs more a pose than the one before, so it sees fewer of them.
 _DRAWN, _RATED, _TESTED, _KEPT = 8000, 1000, 400, 24
 _ABOVE = (
     0.02,
@@ -27,16 +28,17 @@ _ABOVE = (
     0.25,
     0.4,
 )  # metres between a place, or a rim, and the object released above it
-# In units of the places' spacing: a receptacle narrower than the first has few places, and one may go beyond its
-# outermost ones by the second.
+# In units of the places' spacing: a receptacle narrower than the first has few places, and one may
+# go beyond its outermost ones by the second.
 _FEW, _BEYOND = 1.5, 0.4
 _RIM = 0.05  # metres that a rim is above the places within it
 _INTO = 0.3  # share of poses that are below a rim, as on the seat of a sofa
 _YAWS = np.radians(np.arange(-150.0, 151.0, 30.0))  # directions of the hand, from straight ahead
 _PITCHES = np.radians((0.0, 0.0, 30.0, 60.0, 90.0, -30.0))  # angles of the hand, downwards
 _BASES = (0.0, 0.2, -0.2, 0.4, -0.4)  # metres of the base above the wrist
-# Costs of release poses, in metres of path: of an object over an edge, or on other objects; of a place at an edge; of
-# releasing below a rim; of a radian that the hand points down, or aside; of a metre to fall.
+# Costs of release poses, in metres of path: of an object over an edge, or on other objects; of a
+# place at an edge; of releasing below a rim; of a radian that the hand points down, or aside; of a
+# metre to fall.
 _LOOSE, _OCCUPIED, _EDGE, _BELOW_RIM, _PITCHED, _TURNED, _DROP = 1.0, 3.0, 0.6, 0.3, 0.2, 0.05, 0.5
 _COLLIDED, _NEAR = (
     0.2,
@@ -83,7 +85,8 @@ class ReleasePoses:
 def release_poses(
     goal: PutGoal, terrain: Terrain, stand: ArmStand, draw: Generator
 ) -> ReleasePoses:
-    """Return the best of many poses in which the held object would come to rest in or on a receptacle."""
+    """Return the best of many poses in which the held object would come to rest in or on a
+    receptacle."""
     poses, costs = _draw_above(goal, terrain.linkage, stand, draw)
     reached = np.flatnonzero(terrain.linkage.can_reach(poses))[:_RATED]
     poses, costs = poses[reached], costs[reached]
@@ -99,7 +102,8 @@ def release_poses(
 
 
 def _count_contacts(goal: PutGoal, middles: Array, contacts: Sequence[Contact]) -> Array:
-    """Count the collisions (n,) with the receptacle near the held object's middle; in an opening, on its way in."""
+    """Count the collisions (n,) with the receptacle near the held object's middle; in an opening,
+    on its way in."""
     counts = np.zeros(len(middles))
     for contact in contacts:
         if contact.on_goal:
@@ -113,7 +117,8 @@ def _count_contacts(goal: PutGoal, middles: Array, contacts: Sequence[Contact]) 
 def _draw_above(
     goal: PutGoal, linkage: Linkage, stand: ArmStand, draw: Generator
 ) -> tuple[Poses, Array]:
-    """Draw poses (n) with the held object above places, with their costs (n,) except those of how it would rest."""
+    """Draw poses (n) with the held object above places, with their costs (n,) except those of how
+    it would rest."""
     points = _within_reach(goal.places.points, linkage)
     spots = _jitter(points[draw.integers(len(points), size=_DRAWN)], goal.places, draw)
     yaws, pitches = draw.choice(_YAWS, size=_DRAWN), draw.choice(_PITCHES, size=_DRAWN)
@@ -135,7 +140,8 @@ def _draw_above(
 
 
 def _jitter(spots: Array, places: Places, draw: Generator) -> Array:
-    """Move places (n, 3) by up to half their spacing, not beyond the outermost ones unless there are few."""
+    """Move places (n, 3) by up to half their spacing, not beyond the outermost ones unless there
+    are few."""
     spacing = places.spacing
     low, high = places.points.min(axis=0), places.points.max(axis=0)
     margin = np.where(high - low < _FEW * spacing, _BEYOND * spacing, 0.0)
@@ -145,7 +151,8 @@ def _jitter(spots: Array, places: Places, draw: Generator) -> Array:
 
 
 def _grounds(goal: PutGoal, spots: Array, draw: Generator) -> tuple[Array, Array]:
-    """Return the heights (n,) above which to release the object over some places (n, 3), and their costs (n,)."""
+    """Return the heights (n,) above which to release the object over some places (n, 3), and their
+    costs (n,)."""
     rim = goal.places.top
     if goal.entry is not None or rim < spots[:, 1].max() + _RIM:
         return spots[:, 1], np.zeros(len(spots))
@@ -163,7 +170,8 @@ def _within_reach(points: Array, linkage: Linkage) -> Array:
 def passing_poses(
     goal: PutGoal, terrain: Terrain, stand: ArmStand, ends: Poses, count: int, draw: Generator
 ) -> Poses:
-    """Return free poses to pass: before and above release poses, with a folded arm, near the present one, anywhere."""
+    """Return free poses to pass: before and above release poses, with a folded arm, near the
+    present one, anywhere."""
     known = Poses.join(
         [*_approaches(ends, goal.entry, stand), _folded_poses(terrain.linkage, stand)]
     )
@@ -216,7 +224,8 @@ def _random_poses(linkage: Linkage, stand: ArmStand, count: int, draw: Generator
 
 
 def _nearby_poses(linkage: Linkage, stand: ArmStand, count: int, draw: Generator) -> Poses:
-    """Draw poses near the present one: where it is narrow, the path out begins with small movements."""
+    """Draw poses near the present one: where it is narrow, the path out begins with small
+    movements."""
     now = linkage.now
     wrists = now.wrists + draw.normal(scale=_AROUND, size=(count, 3))
     bases = np.clip(now.bases + draw.normal(scale=2 * _AROUND, size=count), stand.low, stand.high)

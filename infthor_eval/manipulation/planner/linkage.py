@@ -1,6 +1,7 @@
 """Forward kinematics of an arm: where its parts and the held object would be in other poses.
 
-Lengths and offsets are measured in the present pose, as the simulators' metadata have joints but no dimensions.
+Lengths and offsets are measured in the present pose, as the simulators' metadata have joints but no
+dimensions.
 """
 
 import math
@@ -17,7 +18,8 @@ __all__ = ["Array", "Linkage", "Parts", "Poses", "angles_of", "heading", "rotati
 Array = NDArray[np.float64]
 _UP: Array = np.array([0.0, 1.0, 0.0])
 _THICK = 0.045  # metres: half the thickness of links and palm, a little more than the actual one
-_STRETCHED = 0.995  # share of the arm's length that is used: the elbow of a fully stretched arm has no defined side
+# share of the arm's length that is used: the elbow of a fully stretched arm has no defined side
+_STRETCHED = 0.995
 _TINY = 1e-6
 
 
@@ -25,11 +27,12 @@ _TINY = 1e-6
 class Poses:
     """Poses (n) of an arm.
 
-    They are in coordinates that each of AI2-THOR's movements changes one of: `MoveArmBase` carries the wrist along, so
-    its height is relative to the base.
+    They are in coordinates that each of AI2-THOR's movements changes one of: `MoveArmBase` carries
+    the wrist along, so its height is relative to the base.
 
     Attributes:
-        wrists: positions of the wrist, metres of the world (n, 3), but with the height above the arm's base.
+        wrists: positions of the wrist, metres of the world (n, 3), but with the height above the
+            arm's base.
         bases: heights of the base in the world, metres (n,).
         turns: rotations of the hand in the world (n, 3, 3).
     """
@@ -77,8 +80,10 @@ class Linkage:
 
     Attributes:
         now: the pose that it was measured in (1).
-        shoulder: position of the shoulder in the world, with the height above the base, metres (3,).
-        lever: vector from the wrist to the middle of the held object, in the frame of the hand, metres (3,).
+        shoulder: position of the shoulder in the world, with the height above the base, metres
+            (3,).
+        lever: vector from the wrist to the middle of the held object, in the frame of the hand,
+            metres (3,).
     """
 
     now: Poses
@@ -92,9 +97,11 @@ class Linkage:
         """Measure an arm and the object that it holds.
 
         Args:
-            held: the held object; its box is along the world's axes, so it grows when the hand is tilted.
-            before: measurements in another pose, whose shapes are taken over. Those of the first pose are the best: the
-                arm is bent, which tells the side of the elbow, and the hand is level, so the object's box is tight.
+            held: the held object; its box is along the world's axes, so it grows when the hand is
+                tilted.
+            before: measurements in another pose, whose shapes are taken over. Those of the first
+                pose are the best: the arm is bent, which tells the side of the elbow, and the hand
+                is level, so the object's box is tight.
         """
         base, shoulder, elbow, wrist = (np.array(point_of(joint.position)) for joint in arm.joints)
         self.shoulder: Array = shoulder - base[1] * _UP
@@ -157,7 +164,8 @@ class Linkage:
         return Parts(*joined)
 
     def _elbows(self, wrists: Array) -> Array:
-        """Return the elbows (n, 3) of wrists (n, 3): the circle on which both links meet, on the measured side."""
+        """Return the elbows (n, 3) of wrists (n, 3): the circle on which both links meet, on the
+        measured side."""
         line = wrists - self.shoulder
         far = np.clip(np.linalg.norm(line, axis=1), _TINY, sum(self._lengths))
         upper, fore = self._lengths
@@ -182,7 +190,8 @@ def _normals(lines: Array) -> tuple[Array, Array]:
 
 
 def _elbow_side(upper: Array, line: Array) -> tuple[float, float]:
-    """Return the direction of an elbow from the line between shoulder and wrist: its share upwards and to the side."""
+    """Return the direction of an elbow from the line between shoulder and wrist: its share upwards
+    and to the side."""
     over, aside = _normals(line[None])
     out = float(over[0] @ upper), float(aside[0] @ upper)
     length = math.hypot(*out)
@@ -205,7 +214,8 @@ def _matrix(rotation: AxisAngle) -> Array:
 
 
 def rotations_about(axis: Array, angles: Array) -> Array:
-    """Return rotations (n, 3, 3) about a unit axis by angles (n,) in radians, by Rodrigues' formula."""
+    """Return rotations (n, 3, 3) about a unit axis by angles (n,) in radians, by Rodrigues'
+    formula."""
     skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
     rotations: Array = (
         np.eye(3)
@@ -216,12 +226,14 @@ def rotations_about(axis: Array, angles: Array) -> Array:
 
 
 def heading(yaws: Array, pitches: Array) -> Array:
-    """Return rotations (n, 3, 3) of hands that point to a yaw (n,) and down by a pitch (n,), radians."""
+    """Return rotations (n, 3, 3) of hands that point to a yaw (n,) and down by a pitch (n,),
+    radians."""
     return rotations_about(_UP, yaws) @ rotations_about(np.array([1.0, 0.0, 0.0]), pitches)
 
 
 def angles_of(turn: Array) -> tuple[float, float, float]:
-    """Return pitch, yaw and roll in degrees, as `RotateWristRelative` takes them, of a rotation (3, 3)."""
+    """Return pitch, yaw and roll in degrees, as `RotateWristRelative` takes them, of a rotation (3,
+    3)."""
     pitch = math.asin(float(np.clip(-turn[1, 2], -1.0, 1.0)))
     yaw = math.atan2(turn[0, 2], turn[2, 2])
     roll = math.atan2(turn[1, 0], turn[1, 1])

@@ -57,10 +57,12 @@ def obstacles_of(boxes: Iterable[tuple[str, Corners]]) -> Obstacles:
 
 
 def clearances(parts: Parts, obstacles: Obstacles) -> Array:
-    """Return how far (n, m, things) parts (n, m) are from things, metres; negative values are depths of overlap.
+    """Return how far (n, m, things) parts (n, m) are from things, metres; negative values are
+    depths of overlap.
 
-    Things that are far from all parts are at infinity. This is the separating axis test without the directions at right
-    angles to two edges: that saves nine of fifteen axes, and edges that pass each other closely count as a collision.
+    Things that are far from all parts are at infinity. This is the separating axis test without the
+    directions at right angles to two edges: that saves nine of fifteen axes, and edges that pass
+    each other closely count as a collision.
     """
     things = obstacles.things()
     clearance = np.full(
@@ -80,7 +82,8 @@ def clearances(parts: Parts, obstacles: Obstacles) -> Array:
 
 
 def _separations(parts: Parts, extent: Array, center: Array, half: Array) -> Array:
-    """Return separations (n, m, k) of oriented boxes (n, m), with extents (n, m, 3), from boxes along the axes (k)."""
+    """Return separations (n, m, k) of oriented boxes (n, m), with extents (n, m, 3), from boxes
+    along the axes (k)."""
     between = center - parts.center[:, :, None]
     along_world = (np.abs(between) - half - extent[:, :, None]).max(axis=-1)
     turned = parts.axes.transpose(0, 1, 3, 2)
@@ -90,7 +93,8 @@ def _separations(parts: Parts, extent: Array, center: Array, half: Array) -> Arr
 
 
 def columns(item: ThorObject, places: Places) -> list[Corners]:
-    """Return boxes below the places of a piece of furniture; its own box may be partly empty, as a corner counter's."""
+    """Return boxes below the places of a piece of furniture; its own box may be partly empty, as a
+    corner counter's."""
     box = corners_of(item)
     boxes = []
     for height in places.heights:
@@ -108,7 +112,8 @@ _Span = tuple[float, float]
 def _rectangles(points: Array, spacing: float) -> list[tuple[_Span, _Span]]:
     """Return rectangles, by their lowest and highest x and z, around lattices of points (n, 3).
 
-    Adjacent rows of equal length are one rectangle. A lattice that is not along the axes gets a single one.
+    Adjacent rows of equal length are one rectangle. A lattice that is not along the axes gets a
+    single one.
     """
     rows: dict[float, list[float]] = {}
     for x, _, z in np.round(points, 3).tolist():
@@ -159,11 +164,12 @@ def _runs(values: Sequence[float], spacing: float) -> list[_Span]:
 
 
 def cavity(item: ThorObject, places: Places, entry: Entry, hinge: int) -> list[Corners]:
-    """Return boxes of a receptacle that is entered from the front: sides, back, top, boards, and its open door.
+    """Return boxes of a receptacle that is entered from the front: sides, back, top, boards, and
+    its open door.
 
     Args:
-        hinge: edge of the opening that the door hangs on: -1 for the one of lower coordinate, 1 for the other, 0 for no
-            door.
+        hinge: edge of the opening that the door hangs on: -1 for the one of lower coordinate, 1 for
+            the other, 0 for no door.
     """
     box, half = corners_of(item), places.spacing / 2
     axis, across = entry.axis, 2 - entry.axis
@@ -192,7 +198,8 @@ def _slab(inner: Corners, axis: int, side: int, thick: float) -> Corners:
 
 
 def _leaf(inner: Corners, entry: Entry, hinge: int, end: float) -> list[Corners]:
-    """Return an open door in pieces, the outer ones more over the opening: doors stop short of a right angle."""
+    """Return an open door in pieces, the outer ones more over the opening: doors stop short of a
+    right angle."""
     across = 2 - entry.axis
     width = inner.high[across] - inner.low[across]
     edge = (inner.high if hinge > 0 else inner.low)[across]

@@ -1,4 +1,5 @@
-"""Places in or on a receptacle, and whether a held object would come to rest there if it was released."""
+"""Places in or on a receptacle, and whether a held object would come to rest there if it was
+released."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -79,7 +80,8 @@ class Places:
         return height < self.heights[-1] - _LEVEL or (self.entered and self.top > height + _THIN)
 
     def ceiling(self, height: float) -> float:
-        """Return the height of the ceiling over a board: the next board, or the receptacle's top."""
+        """Return the height of the ceiling over a board: the next board, or the receptacle's
+        top."""
         above = [other for other in self.heights if other > height + _LEVEL]
         return above[0] if above else self.top
 
@@ -133,8 +135,9 @@ def is_entered(item: ThorObject) -> bool:
 def entry_of(view: SimulatorView, item: ThorObject, places: Places) -> Entry | None:
     """Return the opening of a receptacle that is entered from the front; None for others.
 
-    The metadata have no direction of it. An open door extends the box on that side, so the box's middle is off the
-    places' middle towards the opening. A receptacle without a door is open towards the agent.
+    The metadata have no direction of it. An open door extends the box on that side, so the box's
+    middle is off the places' middle towards the opening. A receptacle without a door is open
+    towards the agent.
     """
     if not is_entered(item):
         return None
@@ -147,7 +150,8 @@ def entry_of(view: SimulatorView, item: ThorObject, places: Places) -> Entry | N
 
 
 def others_on(view: SimulatorView, item: ThorObject, held: str) -> list[ThorObject]:
-    """Return loose objects that may stand in or on a receptacle, except the held one and what the receptacle is in."""
+    """Return loose objects that may stand in or on a receptacle, except the held one and what the
+    receptacle is in."""
     around = {
         name
         for name, other in view.objects.items()
@@ -158,7 +162,8 @@ def others_on(view: SimulatorView, item: ThorObject, held: str) -> list[ThorObje
 
 
 def support(held: Parts, places: Places) -> Array:
-    """Return the share (n,) of held boxes (n, 1) that would be over a board below; 0 if the middle would not."""
+    """Return the share (n,) of held boxes (n, 1) that would be over a board below; 0 if the middle
+    would not."""
     corners = held.axes[:, 0].transpose(0, 2, 1)[:, None] @ (_CORNERS * held.half)[..., None]
     spots = (held.center + _SHRUNK * corners[..., 0])[:, :, [0, 2]]
     bottom = held.center[:, 0, 1] - (np.abs(held.axes[:, 0, :, 1]) * held.half[:, 0]).sum(axis=1)
@@ -181,11 +186,13 @@ _CORNERS: Array = np.array(
 
 
 def occupancy(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
-    """Return how much (n,) a place is occupied: 1 if the object's middle would fall on another, half if it would touch.
+    """Return how much (n,) a place is occupied: 1 if the object's middle would fall on another,
+    half if it would touch.
 
     Args:
         held: box of the held object in some poses (n, 1).
-        others: boxes of objects that may stand there, or be over it; one that begins below the places is not on them.
+        others: boxes of objects that may stand there, or be over it; one that begins below the
+            places is not on them.
     """
     if not others:
         return np.zeros(len(held.center))
@@ -206,7 +213,8 @@ def occupancy(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
 
 
 def firmness(held: Parts, places: Places) -> Array:
-    """Return how far (n,) the middle of the held object is from the edge of the boards: from 0, at the edge, to 1."""
+    """Return how far (n,) the middle of the held object is from the edge of the boards: from 0, at
+    the edge, to 1."""
     middles = held.center[:, 0]
     apart = np.abs(middles[:, None, [0, 2]] - places.points[None, :, [0, 2]])
     around = (np.linalg.norm(apart, axis=-1) <= _FIRM * places.spacing).sum(axis=1) / len(

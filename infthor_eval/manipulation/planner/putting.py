@@ -1,4 +1,5 @@
-"""Putting down a held object: paths to a place, and what collisions on them tell about the surroundings."""
+"""Putting down a held object: paths to a place, and what collisions on them tell about the
+surroundings."""
 
 from collections.abc import Iterator, Sequence
 
@@ -24,17 +25,20 @@ __all__ = ["put_steps"]
 
 _MAX_PATHS = 40  # after which it gives up
 _EXACT, _LEVEL = 0.015, 0.03  # metres, and entries of rotations, within which a pose is reached
-# Beliefs about obstacles, tried one after the other until there is a path, and the number of poses drawn for each. The
-# metadata's boxes are larger than the things, so with all of them there is often no path.
+# Beliefs about obstacles, tried one after the other until there is a path, and the number of poses
+# drawn for each. The metadata's boxes are larger than the things, so with all of them there is
+# often no path.
 _ATTEMPTS = (
-    (Belief.WHOLE, 200), (Belief.FILLED, 200), (Belief.COLLIDED, 200), (Belief.RECEPTACLE, 500), (Belief.NOTHING, 200)
+    (Belief.WHOLE, 200), (Belief.FILLED, 200), (Belief.COLLIDED, 200), (Belief.RECEPTACLE, 500),
+    (Belief.NOTHING, 200)
 )  # fmt: skip
 
 Steps = Iterator[Sequence[Call]]
 
 
 def put_steps(environment: ArmEnvironment) -> Steps:
-    """Yield steps that bring the held object over a place and release it there; after a collision, by another path."""
+    """Yield steps that bring the held object over a place and release it there; after a collision,
+    by another path."""
     task = _PutTask(environment)
     for _ in range(_MAX_PATHS):
         moves = task.moves()

@@ -1,4 +1,5 @@
-"""How an arm that knows where everything is moves its hand to an object, to pick it up or to put it down."""
+"""How an arm that knows where everything is moves its hand to an object, to pick it up or to put it
+down."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -25,7 +26,8 @@ Steps = Iterator[Sequence[Call]]
 
 
 def plan_steps(environment: ArmEnvironment) -> Steps:
-    """Yield steps up to the end of the present episode; each is planned after the one before was executed."""
+    """Yield steps up to the end of the present episode; each is planned after the one before was
+    executed."""
     return (
         _pick_up(environment)
         if environment.episode.kind == ManipulationKind.PICKUP
@@ -44,8 +46,8 @@ def _pick_up(environment: ArmEnvironment) -> Steps:
 def _approach(environment: ArmEnvironment, target: str) -> Iterator[Call]:
     """Yield movements of the hand to a target, from several heights of the arm's base.
 
-    At each height the hand is aimed and moved twice: what blocked the first movement may let the second one pass, as it
-    begins elsewhere.
+    At each height the hand is aimed and moved twice: what blocked the first movement may let the
+    second one pass, as it begins elsewhere.
     """
     for shift in _SHIFTS:
         goal = middle_of(environment.view.objects[target])
@@ -84,7 +86,8 @@ def _elevation(direction: Point) -> float:
 
 
 def _wrist_before(view: SimulatorView, goal: Point) -> Point:
-    """Return the position of the wrist for which the sphere's centre is at a goal, coming from where the wrist is."""
+    """Return the position of the wrist for which the sphere's centre is at a goal, coming from
+    where the wrist is."""
     arm = arm_of(view)
     wrist = point_of(arm.wrist)
     length = math.dist(wrist, point_of(arm.sphere_center))

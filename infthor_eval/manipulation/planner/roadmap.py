@@ -1,8 +1,9 @@
 """Path planning of an arm among obstacles, by a lazy probabilistic roadmap.
 
-Free poses are drawn at random, and each is joined to its nearest neighbours. The search takes the cheapest path by the
-costs of its edges and tests edges for collisions only on that path, as the tests are what takes the time. An edge that
-collides is removed, edges near the collision become dearer, and the search begins again.
+Free poses are drawn at random, and each is joined to its nearest neighbours. The search takes the
+cheapest path by the costs of its edges and tests edges for collisions only on that path, as the
+tests are what takes the time. An edge that collides is removed, edges near the collision become
+dearer, and the search begins again.
 """
 
 import heapq
@@ -65,7 +66,8 @@ class Contact:
 
 
 class MoveKind(IntEnum):
-    """Kinds of movement: of the base up or down, of the wrist in a straight line, of the hand about the wrist."""
+    """Kinds of movement: of the base up or down, of the wrist in a straight line, of the hand about
+    the wrist."""
 
     LIFT = 0
     REACH = 1
@@ -84,7 +86,8 @@ _Stretch = tuple[MoveKind, Poses]  # the kind of a movement and the poses (n) on
 
 
 class Terrain:
-    """Which movements are free for an arm (`linkage`, in its present pose), given its collisions so far."""
+    """Which movements are free for an arm (`linkage`, in its present pose), given its collisions so
+    far."""
 
     def __init__(
         self,
@@ -97,8 +100,8 @@ class Terrain:
         """Measure how near obstacles are in the present pose.
 
         Args:
-            escapes: whether a part that is deep in a thing may leave it through other parts of that thing, as the
-                embedded simulator allows; in Unity it is stuck.
+            escapes: whether a part that is deep in a thing may leave it through other parts of that
+                thing, as the embedded simulator allows; in Unity it is stuck.
         """
         self._deepest = -_STUCK if escapes else -np.inf
         self.linkage = linkage
@@ -108,7 +111,8 @@ class Terrain:
         self._start = self._from_contacts(linkage.now)
 
     def free(self, poses: Poses) -> NDArray[np.bool_]:
-        """Return whether poses (n,) are free of collisions; the arm may be as deep in a thing as it is now.
+        """Return whether poses (n,) are free of collisions; the arm may be as deep in a thing as it
+        is now.
 
         Boxes are larger than the things that they stand for, so the present pose may be in one.
         """
@@ -118,10 +122,12 @@ class Terrain:
         return clear & (self._from_contacts(poses) >= _NEAR).all(axis=1)
 
     def movements(self, start: Poses, end: Poses) -> tuple[list[ArmMove] | None, Poses]:
-        """Find movements from one pose (1) to another, at most one of each kind, in an order in which they are free.
+        """Find movements from one pose (1) to another, at most one of each kind, in an order in
+        which they are free.
 
         Returns:
-            The movements, None if there are none; then also the first colliding poses (n) of each order.
+            The movements, None if there are none; then also the first colliding poses (n) of each
+            order.
         """
         sizes = _sizes(start, end)[:, 0]
         if sizes[MoveKind.TURN] > _MAX_TURN:
@@ -145,9 +151,11 @@ class Terrain:
     def _promising_orders(
         self, orders: list[list[_Stretch]], *, leaving: bool
     ) -> tuple[list[list[_Stretch]], list[Poses]]:
-        """Return the orders of which a few poses are free, and the first colliding pose of each other order.
+        """Return the orders of which a few poses are free, and the first colliding pose of each
+        other order.
 
-        All orders are tested in one call, as numpy's overhead is a large share of the time for so few poses.
+        All orders are tested in one call, as numpy's overhead is a large share of the time for so
+        few poses.
         """
         glances = [
             Poses.join([stances[::-_GLANCE][::-1] for _, stances in moves]) for moves in orders
@@ -169,10 +177,11 @@ class Terrain:
         return promising, collisions
 
     def _first_collision(self, start: Poses, moves: list[Poses], *, leaving: bool) -> Poses | None:
-        """Return the first colliding pose (1) of movements, one after the other; None if they are free.
+        """Return the first colliding pose (1) of movements, one after the other; None if they are
+        free.
 
-        A part that touches a thing at the start of a movement may not get deeper into it. A part that is in a thing may
-        leave it through other parts of it, if escapes are allowed.
+        A part that touches a thing at the start of a movement may not get deeper into it. A part
+        that is in a thing may leave it through other parts of it, if escapes are allowed.
         """
         path = Poses.join([start, *moves])
         least = np.minimum(_NEAR, self._start - _SAME) if leaving else _NEAR
@@ -208,13 +217,15 @@ class Terrain:
 
 
 def _tolerance(clearance: Array) -> Array:
-    """Return how near parts may come to things, or how deep they may be in them, given their clearance at the start."""
+    """Return how near parts may come to things, or how deep they may be in them, given their
+    clearance at the start."""
     tolerated: Array = np.minimum(_MARGIN, clearance - _SAME)
     return tolerated
 
 
 def _moves(start: Poses, order: Sequence[MoveKind], spans: Sequence[Array]) -> Iterator[_Stretch]:
-    """Yield each movement of an order with the poses on its path (n); `spans` has what each kind changes, by step."""
+    """Yield each movement of an order with the poses on its path (n); `spans` has what each kind
+    changes, by step."""
     done = {MoveKind.LIFT: start.bases, MoveKind.REACH: start.wrists, MoveKind.TURN: start.turns}
     for kind in order:
         count = len(spans[kind])
@@ -225,7 +236,8 @@ def _moves(start: Poses, order: Sequence[MoveKind], spans: Sequence[Array]) -> I
 
 
 def _spans(start: Poses, end: Poses, sizes: Array) -> list[Array]:
-    """Return what each kind of movement (base, wrist, turn) changes from one pose (1) to another, step by step."""
+    """Return what each kind of movement (base, wrist, turn) changes from one pose (1) to another,
+    step by step."""
     shares = [
         np.linspace(0.0, 1.0, max(1, math.ceil(float(size) / step)) + 1)[1:]
         for size, step in zip(sizes, (_STEP, _STEP, _ANGLE), strict=True)
@@ -236,7 +248,8 @@ def _spans(start: Poses, end: Poses, sizes: Array) -> list[Array]:
 
 
 def _sizes(start: Poses, end: Poses) -> Array:
-    """Return how far (3, n) poses are from others: metres of the base, metres of the wrist, radians."""
+    """Return how far (3, n) poses are from others: metres of the base, metres of the wrist,
+    radians."""
     cosine = (np.einsum("nij,nij->n", start.turns, end.turns) - 1.0) / 2.0
     return np.stack([
         np.abs(end.bases - start.bases), np.linalg.norm(end.wrists - start.wrists, axis=1),
@@ -259,7 +272,8 @@ class Roadmap:
     """Free poses, and the costs of moving from one to another."""
 
     def __init__(self, terrain: Terrain, others: Poses, ends: Poses, costs: Array) -> None:
-        """Collect the poses that may be passed (n), and those to reach (m) with their costs (m,)."""
+        """Collect the poses that may be passed (n), and those to reach (m) with their costs
+        (m,)."""
         self._terrain, self._costs = terrain, costs
         self._poses = Poses.join([terrain.linkage.now, ends, others])
         self._n_ends = len(ends)
@@ -274,7 +288,8 @@ class Roadmap:
         self._squared_lengths = np.maximum((self._edge_lines**2).sum(axis=1), _SAME)
 
     def _edge_costs(self) -> Array:
-        """Return the costs (n, n) of moving from each pose to each other; infinite if they are not joined."""
+        """Return the costs (n, n) of moving from each pose to each other; infinite if they are not
+        joined."""
         p = self._poses
         count = len(p)
         wide = np.linalg.norm(p.wrists[:, None] - p.wrists[None], axis=2)
@@ -329,7 +344,8 @@ class Roadmap:
             self._lengths[starts[near], ends[near]] += _HARD
 
     def _spots_of(self, poses: Poses) -> Array:
-        """Return the positions (n, 6) of the wrist and of the middle of the held object in poses, metres."""
+        """Return the positions (n, 6) of the wrist and of the middle of the held object in poses,
+        metres."""
         return np.concatenate(
             [poses.world(), self._terrain.linkage.held_box(poses).center[:, 0]], axis=1
         )
@@ -339,7 +355,8 @@ class Roadmap:
         return self._poses[index : index + 1] if index else self._terrain.linkage.now
 
     def _cheapest(self) -> list[int] | None:
-        """Return the cheapest path by the present costs, as indices of poses (Dijkstra's algorithm)."""
+        """Return the cheapest path by the present costs, as indices of poses (Dijkstra's
+        algorithm)."""
         best = np.full(len(self._poses), np.inf)
         best[0] = 0.0
         came: dict[int, int] = {}

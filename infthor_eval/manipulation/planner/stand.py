@@ -13,7 +13,8 @@ _RANGE = 0.451, 1.801  # metres: heights of the arm's base above the floor
 
 @dataclass(frozen=True)
 class ArmStand:
-    """Where an agent stands: the range of heights of its arm's base, metres, and its direction, radians."""
+    """Where an agent stands: the range of heights of its arm's base, metres, and its direction,
+    radians."""
 
     low: float
     high: float
@@ -21,7 +22,8 @@ class ArmStand:
 
     @classmethod
     def of(cls, agent: AgentPose) -> "ArmStand":
-        """Return the stand of an agent; AI2-THOR's agents with an arm are all of the same height."""
+        """Return the stand of an agent; AI2-THOR's agents with an arm are all of the same
+        height."""
         floor = agent.position.y - _FLOOR
         return cls(floor + _RANGE[0], floor + _RANGE[1], math.radians(agent.rotation))
 

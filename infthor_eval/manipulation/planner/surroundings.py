@@ -1,4 +1,5 @@
-"""The surroundings of an agent that is to put an object down, and beliefs about what in them is an obstacle."""
+"""The surroundings of an agent that is to put an object down, and beliefs about what in them is an
+obstacle."""
 
 import math
 from enum import IntEnum
@@ -40,7 +41,8 @@ _Boxes = list[tuple[str, Corners]]
 
 
 class Belief(IntEnum):
-    """Which boxes are believed to be obstacles: furniture is partly empty, which the metadata do not tell."""
+    """Which boxes are believed to be obstacles: furniture is partly empty, which the metadata do
+    not tell."""
 
     NOTHING = 0
     RECEPTACLE = 1  # the parts of the receptacle that the object is to be put into
@@ -58,7 +60,8 @@ class Surroundings:
     """
 
     def __init__(self, environment: ArmEnvironment, linkage: Linkage, floor: float) -> None:
-        """Collect the boxes around an environment that was reset to an episode; `floor` is a height in metres."""
+        """Collect the boxes around an environment that was reset to an episode; `floor` is a height
+        in metres."""
         self._environment, self._linkage = environment, linkage
         self._item = environment.view.objects[str(environment.start.receptacle_id)]
         self.places = places_of(environment, self._item)
@@ -80,7 +83,8 @@ class Surroundings:
         }
 
     def obstacles(self, belief: Belief) -> Obstacles:
-        """Return the obstacles of a belief, with the door on the side that collisions have refuted least often."""
+        """Return the obstacles of a belief, with the door on the side that collisions have refuted
+        least often."""
         if belief == Belief.NOTHING:
             return obstacles_of(())
         hinge = self._hinges[self._n_refuted.index(min(self._n_refuted))]
@@ -92,12 +96,14 @@ class Surroundings:
         return obstacles_of([*self._receptacle(hinge), *around])
 
     def others(self) -> list[Corners]:
-        """Return boxes that may be on the receptacle's places, or cover them: loose objects, and furniture nearby."""
+        """Return boxes that may be on the receptacle's places, or cover them: loose objects, and
+        furniture nearby."""
         loose = others_on(self._environment.view, self._item, self._environment.start.object_id)
         return [*map(corners_of, loose), *(box for _, box in self._around[Belief.FILLED])]
 
     def add_collision(self, parts: Parts, error: str) -> bool:
-        """Take a collision; one with the receptacle counts against each side of the door that does not explain it.
+        """Take a collision; one with the receptacle counts against each side of the door that does
+        not explain it.
 
         Args:
             parts: parts of the arm in the colliding pose (1).
@@ -141,7 +147,8 @@ class Surroundings:
         return around
 
     def _has_places_in(self, box: Corners) -> bool:
-        """Return whether a box has places of the receptacle, and so is partly empty: a shelf in a table's box."""
+        """Return whether a box has places of the receptacle, and so is partly empty: a shelf in a
+        table's box."""
         if self.places is None:
             return False
         points = self.places.points
@@ -158,7 +165,8 @@ class Surroundings:
         )
 
     def _boxes_of(self, item: ThorObject) -> list[Corners]:
-        """Return boxes of a piece of furniture without the room in an open cupboard, or below a counter."""
+        """Return boxes of a piece of furniture without the room in an open cupboard, or below a
+        counter."""
         hollow = item.is_open if is_entered(item) and item.openable else not item.openable
         places = places_of(self._environment, item) if item.receptacle and hollow else None
         if places is None:

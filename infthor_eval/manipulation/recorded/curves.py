@@ -1,7 +1,8 @@
-"""Cumulative reward along trajectories in which an arm does the expert's pick-ups and puts, from journals alone.
+"""Cumulative reward along trajectories in which an arm does the expert's pick-ups and puts, from
+journals alone.
 
-Every episode begins in the expert's own state, so after a failed one the next is independent of it. An episode's place
-is the expert's low-level action that it replaces.
+Every episode begins in the expert's own state, so after a failed one the next is independent of it.
+An episode's place is the expert's low-level action that it replaces.
 """
 
 from collections.abc import Sequence
@@ -27,10 +28,11 @@ _END = "at step"
 
 
 def arm_curves(runs: Sequence[ArmRun], tasks: str | None = None) -> RewardCurves:
-    """Compute the curves of runs (at least one) in tasks, separated by commas (None: all shared); see `compute_curves`.
+    """Compute the curves of runs (at least one) in tasks, separated by commas (None: all shared);
+    see `compute_curves`.
 
-    The mean is over the same trajectories in every facet, so that the curves of the kinds add up to that of both.
-    Episodes that a run excludes are left out of all of them.
+    The mean is over the same trajectories in every facet, so that the curves of the kinds add up to
+    that of both. Episodes that a run excludes are left out of all of them.
 
     Raises:
         UsageError: they share no task or several of a kind, or their successes earn differently.

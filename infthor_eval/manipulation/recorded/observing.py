@@ -1,4 +1,5 @@
-"""What replays show of an arm: the frame, and the arm with nearby objects in the agent's coordinates."""
+"""What replays show of an arm: the frame, and the arm with nearby objects in the agent's
+coordinates."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -26,7 +27,8 @@ class ArmObserver:
     """Observes one episode; all its pictures have the same bounds."""
 
     def __init__(self, begun: SimulatorView, hands: Iterable[Point], named: Sequence[str]) -> None:
-        """Set the bounds by the world at the start, the hand's sphere centres in the world, and named objects' ids."""
+        """Set the bounds by the world at the start, the hand's sphere centres in the world, and
+        named objects' ids."""
         self._agent, self._named = begun.agent, frozenset(named)
         self._path = [self._hand(begun)]
         points = [
@@ -46,7 +48,8 @@ class ArmObserver:
         self._low, self._high = _corner(points, min, -_MARGIN), _corner(points, max, _MARGIN)
 
     def observe(self, view: SimulatorView) -> ArmObservation:
-        """Return what is seen in the next view of the episode; raises DataError if the simulator sent no frame."""
+        """Return what is seen in the next view of the episode; raises DataError if the simulator
+        sent no frame."""
         if view.frame is None:
             raise DataError("the simulator sent no frame; use one that renders")
         arm, hand = arm_of(view), self._hand(view)
@@ -94,7 +97,8 @@ class ArmObserver:
         )
 
     def _place(self, point: Point) -> Place:
-        """Return a point of the world in the agent's coordinates; its rotation goes from +z towards +x."""
+        """Return a point of the world in the agent's coordinates; its rotation goes from +z towards
+        +x."""
         x, z = point[0] - self._agent.position.x, point[2] - self._agent.position.z
         turn = math.radians(self._agent.rotation)
         right = x * math.cos(turn) - z * math.sin(turn)

@@ -42,8 +42,8 @@ class SuccessByRadius:
 
     Attributes:
         lines: lines by kind, then in the order of the runs, the planner's last.
-        floor: share of pick-ups whose object is in the sphere at the start, by radius: successes without a movement.
-            Empty if there are no pick-ups.
+        floor: share of pick-ups whose object is in the sphere at the start, by radius: successes
+            without a movement. Empty if there are no pick-ups.
     """
 
     task: str
@@ -56,7 +56,8 @@ class SuccessByRadius:
 def success_by_radius(runs: Sequence[ArmRun], tasks: str | None = None) -> SuccessByRadius:
     """Compute the success of models by radius, on the episodes that all runs have.
 
-    Runs of one label are one model with several radii. Episodes that a run excludes are left out of all of them.
+    Runs of one label are one model with several radii. Episodes that a run excludes are left out of
+    all of them.
 
     Args:
         runs: at least one run.
@@ -87,7 +88,8 @@ def _lines(
         radii = models.setdefault(run.label, {})
         if radius in radii:
             raise UsageError(
-                f"two runs are called {run.label} and have a radius of {radius:g} m; leave one of them out"
+                f"two runs are called {run.label} and have a radius of {radius:g} m; leave one of "
+                "them out"
             )
         radii[radius] = run, _records_of(task, shared, number)
     lines = [_line(label, kind, radii) for label, radii in models.items()]
@@ -107,12 +109,14 @@ def _line(
             radius: [(float(r.failure is None and r.payload.done), r) for r in records]
             for radius, (_, records) in radii.items()
         }),
-        n_failed=sum(record.failure is not None for _, records in radii.values() for record in records),
+        n_failed=sum(record.failure is not None for _,
+                     records in radii.values() for record in records),
     )  # fmt: skip
 
 
 def _floor(task: str | None, runs: Sequence[ArmRun], shared: SharedUnits[ArmRecord]) -> Points:
-    """Return the share of pick-ups by radius that begin in the sphere, as the first run that acted recorded them."""
+    """Return the share of pick-ups by radius that begin in the sphere, as the first run that acted
+    recorded them."""
     if task is None:
         return ()
     radii: dict[float, dict[str, Record]] = {}
@@ -122,7 +126,8 @@ def _floor(task: str | None, runs: Sequence[ArmRun], shared: SharedUnits[ArmReco
             if record.failure is None:
                 episodes.setdefault(record.id, record)
     return _points({
-        radius: [(float(r.payload.starts_inside), r) for r in episodes.values()] for radius, episodes in radii.items()
+        radius: [(float(r.payload.starts_inside), r) for r in episodes.values()] for radius,
+        episodes in radii.items()
     })  # fmt: skip
 
 

@@ -98,7 +98,8 @@ class ArmFrame(EpisodeFrame[EpisodeTitle, ArmObservation]):
         requests: request of a policy, and the simulator's calls, a line each.
         actions: names of the calls, in order.
         refusals: messages of the simulator on calls that it refused in this step.
-        distance: metres from the centre of the hand's sphere to the target's box, as recorded; None if nobody acted.
+        distance: metres from the centre of the hand's sphere to the target's box, as recorded; None
+            if nobody acted.
         closest: smallest distance so far.
         n_collisions: collisions so far.
         reward: reward so far.

@@ -45,7 +45,8 @@ class RecordedEpisodes(RecordedTrajectory[ArmRun, ArmRecord]):
     """What a run recorded of an arm's episodes in one trajectory."""
 
     def at_actions(self, actions: Sequence[int]) -> list[Record]:
-        """Return the records of the episodes for some of the expert's actions; UsageError if the run lacks one."""
+        """Return the records of the episodes for some of the expert's actions; UsageError if the
+        run lacks one."""
         known = [record.payload.index for record in self.records]
         for action in actions:
             if action not in known:
@@ -86,7 +87,8 @@ def replay_episodes(
 
 
 class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
-    """Simulators in which recorded episodes are replayed. They are started for the first episode."""
+    """Simulators in which recorded episodes are replayed. They are started for the first
+    episode."""
 
     def __init__(
         self,
@@ -119,12 +121,14 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
         )
         if episode is None:
             raise DataError(
-                f"{self._trajectory.traj_id}: action {payload.index} is no pick-up or put; restore the journal"
+                f"{self._trajectory.traj_id}: action {payload.index} is no pick-up or put; restore "
+                "the journal"
             )
         settings = self._settings(record)
         start = self._expert_states.before(episode)
         environment = self._environment(settings)
-        # Calls are repeated as recorded, so nothing is converted; and frames are taken from the view.
+        # Calls are repeated as recorded, so nothing is converted; and frames are taken from the
+        # view.
         begun = environment.reset(episode, start, Conversion(), settings.grasp, NoFrames())
         return _EpisodeInReplay(environment, begun, payload)
 

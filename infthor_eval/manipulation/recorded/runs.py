@@ -43,7 +43,8 @@ class ArmRun(RecordedRun[ArmRecord, ArmTaskConfig]):
 
 
 def label_by_radius(runs: Sequence[ArmRun]) -> list[ArmRun]:
-    """Return the same runs, with the radius of the hand in their labels if it is not the same in all of them."""
+    """Return the same runs, with the radius of the hand in their labels if it is not the same in
+    all of them."""
     radii = [sorted({task.radius for task in run.config.tasks.values()}) for run in runs]
     if all(of_run == radii[0] for of_run in radii):
         return list(runs)
@@ -62,7 +63,8 @@ def task_kinds(runs: Sequence[ArmRun], tasks: Sequence[str]) -> dict[Manipulatio
 def shared_episodes(
     runs: Sequence[ArmRun], tasks: str | None, *, one_radius: bool = True
 ) -> SharedUnits[ArmRecord]:
-    """Find the episodes that all runs have: of one task of each kind, in trajectories that each run has in full.
+    """Find the episodes that all runs have: of one task of each kind, in trajectories that each run
+    has in full.
 
     Args:
         runs: at least one run.
@@ -70,7 +72,8 @@ def shared_episodes(
         one_radius: whether to note that the radius of the hand differs.
 
     Raises:
-        UsageError: they share no task, or several of a kind, or a success earns more in one run than in another.
+        UsageError: they share no task, or several of a kind, or a success earns more in one run
+            than in another.
         DataError: they share no trajectory, or one is not a run of manipulation.
     """
     chosen = shared_tasks(
@@ -99,7 +102,8 @@ def _require_same_rewards(runs: Sequence[ArmRun], tasks: Sequence[str]) -> None:
         for run, of_run in zip(runs, rewards, strict=True):
             if len(of_run | rewards[0]) > 1 and of_run and rewards[0]:
                 raise UsageError(
-                    f"{runs[0].label} and {run.label} earn different rewards in {name}; draw runs of the same task file"
+                    f"{runs[0].label} and {run.label} earn different rewards in {name}; draw runs "
+                    "of the same task file"
                 )
 
 
@@ -107,7 +111,10 @@ def _differences(runs: Sequence[ArmRun], tasks: Sequence[str], one_radius: bool)
     """Yield notes on how the settings of the runs differ."""
     radii = sorted({run.config.tasks[name].radius for run in runs for name in tasks})
     if len(radii) > 1 and one_radius:
-        yield f"the runs differ in the radius of the hand's sphere: {', '.join(f'{radius:g}' for radius in radii)} m"
+        yield (
+            "the runs differ in the radius of the hand's sphere: "
+            f"{', '.join(f'{radius:g}' for radius in radii)} m"
+        )
     for name in tasks:
         settings = [_settings(run.config.tasks[name]) for run in runs]
         for key in sorted({key for of_run in settings for key in of_run} - _COMPARED_ELSEWHERE):

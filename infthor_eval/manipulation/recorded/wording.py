@@ -13,7 +13,8 @@ _LEFT_OUT = {"action", "returnToStart"}
 
 
 def describe_request(step: ArmStep) -> Iterator[str]:
-    """Yield the request of a policy in centimetres and degrees, then the simulator's calls, a line each."""
+    """Yield the request of a policy in centimetres and degrees, then the simulator's calls, a line
+    each."""
     if step.delta is not None:
         x, y, z, roll, pitch, yaw, gripper = step.delta
         moved = ", ".join(

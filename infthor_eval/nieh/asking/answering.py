@@ -1,6 +1,8 @@
-"""Having questions answered, by a model through its conversation or by a baseline from the answer key.
+"""Having questions answered, by a model through its conversation or by a baseline from the answer
+key.
 
-This is the one way from a sample to its record, whoever drives it: our own run, or lm-eval as the host.
+This is the one way from a sample to its record, whoever drives it: our own run, or lm-eval as the
+host.
 """
 
 import time
@@ -78,7 +80,8 @@ class _UnitRequest:
         usage: Usage,
         session: Session[NiehAnswer],
     ) -> UnitRecord[NiehAnswer]:
-        """Return the record of a reply; a failed one, with the reply, if the task's own metrics fail on it."""
+        """Return the record of a reply; a failed one, with the reply, if the task's own metrics
+        fail on it."""
         scores, failure = {}, None
         thinking, answer = answer_of(reply)
         answer = self.prepared.cut(answer)
@@ -112,13 +115,16 @@ class Answerer(Protocol):
 
     @property
     def write(self) -> Write | None:
-        """What asks the model for texts for its memory; None if it has no memory, as it reads no context."""
+        """What asks the model for texts for its memory; None if it has no memory, as it reads no
+        context."""
 
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
-        """Return a context as the model is given it: films as images, unless it has a video input."""
+        """Return a context as the model is given it: films as images, unless it has a video
+        input."""
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
-        """Return the replies to units that share their decoding, and their context unless contexts are batched.
+        """Return the replies to units that share their decoding, and their context unless contexts
+        are batched.
 
         Raises:
             DataError: a frame cannot be read; nothing is answered then.
@@ -130,7 +136,8 @@ class Answerer(Protocol):
 
 
 class ModelAnswerer:
-    """A model with one conversation, so that units in the same context share what is encoded of it."""
+    """A model with one conversation, so that units in the same context share what is encoded of
+    it."""
 
     def __init__(self, model: Model, session: Session[NiehAnswer]) -> None:
         self.batch_size = model.capabilities.batch_size
@@ -210,8 +217,9 @@ def answer_units(
     """Yield the records of units on one trajectory.
 
     Those with one context are answered together, and all of them if the answerer batches contexts.
-    Neighbours share as long a prefix as there is, which a model's conversation encodes once; so do the repetitions of
-    a question. The order depends on the units alone, so it is the same when a run is resumed.
+    Neighbours share as long a prefix as there is, which a model's conversation encodes once; so do
+    the repetitions of a question. The order depends on the units alone, so it is the same when a
+    run is resumed.
     """
     requests = []
     for unit, recalled in _recall_all(units, prepared, answerer, session):
@@ -267,7 +275,8 @@ def _recall_all(
     answerer: Answerer,
     session: Session[NiehAnswer],
 ) -> list[tuple[NiehUnit, NiehUnit | Exception]]:
-    """Return each unit with what its memory recalled, or why that failed; as they are if there is nothing to recall."""
+    """Return each unit with what its memory recalled, or why that failed; as they are if there is
+    nothing to recall."""
     if answerer.write is None or not any(unit.sample.awaits_recall for unit in units):
         return [(unit, unit) for unit in units]
     recaller = Recaller(
@@ -295,7 +304,8 @@ def _recall(unit: NiehUnit, recaller: Recaller, prepared: PreparedTask) -> NiehU
 def _answer_in_batches(
     requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer]
 ) -> Iterator[UnitRecord[NiehAnswer]]:
-    # A batch has the same requests when a run is resumed, as replies can differ by rounding with those beside them.
+    # A batch has the same requests when a run is resumed, as replies can differ by rounding with
+    # those beside them.
     for batch in _batches(requests, answerer.batch_size):
         waiting = []
         for item in batch:
@@ -318,7 +328,8 @@ def _batches(requests: Sequence[_UnitRequest], size: int) -> Iterator[Sequence[_
 def _find_record(
     request: _UnitRequest, session: Session[NiehAnswer]
 ) -> UnitRecord[NiehAnswer] | None:
-    """Return the record of a unit that needs no answer: an earlier run has it, or a frame cannot be read."""
+    """Return the record of a unit that needs no answer: an earlier run has it, or a frame cannot be
+    read."""
     try:
         return session.find_record(request.unit, request.fingerprint)
     except DataError as error:

@@ -1,4 +1,5 @@
-"""What answers the questions of a run: a model through its conversation, or a baseline from the answer key."""
+"""What answers the questions of a run: a model through its conversation, or a baseline from the
+answer key."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
@@ -19,7 +20,8 @@ __all__ = ["AnsweringModel", "OpenAnswerer", "answering_model"]
 # Opens what answers the questions of one task on one trajectory, given the task's name.
 OpenAnswerer = Callable[[str, Session[NiehAnswer]], Answerer]
 
-# Baselines read no frames; contexts that are measured in tokens are cut for them as for Qwen2.5-VL (published count).
+# Baselines read no frames; contexts that are measured in tokens are cut for them as for Qwen2.5-VL
+# (published count).
 _BASELINE_TOKENS_PER_FRAME = 121
 
 
@@ -27,7 +29,8 @@ class AnsweringModel(Protocol):
     """A subject that answers questions: a model or a baseline.
 
     Attributes:
-        video_input: True if it is given films as videos, False if as images; None if it sees nothing.
+        video_input: True if it is given films as videos, False if as images; None if it sees
+            nothing.
     """
 
     video_input: bool | None
@@ -43,7 +46,8 @@ class AnsweringModel(Protocol):
         """Return the cost of a task in words, or None where it is not known."""
 
     def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
-        """Fit the subject to the answer key of each task, given a function that finds the key; models need no key."""
+        """Fit the subject to the answer key of each task, given a function that finds the key;
+        models need no key."""
 
 
 class _ConversationModel:
@@ -55,7 +59,8 @@ class _ConversationModel:
         tokens = self._model.tokens_per_frame(frame)
         if tokens is None:
             raise UsageError(
-                f"the context has a size in tokens, which {self._model.name} does not count; give --tokens-per-frame"
+                f"the context has a size in tokens, which {self._model.name} does not count; give "
+                "--tokens-per-frame"
             )
         return tokens
 

@@ -1,4 +1,5 @@
-"""Baselines that see no frame: the answer key itself, the best guess from the question alone, and chance."""
+"""Baselines that see no frame: the answer key itself, the best guess from the question alone, and
+chance."""
 
 import random
 from collections import Counter, defaultdict
@@ -27,7 +28,8 @@ Predict = Callable[[Sample], str]
 
 @runtime_checkable
 class Baseline(Subject, Protocol):
-    """A subject that answers from the answer key, without frames; the data's fingerprint covers the key."""
+    """A subject that answers from the answer key, without frames; the data's fingerprint covers the
+    key."""
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
         """Read the whole answer key of one task, and return a function that answers its samples."""
@@ -44,13 +46,15 @@ class Oracle(BaselineSubject):
 
 
 class Blind(BaselineSubject):
-    """The best guess from the question's words, learned on the other trajectories: the score without looking."""
+    """The best guess from the question's words, learned on the other trajectories: the score
+    without looking."""
 
     name = "blind"
     _chains: Callable[[Sample], list[Chain]] = staticmethod(chains_of_words)
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Guesser`; each file of a set is learned alone, as the published scripts ask one at a time."""
+        """See `Guesser`; each file of a set is learned alone, as the published scripts ask one at a
+        time."""
         by_file: dict[str, list[Sample]] = defaultdict(list)
         for sample in samples:
             by_file[sample.question.file].append(sample)
@@ -75,7 +79,8 @@ class Random(BaselineSubject):
         return {"baseline": self.name, "seed": self._seed}
 
     def fit(self, samples: Sequence[Sample]) -> Predict:
-        """See `Baseline`; a draw depends on the seed and the question alone, not on the order of asking."""
+        """See `Baseline`; a draw depends on the seed and the question alone, not on the order of
+        asking."""
         seen: dict[str, Counter[str]] = defaultdict(Counter)
         for question in {sample.question.id: sample.question for sample in samples}.values():
             seen[question_type(question)][doc_target(question)] += 1
@@ -95,7 +100,8 @@ def _counts(seen: Mapping[str, Counter[str]], question: Question) -> Counter[str
     asked = question_type(question)
     if asked not in seen:
         raise ModelError(
-            f"no question of type {asked!r} was in the answer key; fit the baseline to the whole key"
+            f"no question of type {asked!r} was in the answer key; fit the baseline to the whole "
+            "key"
         )
     return seen[asked]
 

@@ -41,7 +41,10 @@ class Budget:
         limit += (
             "" if self.limit_before is None else f", {self.limit_before:,} before its extension"
         )
-        return f"{self.n_contexts} contexts, the longest request {self.longest:,} tokens ({limit}): {self._outcome}"
+        return (
+            f"{self.n_contexts} contexts, the longest request {self.longest:,} tokens ({limit}): "
+            f"{self._outcome}"
+        )
 
     @property
     def _outcome(self) -> str:
@@ -59,7 +62,8 @@ class Budget:
 def budget_of(prepared: PreparedTask, model: Model) -> Budget:
     """Count the tokens of a task's requests as the model's own processor does.
 
-    Questions in one context differ by a few words, so each context is counted once, with its longest question.
+    Questions in one context differ by a few words, so each context is counted once, with its
+    longest question.
 
     Raises:
         ModelError: the model can take none of the requests, whatever their length.

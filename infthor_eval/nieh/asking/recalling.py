@@ -1,7 +1,8 @@
 """Recalling what a memory shows of a trajectory, for each question on it.
 
-The memory observes the trajectory once, up to the step before the last, and recalls for every question. What it
-recalled is in the run's journal, so that a resumed run shows the same and needs no memory for it.
+The memory observes the trajectory once, up to the step before the last, and recalls for every
+question. What it recalled is in the run's journal, so that a resumed run shows the same and needs
+no memory for it.
 """
 
 import threading
@@ -42,7 +43,8 @@ _IN_USE = threading.Lock()  # memories are shared by a process, and serve one tr
 
 
 class _Built(NamedTuple):
-    """A memory that has observed a trajectory up to the step before the last: steps as it sees them, seconds taken."""
+    """A memory that has observed a trajectory up to the step before the last: steps as it sees
+    them, seconds taken."""
 
     traj_id: str
     settings: RecallSettings
@@ -52,7 +54,8 @@ class _Built(NamedTuple):
 
 
 class Recaller:
-    """Recalls for questions, trajectory by trajectory, while `in_use` reserves the memories of this process."""
+    """Recalls for questions, trajectory by trajectory, while `in_use` reserves the memories of this
+    process."""
 
     def __init__(
         self, task_samples: TaskSamples, write: Write | None, find: FindRecall, keep: KeepRecall
@@ -61,7 +64,8 @@ class Recaller:
 
         Args:
             task_samples: the samples.
-            write: asks the model under test; None if there is none, then memories that need one are refused.
+            write: asks the model under test; None if there is none, then memories that need one are
+                refused.
             find: finds an earlier recall.
             keep: keeps a new one.
         """
@@ -74,7 +78,8 @@ class Recaller:
 
     @contextmanager
     def in_use(self) -> Iterator[None]:
-        """Reserve the memories of this process within the context; what this has built is not used afterwards."""
+        """Reserve the memories of this process within the context; what this has built is not used
+        afterwards."""
         with _IN_USE:
             yield
             self._built = None
@@ -84,8 +89,8 @@ class Recaller:
 
         Raises:
             DataError: a frame or the trajectory's metadata cannot be read.
-            ModelError: the model under test cannot write what the memory asks for, or the memory recalls what it may
-                not: beyond its budget, or what it has not observed.
+            ModelError: the model under test cannot write what the memory asks for, or the memory
+                recalls what it may not: beyond its budget, or what it has not observed.
             UserCodeError: the memory fails.
         """
         settings, question = sample.recall, sample.question
@@ -179,7 +184,8 @@ def apply_recall(sample: Sample, recall: NiehRecall) -> Sample:
 
 
 def recall_all(task_samples: TaskSamples) -> list[Sample]:
-    """Return the samples of a task, with what their memory recalls, for models that are none of ours.
+    """Return the samples of a task, with what their memory recalls, for models that are none of
+    ours.
 
     Raises:
         UsageError: the memory asks the model under test, or recalling fails.
@@ -205,7 +211,8 @@ def recall_all(task_samples: TaskSamples) -> list[Sample]:
 
 
 def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:
-    """Return the steps as the memory may see them: the simulator's metadata only if it is privileged."""
+    """Return the steps as the memory may see them: the simulator's metadata only if it is
+    privileged."""
     return (
         list(steps)
         if memory.capabilities.privileged

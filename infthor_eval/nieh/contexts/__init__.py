@@ -50,7 +50,8 @@ CONTEXTS = {
     ),
     "text_state": Context(
         text_state.text_state,
-        intro="Answer the question given the description of the environment and the agent's state (the last image).",
+        intro="Answer the question given the description of the environment and the agent's state "
+        "(the last image).",
         parts=text_state.state_parts,
         sources=trajectories_identity,
     ),

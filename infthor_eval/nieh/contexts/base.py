@@ -75,9 +75,10 @@ class Sample:
         variant: variant of the context ("depth=0.4"); empty if there is only one.
         n_cut: number of frames that are cut off to keep the context's size.
         recall: how frames and texts are recalled; None if the context shows what it says.
-        recalled: what was recalled, positions of frames and texts in order; None before. `frames` are all frames
-            before, and then the recalled ones and the last.
-        fps: rate at which the frames are sampled from a film, per second, if they are shown as a video.
+        recalled: what was recalled, positions of frames and texts in order; None before. `frames`
+            are all frames before, and then the recalled ones and the last.
+        fps: rate at which the frames are sampled from a film, per second, if they are shown as a
+            video.
     """
 
     question: Question
@@ -132,7 +133,8 @@ class ContextSettings:
 
     @classmethod
     def read(cls, given: Mapping[str, Any], place: str = "dataset_kwargs") -> "ContextSettings":
-        """Return the settings in a mapping; other keys are ignored. `place` is its file and key, for messages.
+        """Return the settings in a mapping; other keys are ignored. `place` is its file and key,
+        for messages.
 
         Raises:
             UsageError: a value is not valid; the message has place, setting and valid values.
@@ -152,7 +154,8 @@ class ContextSettings:
         return cls(**values)
 
     def n_frames(self, k_tokens: int) -> int:
-        """Return the number of frames that fill the context, given the published tokens of its kilo-token.
+        """Return the number of frames that fill the context, given the published tokens of its
+        kilo-token.
 
         Raises:
             UsageError: the size, or the tokens of a frame, are not given.
@@ -163,7 +166,8 @@ class ContextSettings:
             )
         if not self.tokens_per_frame:
             raise UsageError(
-                "this context needs tokens_per_frame, the model's tokens of one frame, in the metadata"
+                "this context needs tokens_per_frame, the model's tokens of one frame, in the "
+                "metadata"
             )
         return int(self.ctx_size * (self.k_tokens or k_tokens)) // self.tokens_per_frame
 
@@ -190,23 +194,27 @@ class Context:
     """A context.
 
     Attributes:
-        samples: returns the samples of a question, one for each variant, or the reasons why it cannot be asked.
+        samples: returns the samples of a question, one for each variant, or the reasons why it
+            cannot be asked.
         needs_model: True if the frames depend on the model's tokens per frame.
-        intro: the sentence that says what the model sees; the published one where the context is published.
+        intro: the sentence that says what the model sees; the published one where the context is
+            published.
         text_intro: the sentence where texts were recalled.
         prompts: the prompts in which it can be asked.
         parts: returns what the model sees before that sentence, given the frames of a sample.
-        frames: returns the frames of a trajectory that the positions of a sample refer to, given its `fps`.
+        frames: returns the frames of a trajectory that the positions of a sample refer to, given
+            its `fps`.
         positions: returns where in the trajectory's time order the frames of a sample are.
-        sources: returns whatever the frames depend on besides the set's fingerprint and the settings, as JSON values.
+        sources: returns whatever the frames depend on besides the set's fingerprint and the
+            settings, as JSON values.
     """
 
     samples: Callable[[NiehSet, Question, ContextSettings], list[Sample | SkippedQuestion]]
     needs_model: bool = False
     intro: str = "Answer the question given the agent's views in time order."
     text_intro: str = (
-        "Answer the question given what was recalled of the agent's views, in time order, and its last view (the last "
-        "image)."
+        "Answer the question given what was recalled of the agent's views, in time order, and its "
+        "last view (the last image)."
     )
     prompts: tuple[str, ...] = (PUBLISHED_MAIN,)
     parts: Callable[[NiehSet, Sample, Sequence[FrameRef]], list[ContextPart]] = field(
@@ -226,7 +234,8 @@ class Context:
     def request(
         self, data: NiehSet, sample: Sample, prompt: str = PUBLISHED_MAIN
     ) -> tuple[list[ContextPart], str]:
-        """Return the request of a sample: the context, and the text with the question that follows it."""
+        """Return the request of a sample: the context, and the text with the question that follows
+        it."""
         parts = self.parts(data, sample, self.select_frames(data, sample))
         has_texts = any(isinstance(item, str) for item in sample.recalled or ())
         return parts, question_text(
@@ -241,7 +250,8 @@ def clue_positions(data: NiehSet, question: Question) -> tuple[int, ...]:
 
 
 def trajectories_identity(data: NiehSet, _settings: ContextSettings) -> dict[str, Any]:
-    """Return the hash of the trajectories' own files, which the set's fingerprint does not cover."""
+    """Return the hash of the trajectories' own files, which the set's fingerprint does not
+    cover."""
     ids = sorted({question.traj_id for question in data.questions})
     files = {traj_id: path for traj_id in ids if (path := data.outline_file(traj_id)) is not None}
     return {

@@ -1,13 +1,15 @@
 """The haystack: a window of a given size with the needle in it (published: `haystack`).
 
-Every question is asked once per depth, and reported there. One needle lies at depth d of the window of n frames when
-the window starts d_index * (n // 5) frames before it, d_index being the depth's place in the published grid 0, .2, .4,
-.6, .8. So do two that follow each other, a put. Needles that are apart have no depth: each time, other frames between
-and around them are drawn, from the run's seed (the published code has none). Three and more that follow each other
-lie at the last depth every time. As published, a window around several that follow each other may end one frame past
-the trajectory, and then has one frame less.
+Every question is asked once per depth, and reported there. One needle lies at depth d of the window
+of n frames when the window starts d_index * (n // 5) frames before it, d_index being the depth's
+place in the published grid 0, .2, .4, .6, .8. So do two that follow each other, a put. Needles that
+are apart have no depth: each time, other frames between and around them are drawn, from the run's
+seed (the published code has none). Three and more that follow each other lie at the last depth
+every time. As published, a window around several that follow each other may end one frame past the
+trajectory, and then has one frame less.
 
-A question without a needle (an absence) has no depth either: it is asked once, on a window drawn from the trajectory.
+A question without a needle (an absence) has no depth either: it is asked once, on a window drawn
+from the trajectory.
 """
 
 import random
@@ -57,7 +59,8 @@ def _window(
     if missing < 0:
         return "the clues do not fit the window"
     if clues[-1] - clues[0] == len(clues) - 1:  # they follow each other
-        # As published, the window of several clues may end one frame too late, and is then one frame shorter.
+        # As published, the window of several clues may end one frame too late, and is then one
+        # frame shorter.
         return _around(clues[0], n_all, n, d_index if len(clues) == 2 else _STEPS - 1, n_all + 1)
     pool = sampling_pool(clues, n_all, n)
     if missing > len(pool):
@@ -73,10 +76,11 @@ def _around(needle: int, n_all: int, n: int, d_index: int, last_end: int) -> tup
 
 
 def sampling_pool(clues: Sequence[int], n_all: int, n: int) -> list[int]:
-    """Return the frames from which a window around clues that are apart is drawn: those between them.
+    """Return the frames from which a window around clues that are apart is drawn: those between
+    them.
 
-    If these are too few, as many as are missing on either side too. As published, clues can be among these: a clue that
-    is drawn takes no second place, and the window is shorter.
+    If these are too few, as many as are missing on either side too. As published, clues can be
+    among these: a clue that is drawn takes no second place, and the window is shorter.
     """
     between = [place for place in range(clues[0] + 1, clues[-1]) if place not in clues]
     missing = n - len(clues)

@@ -41,7 +41,8 @@ def _layout(outline: Outline, frames_of: Mapping[int, tuple[int, ...]]) -> Itera
     for goal, span in outline.tasks:
         yield f"Your task goal: {goal}. "
         yield _STATE
-        # The frame from which the first action starts: the last one of those before it, or the first of all.
+        # The frame from which the first action starts: the last one of those before it, or the
+        # first of all.
         yield next(
             (
                 frames_of[number][-1]

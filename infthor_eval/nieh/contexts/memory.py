@@ -1,7 +1,7 @@
 """What a memory recalls of the trajectory, and the agent's current view.
 
-A memory is opened for a task's identity, but it recalls only when a question is asked: that can take long, and some ask
-the model under test (`infthor_eval.nieh.asking.recalling`).
+A memory is opened for a task's identity, but it recalls only when a question is asked: that can
+take long, and some ask the model under test (`infthor_eval.nieh.asking.recalling`).
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,8 @@ _OF_RETRIEVER = ("retriever", "retriever_revision")
 def memory(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on what a memory recalls of the frames before the last, and on that one, the agent's current view."""
+    """Ask on what a memory recalls of the frames before the last, and on that one, the agent's
+    current view."""
     return [
         Sample(question, tuple(range(len(data.frames(question.traj_id)))), recall=_recall(settings))
     ]
@@ -39,7 +40,8 @@ def memory_sources(_data: NiehSet, settings: ContextSettings) -> dict[str, Any]:
 
 
 def recalled_parts(_data: NiehSet, sample: Sample, frames: Sequence[FrameRef]) -> list[ContextPart]:
-    """Return what was recalled in its order, then the last frame; a mark in its place if nothing was recalled yet."""
+    """Return what was recalled in its order, then the last frame; a mark in its place if nothing
+    was recalled yet."""
     if sample.recalled is None:
         return [_UNRECALLED, *frames[-1:]]
     left = iter(frames)
@@ -56,7 +58,8 @@ def _recall(settings: ContextSettings) -> RecallSettings:
         value = getattr(settings, name)
         if value is not None and name in accepted_options(settings.memory):
             options.setdefault(name, value)
-    # Without a budget the size of a frame decides nothing, and recalls are the same for every model.
+    # Without a budget the size of a frame decides nothing, and recalls are the same for every
+    # model.
     size = settings.tokens_per_frame if settings.budget is not None else None
     return RecallSettings(
         settings.memory, tuple(sorted(options.items())), settings.budget, size, settings.seed

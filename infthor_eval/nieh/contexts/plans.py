@@ -1,4 +1,5 @@
-"""The whole trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, special tokens and frames."""
+"""The whole trajectory as agents are trained on it (`traj.txt`): goals, plans, actions, special
+tokens and frames."""
 
 from collections.abc import Sequence
 from itertools import zip_longest
@@ -19,7 +20,8 @@ _ACT = "<|act|>"  # the end of an action there
 def interleaved_plans(
     data: NiehSet, question: Question, _settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on goals, plans, frames and actions in time order; of several frames of an action, the last is shown."""
+    """Ask on goals, plans, frames and actions in time order; of several frames of an action, the
+    last is shown."""
     n_frames = len(data.frames(question.traj_id))
     done = _actions_before_marks(_sequence_text(data.folder(question.traj_id)))
     n_actions = max(done, default=0)
@@ -35,7 +37,8 @@ def interleaved_plans(
 
 
 def _actions_before_marks(text: str) -> list[int]:
-    """Return the number of actions before each frame mark. The frame after a goal shows the result of the last one."""
+    """Return the number of actions before each frame mark. The frame after a goal shows the result
+    of the last one."""
     done, n_actions = [], 0
     for before in text.split(_MARK)[:-1]:
         n_actions += before.rstrip().endswith(_ACT)

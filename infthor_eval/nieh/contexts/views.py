@@ -1,4 +1,5 @@
-"""Contexts that show frames of the trajectory without choosing by the needle: clues, whole, its end."""
+"""Contexts that show frames of the trajectory without choosing by the needle: clues, whole, its
+end."""
 
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
@@ -12,7 +13,8 @@ _K_TOKENS = 1024  # truncate_head's published kilo-token
 def clues(
     data: NiehSet, question: Question, _settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """Ask on the frames that are evidence alone, in time order whatever the file's (the paper's Table 4)."""
+    """Ask on the frames that are evidence alone, in time order whatever the file's (the paper's
+    Table 4)."""
     if not data.has_frames:  # baselines need no more than their number
         return [Sample(question, tuple(sorted(question.clues)))]
     order = {frame: position for position, frame in enumerate(data.frames(question.traj_id))}
@@ -29,7 +31,8 @@ def trajectory(
 def truncate_head(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
-    """The last frames that fit the context (published under the same name); clues before them are lost."""
+    """The last frames that fit the context (published under the same name); clues before them are
+    lost."""
     n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
     if n < 1:
         return [SkippedQuestion(question, "no frame fits the context")]

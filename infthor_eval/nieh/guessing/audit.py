@@ -82,7 +82,8 @@ class Group:
 
 
 def audit(data: NiehSet, scorer: Scorer = "strict") -> list[AuditedQuestion]:
-    """Return the questions of a set that can be asked, with the guessers' scores; a file is guessed at a time."""
+    """Return the questions of a set that can be asked, with the guessers' scores; a file is guessed
+    at a time."""
     return [
         AuditedQuestion(question, scores)
         for questions in questions_by_file(data).values()
@@ -104,7 +105,8 @@ BY: Mapping[str, Callable[[Question], str]] = {
 
 
 def groups(questions: Sequence[AuditedQuestion], by: str) -> list[Group]:
-    """Return the groups of some questions; all but whole files are split by file, in a set of several."""
+    """Return the groups of some questions; all but whole files are split by file, in a set of
+    several."""
     split: dict[str, list[AuditedQuestion]] = {}
     for item in questions:
         name, file = BY[by](item.question), item.question.file
@@ -125,9 +127,15 @@ def sentences(questions: Sequence[AuditedQuestion]) -> Iterator[str]:
             continue
         name, mean = group.best()
         if len(group.answers) == 1:
-            yield f"{group.name} ({len(group.questions)} questions): the answer is always {next(iter(group.answers))}."
+            yield (
+                f"{group.name} ({len(group.questions)} questions): the answer is always "
+                f"{next(iter(group.answers))}."
+            )
         elif mean > 0.9:
-            yield f"{group.name} ({len(group.questions)} questions): {name} gets {100 * mean:.1f} % without a frame."
+            yield (
+                f"{group.name} ({len(group.questions)} questions): {name} gets {100 * mean:.1f} % "
+                "without a frame."
+            )
     for group in groups(questions, "file"):
         name, mean = group.best()
         yield f"{group.name}: {100 * mean:.2f} % can be had without a frame ({name})."

@@ -1,4 +1,5 @@
-"""The audit of a set as tables: what guessers get by file, form, type and clues, and what runs get above it."""
+"""The audit of a set as tables: what guessers get by file, form, type and clues, and what runs get
+above it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -30,7 +31,10 @@ def guessers_table(questions: Sequence[AuditedQuestion]) -> Table:
         for place, guesser in enumerate(GUESSERS)
     ]
     columns = (Column("guesser", False), *(Column(group.name) for group in files))
-    note = "Each question is guessed from questions on other trajectories in its file; nobody sees a frame."
+    note = (
+        "Each question is guessed from questions on other trajectories in its file; nobody sees a "
+        "frame."
+    )
     return Table(
         "What can be guessed, % by guesser and file (strict scorer)", columns, tuple(rows), (note,)
     )
@@ -93,7 +97,8 @@ def balanced_table(balanced: Balanced) -> Table:
     )
     note = (
         f"Best guesser on the part: {balanced.best}, {100 * balanced.best_score:.1f} %; chance "
-        f"{100 * balanced.chance:.1f} %. In no form is a guesser more than {100 * MARGIN:.0f} points above chance."
+        f"{100 * balanced.chance:.1f} %. In no form is a guesser more than {100 * MARGIN:.0f} "
+        "points above chance."
     )
     columns = (Column("form of question", False), Column("kept"), Column("of"))
     return Table("The balanced part", columns, tuple(rows), (note,))

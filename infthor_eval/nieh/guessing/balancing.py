@@ -1,12 +1,15 @@
 """A large part of a set in which guessing without frames does not help.
 
-The algorithm is iterative pruning, as in the debiased sets of Brown et al. (arXiv:2511.04655). The part is one file, so
-all questions count as one file here. Chance is one over the number of answers that a form has in the part.
+The algorithm is iterative pruning, as in the debiased sets of Brown et al. (arXiv:2511.04655). The
+part is one file, so all questions count as one file here. Chance is one over the number of answers
+that a form has in the part.
 
-1. In each form the commonest answer is cut to chance and 3 points: of all ways to keep the k commonest answers, each up
-   to some number of questions, the one that keeps most. A form with one answer alone goes.
-2. All guessers guess what is left, each question from other trajectories. In each form where one of them is more than 3
-   points above chance, the questions that most guessers get right go, half as many as are too many; then step 1 again.
+1. In each form the commonest answer is cut to chance and 3 points: of all ways to keep the k
+   commonest answers, each up to some number of questions, the one that keeps most. A form with one
+   answer alone goes.
+2. All guessers guess what is left, each question from other trajectories. In each form where one of
+   them is more than 3 points above chance, the questions that most guessers get right go, half as
+   many as are too many; then step 1 again.
 3. It ends when no guesser is more than 3 points above chance in any form.
 
 It is greedy: a larger part may exist.
@@ -36,7 +39,8 @@ class Balanced:
         chance: mean over them of one over the number of answers of their form.
         best: name of the best guesser on them all.
         best_score: its mean score.
-        kept: number of questions that were kept, and that there were, by form and, in a set of several, file.
+        kept: number of questions that were kept, and that there were, by form and, in a set of
+            several, file.
     """
 
     questions: Sequence[Question]
@@ -47,7 +51,8 @@ class Balanced:
 
 
 def balance(questions: Sequence[Question]) -> Balanced:
-    """Return the balanced part of some questions; it may be empty. Of questions that are there twice it has one."""
+    """Return the balanced part of some questions; it may be empty. Of questions that are there
+    twice it has one."""
     before = Counter(map(_name, questions))
     different: dict[str, Question] = {}
     for question in questions:
@@ -102,7 +107,8 @@ def _cut_answers(questions: Sequence[Question]) -> list[Question]:
 
 
 def _best_cut(sizes: Sequence[int]) -> tuple[int, int]:
-    """Return how many of the commonest answers to keep, and up to how many questions of each; 0 answers for none.
+    """Return how many of the commonest answers to keep, and up to how many questions of each; 0
+    answers for none.
 
     Args:
         sizes: number of questions of each answer, descending.
@@ -126,7 +132,8 @@ def _guess(questions: Sequence[Question]) -> dict[str, tuple[float, ...]]:
 def _surplus(
     questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]
 ) -> dict[str, int]:
-    """Return half of what the best guesser of a form gets right beyond chance, if it is beyond the margin too."""
+    """Return half of what the best guesser of a form gets right beyond chance, if it is beyond the
+    margin too."""
     surplus = {}
     for form, group in _by_form(questions).items():
         chance = _chance(group)

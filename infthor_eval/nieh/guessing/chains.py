@@ -1,9 +1,10 @@
 """The best guess of an answer without frames.
 
-Answers are counted after contexts from the general to the particular ("how", "how many", "how many mugs"). Each is
-mixed with the one before it, and counts less the more different answers it has (Witten and Bell's interpolation). The
-evidence of several such chains is multiplied. Nothing is tuned, and nothing is drawn. Questions on a trajectory are
-guessed from the other trajectories alone, so that a right guess is no memory of the answer key.
+Answers are counted after contexts from the general to the particular ("how", "how many", "how many
+mugs"). Each is mixed with the one before it, and counts less the more different answers it has
+(Witten and Bell's interpolation). The evidence of several such chains is multiplied. Nothing is
+tuned, and nothing is drawn. Questions on a trajectory are guessed from the other trajectories
+alone, so that a right guess is no memory of the answer key.
 """
 
 import re
@@ -28,11 +29,13 @@ __all__ = [
 Chain = Sequence[Hashable]
 _STEM = 3  # leading words that tell the forms of questions apart
 _PLACE = 100  # frames that count as one place
-_DIGITS = 9  # of a log probability; what is beyond is rounding, which must not decide between equal answers
+# of a log probability; what is beyond is rounding, which must not decide between equal answers
+_DIGITS = 9
 
 
 def chains_of_words(sample: Sample) -> list[Chain]:
-    """Return chains of a question's words: the leading words, and each later word, alone and after the first two."""
+    """Return chains of a question's words: the leading words, and each later word, alone and after
+    the first two."""
     words = words_of(sample.question)
     later = sorted(set(words[2:]))
     leading = [("leading", *words[:n]) for n in range(1, len(words) + 1)]
@@ -46,7 +49,8 @@ def chains_of_words_and_count(sample: Sample) -> list[Chain]:
 
 
 def chains_of_words_and_place(sample: Sample) -> list[Chain]:
-    """Return the chains of words, and of the place of the last clue and the span of the clues after the stem."""
+    """Return the chains of words, and of the place of the last clue and the span of the clues after
+    the stem."""
     stem = words_of(sample.question)[:_STEM]
     first, last = sample.frames[0], sample.frames[-1]
     place, span = ("place", *stem, last // _PLACE), ("span", *stem, (last - first).bit_length())
@@ -59,7 +63,8 @@ def words_of(question: Question) -> list[str]:
 
 
 def held_out(samples: Sequence[Sample]) -> Callable[[Sample], str]:
-    """Return what a sample is left out with: its trajectory, or itself if all are on one trajectory."""
+    """Return what a sample is left out with: its trajectory, or itself if all are on one
+    trajectory."""
     is_alone = len({sample.question.traj_id for sample in samples}) == 1
     return lambda sample: sample.question.id if is_alone else sample.question.traj_id
 
@@ -68,7 +73,8 @@ class Guesser:
     """Guesses at samples from the answers to others."""
 
     def __init__(self, samples: Sequence[Sample], chains: Callable[[Sample], list[Chain]]) -> None:
-        """Count the answer key; if it is of one trajectory, each question is guessed from the others."""
+        """Count the answer key; if it is of one trajectory, each question is guessed from the
+        others."""
         self._chains = chains
         self._held_out = held_out(samples)
         self._answers = sorted({doc_target(sample.question) for sample in samples})
@@ -79,7 +85,8 @@ class Guesser:
             self._count(sample)
 
     def guess(self, sample: Sample) -> str:
-        """Return the likeliest answer (of equal ones, the first in the alphabet); empty if nothing was learned."""
+        """Return the likeliest answer (of equal ones, the first in the alphabet); empty if nothing
+        was learned."""
         group = self._held_out(sample)
         counts = self._vector(self._others((), group))
         if not counts.any():

@@ -9,7 +9,8 @@ _LEADING_WORDS = 2
 
 
 def form_of(question: Question) -> str:
-    """Return its form ("Is {} in/on {}?"), or what `question_type` returns if it has none of these."""
+    """Return its form ("Is {} in/on {}?"), or what `question_type` returns if it has none of
+    these."""
     form = find_form(question.text)
     return question_type(question) if form is None else form.words
 

@@ -1,4 +1,5 @@
-"""Guessers that see no frame, from what they know: each guesses the questions of a file from other trajectories."""
+"""Guessers that see no frame, from what they know: each guesses the questions of a file from other
+trajectories."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
@@ -38,7 +39,8 @@ class NamedGuesser:
     Attributes:
         name: its name in tables.
         knows: what it knows.
-        guess: returns a guess for each sample of a file (on the clue frames); an empty text for none.
+        guess: returns a guess for each sample of a file (on the clue frames); an empty text for
+            none.
     """
 
     name: str
@@ -47,7 +49,8 @@ class NamedGuesser:
 
 
 def _guess_constant(samples: Sequence[Sample], group_of: Callable[[Sample], str]) -> list[str]:
-    """Guess the commonest answer to questions of a group on other trajectories; the first in the alphabet of equals."""
+    """Guess the commonest answer to questions of a group on other trajectories; the first in the
+    alphabet of equals."""
     own_of = held_out(samples)
     everywhere: dict[str, Counter[str]] = defaultdict(Counter)
     own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)

@@ -36,7 +36,8 @@ _Scores = Sequence[Mapping[str, float]]  # by scorer, of each question
 def visible_knowledge(context: str) -> Knowledge:
     """Return what a model is told in a context of that name without looking at a frame.
 
-    On the clue frames alone their number is in the request; elsewhere it says nothing of the question.
+    On the clue frames alone their number is in the request; elsewhere it says nothing of the
+    question.
     """
     return Knowledge.WORDS | Knowledge.NUMBER if context == "clues" else Knowledge.WORDS
 
@@ -49,8 +50,9 @@ _LEARNING = (
 def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
     """Return by id of a question what can be guessed of it by guessers that know no more than that.
 
-    Of each file and form the guesser with the highest mean counts, for each scorer of its own; so the guess is rather
-    too good than too bad. They are kept in the user's cache, as learning takes seconds.
+    Of each file and form the guesser with the highest mean counts, for each scorer of its own; so
+    the guess is rather too good than too bad. They are kept in the user's cache, as learning takes
+    seconds.
     """
     with _LEARNING:
         return _find_guesses(data, knowledge)
@@ -71,7 +73,8 @@ def _find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
 
 
 def _key(data: NiehSet, knowledge: Knowledge) -> str:
-    """Return a hash of all that guesses depend on: the questions, and this code with its library."""
+    """Return a hash of all that guesses depend on: the questions, and this code with its
+    library."""
     code = digest_of_files(sorted(Path(infthor_eval.nieh.__file__).parent.rglob("*.py")))
     learner = {"knowledge": knowledge.value, "code": code, "library": version("scikit-learn")}
     return fingerprint(learner | {"questions": list(map(repr, data.questions))})
@@ -94,7 +97,8 @@ def _learn_guesses(data: NiehSet, knowledge: Knowledge) -> dict[str, Guess]:
 
 
 def questions_by_file(data: NiehSet) -> dict[str, list[Question]]:
-    """Return the questions that can be asked by the name of their file; empty if the set has one file alone."""
+    """Return the questions that can be asked by the name of their file; empty if the set has one
+    file alone."""
     by_file: dict[str, list[Question]] = {}
     for question in data.questions:
         by_file.setdefault(question.file, []).append(question)

@@ -1,8 +1,9 @@
-"""A strong guesser: logistic regression on the words of a question, and on the number and place of its clues.
+"""A strong guesser: logistic regression on the words of a question, and on the number and place of
+its clues.
 
-As in the stress test of test sets by Brown et al. (arXiv:2511.04655), it is trained on the questions alone, and guesses
-those of a tenth of the trajectories from the others. What it gets right is there to be exploited by any model that is
-tuned on such a set.
+As in the stress test of test sets by Brown et al. (arXiv:2511.04655), it is trained on the
+questions alone, and guesses those of a tenth of the trajectories from the others. What it gets
+right is there to be exploited by any model that is tuned on such a set.
 """
 
 from collections.abc import Sequence
@@ -19,12 +20,14 @@ __all__ = ["guess_by_learning"]
 
 _FOLDS = 10
 _PLACE = 100  # frames that count as one place
-# On the published files any strength from 1 to 10 gives the same within a point; nothing more is tuned.
+# On the published files any strength from 1 to 10 gives the same within a point; nothing more is
+# tuned.
 _INVERSE_PENALTY, _TOLERANCE, _ITERATIONS = 3.0, 1e-2, 1000
 
 
 def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -> list[str]:
-    """Return a guess for each sample, learned on other trajectories; empty texts if there is nothing to learn from.
+    """Return a guess for each sample, learned on other trajectories; empty texts if there is
+    nothing to learn from.
 
     Args:
         samples: samples on the clue frames.
@@ -45,7 +48,8 @@ def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -
     )
     answers = np.array([doc_target(sample.question) for sample in samples], dtype=object)
     guesses = np.empty(len(samples), dtype=object)
-    # These products are small: on a busy machine threads that wait for each other take ten times as long as one.
+    # These products are small: on a busy machine threads that wait for each other take ten times as
+    # long as one.
     with threadpool_limits(limits=1):
         for known, asked in GroupKFold(min(_FOLDS, n_groups)).split(features, answers, groups):
             if len(set(answers[known])) == 1:

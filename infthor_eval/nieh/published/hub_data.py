@@ -1,4 +1,5 @@
-"""The published NIEH data: downloading it from the Hugging Face hub, and the folder where it is kept."""
+"""The published NIEH data: downloading it from the Hugging Face hub, and the folder where it is
+kept."""
 
 from pathlib import Path
 
@@ -19,9 +20,11 @@ def default_folder() -> Path:
 
 
 def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = None) -> NiehSet:
-    """Download, unpack and check the published NIEH data; files that exist are not downloaded again.
+    """Download, unpack and check the published NIEH data; files that exist are not downloaded
+    again.
 
-    An interrupted download is resumed. The archive is deleted once it is unpacked and the set is checked.
+    An interrupted download is resumed. The archive is deleted once it is unpacked and the set is
+    checked.
 
     Args:
         folder: folder of the set.
@@ -38,7 +41,8 @@ def fetch_nieh(folder: Path, token: str | None = None, endpoint: str | None = No
     if not data.questions:
         reasons = "; ".join(reason for reason, _ in data.reasons().most_common(3))
         raise DataError(
-            f"{folder}: none of its questions can be asked ({reasons}); delete the folder and fetch again"
+            f"{folder}: none of its questions can be asked ({reasons}); delete the folder and "
+            "fetch again"
         )
     (folder / "metadata.tar").unlink(missing_ok=True)
     return data
@@ -64,13 +68,14 @@ def _download(folder: Path, token: str | None, endpoint: str | None) -> None:
         )
     except (GatedRepoError, RepositoryNotFoundError) as error:
         raise DataError(
-            f"{NIEH_REPOSITORY}: no access; request it on the hub's page, then log in with `hf auth login`"
+            f"{NIEH_REPOSITORY}: no access; request it on the hub's page, then log in with `hf "
+            "auth login`"
         ) from error
     except (LocalEntryNotFoundError, HfHubHTTPError, OSError) as error:
         cause = " ".join(str(error).split())[:120]
         raise DataError(
-            f"{NIEH_REPOSITORY}: cannot be fetched ({cause}); go online, or copy the set to {folder} "
-            "from a machine that has it"
+            f"{NIEH_REPOSITORY}: cannot be fetched ({cause}); go online, or copy the set to "
+            f"{folder} from a machine that has it"
         ) from error
     missing = [name for name in _FILES if not (folder / name).is_file()]
     if missing:

@@ -1,4 +1,5 @@
-"""Replies that others made, as runs: scored, with a journal and results like those of our own runs."""
+"""Replies that others made, as runs: scored, with a journal and results like those of our own
+runs."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -56,8 +57,9 @@ class ImportedRun:
     Attributes:
         model: name of the model.
         task: name of the task of ours that the mode is; "imported" if the log names none.
-        settings: settings of the task's context, as `dataset_kwargs` of a task file has them; of published logs with
-            the prompt that they were asked with, None if their counts of tokens do not tell.
+        settings: settings of the task's context, as `dataset_kwargs` of a task file has them; of
+            published logs with the prompt that they were asked with, None if their counts of tokens
+            do not tell.
         logs: the logs.
         records: a record per imported reply.
         refused: the rows that are not imported.
@@ -106,7 +108,8 @@ class ImportedRun:
 
 
 def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -> list[ImportedRun]:
-    """Return the runs that some logs hold: logs of one model in one mode, on different questions, are one run.
+    """Return the runs that some logs hold: logs of one model in one mode, on different questions,
+    are one run.
 
     Args:
         logs: files with replies (`infthor_eval.formats.reply_logs`).
@@ -114,7 +117,8 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
         model: name of the model; None for the one in the names of published logs.
 
     Raises:
-        UsageError: a log names no model and none is given, or no row of a log answers a question of the set.
+        UsageError: a log names no model and none is given, or no row of a log answers a question of
+            the set.
         DataError: a log cannot be read.
     """
     runs: dict[tuple[str, str, str], ImportedRun] = {}
@@ -143,7 +147,8 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
 
 
 def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
-    """Return the numbers of frames of trajectories, from published rows on whole ones or on their ends."""
+    """Return the numbers of frames of trajectories, from published rows on whole ones or on their
+    ends."""
     lengths: dict[str, int] = {}
     for reply in replies:
         n_frames = None
@@ -157,13 +162,15 @@ def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:
 
 
 def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, Any]]:
-    """Return task and context settings of a log, from its first row; a log that is not published names none."""
+    """Return task and context settings of a log, from its first row; a log that is not published
+    names none."""
     first = next((reply for reply in replies if reply.published), None)
     if first is None:
         return _OTHER[0], {"context": _OTHER[1]}
     if first.mode not in _MODES:
         raise UsageError(
-            f"{log}: the mode {first.mode!r:.40} is unknown; there are {', '.join(filter(None, _MODES))}"
+            f"{log}: the mode {first.mode!r:.40} is unknown; there are "
+            f"{', '.join(filter(None, _MODES))}"
         )
     task, context = _MODES[first.mode]
     if context == "truncate_head" and first.size:
@@ -178,7 +185,8 @@ def _mode_of(replies: Sequence[LoggedReply], log: Path) -> tuple[str, dict[str, 
 
 
 def _published_task(settings: Mapping[str, Any]) -> str | None:
-    """Return the task of ours that asks as a published row was made; None if there is none with these settings."""
+    """Return the task of ours that asks as a published row was made; None if there is none with
+    these settings."""
     tasks = [
         task
         for name, task in Catalog.find_packaged().tasks.items()
@@ -229,7 +237,8 @@ def _add_log(
     if len(run.records) == n_before:
         reasons = "; ".join(dict.fromkeys(item.reason for item in refused[:3])) or "it is empty"
         raise UsageError(
-            f"{log}: no row answers a question of this set ({reasons}); give the set that it is about"
+            f"{log}: no row answers a question of this set ({reasons}); give the set that it is "
+            "about"
         )
     run.logs.append(log)
     run.refused += refused
@@ -279,7 +288,8 @@ def _record(
 
 
 def _shown_clues(question: Question, reply: LoggedReply, n_frames: int | None) -> ShownClues | None:
-    """Return the clue frames that the model saw; None if the row does not tell, or if no frame is evidence."""
+    """Return the clue frames that the model saw; None if the row does not tell, or if no frame is
+    evidence."""
     clues = set(question.clues)
     is_whole = reply.published is not None and reply.mode in _WHOLE
     if question.absence or (reply.frames is None and not is_whole):

@@ -1,4 +1,5 @@
-"""The paper's Table 4 from the published question files: means of their columns `match1` to `match4`."""
+"""The paper's Table 4 from the published question files: means of their columns `match1` to
+`match4`."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -15,8 +16,8 @@ __all__ = ["derive_row", "table4"]
 
 _TITLE = "Table 4"
 _NOTES = (
-    "Columns count clue frames: 1 is the whole file of a single clue, 2 and >=3 are the file of several. The total has "
-    "all questions, also those of the second file with one clue frame.",
+    "Columns count clue frames: 1 is the whole file of a single clue, 2 and >=3 are the file of "
+    "several. The total has all questions, also those of the second file with one clue frame.",
     "95 %: interval of the total, clustered by trajectory.",
 )
 
@@ -59,7 +60,8 @@ def table4(data: NiehSet) -> Table:
 
 
 def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
-    """Return the mean of a row's scores by column, each from 0 to 1 (the published scorer can exceed 1).
+    """Return the mean of a row's scores by column, each from 0 to 1 (the published scorer can
+    exceed 1).
 
     Raises:
         DataError: a question lacks the score, or no question is in a column.
@@ -71,13 +73,15 @@ def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
     empty = next((name for name, questions in chosen.items() if not questions), None)
     if empty is not None:
         raise DataError(
-            f"{data.root}: no question for the column {empty}; give a folder with both published question files"
+            f"{data.root}: no question for the column {empty}; give a folder with both published "
+            "question files"
         )
     return {name: _mean(questions, row.match or "", data) for name, questions in chosen.items()}
 
 
 def _by_steps(data: NiehSet) -> list[str]:
-    """Return the questions of each column by the number of steps that their clue frames belong to ("2: 215, 3: 7")."""
+    """Return the questions of each column by the number of steps that their clue frames belong to
+    ("2: 215, 3: 7")."""
     cells = []
     for name in CLUE_COLUMNS[:-1]:
         chosen = [
@@ -96,7 +100,8 @@ def _mean(questions: Sequence[Question], match: str, data: NiehSet) -> MeanEstim
     if len(known) < len(scores):
         missing = questions[scores.index(None)].id
         raise DataError(
-            f"{data.root}: no {match} for question {missing}; give the published question files, with all columns"
+            f"{data.root}: no {match} for question {missing}; give the published question files, "
+            "with all columns"
         )
     return clustered_mean(known, [item.traj_id for item in questions])
 
@@ -107,11 +112,13 @@ def _mean_cell(estimate: MeanEstimate) -> TableCell:
 
 
 def _printed(row: PublishedRow, table: PublishedTable) -> tuple[list[str], list[str]]:
-    """Return the printed cells, those known to be wrong with a mark, and a note on each of these."""
+    """Return the printed cells, those known to be wrong with a mark, and a note on each of
+    these."""
     values = dict(zip(table.columns, row.values, strict=True))
     cells = [f"{values[name]:.2f}{'*' if name in row.misprints else ''}" for name in CLUE_COLUMNS]
     notes = [
-        f"*: {row.name}, column {name}: the paper prints {values[name]:.2f} for {right:.2f}; two digits are swapped."
+        f"*: {row.name}, column {name}: the paper prints {values[name]:.2f} for {right:.2f}; two "
+        "digits are swapped."
         for name, right in row.misprints.items()
     ]
     return cells, notes

@@ -1,11 +1,12 @@
-"""A judge: a model that is asked whether a reply is right where the rules are unsure, and how far it can be trusted.
+"""A judge: a model that is asked whether a reply is right where the rules are unsure, and how far
+it can be trusted.
 
-The metric `judged` is the strict score, or the judge's where the rules are unsure (`infthor_eval.nieh.rescoring.unsure`) and it
-gives more: 1 for a yes. A no leaves what the rules found: 0, or the share of several gold answers. So does a judge that
-gives no verdict.
+The metric `judged` is the strict score, or the judge's where the rules are unsure
+(`infthor_eval.nieh.rescoring.unsure`) and it gives more: 1 for a yes. A no leaves what the rules
+found: 0, or the share of several gold answers. So does a judge that gives no verdict.
 
-The judge is measured on replies of which the rules are sure: it should find the right ones right and the wrong ones
-wrong.
+The judge is measured on replies of which the rules are sure: it should find the right ones right
+and the wrong ones wrong.
 """
 
 import time
@@ -49,7 +50,8 @@ Track = Callable[[Sequence[Record]], Iterable[Record]]
 
 
 class Verdicts(msgspec.Struct, frozen=True, kw_only=True):
-    """A judge's verdicts on n replies: right, partly right, wrong, neither, or not asked as the request failed."""
+    """A judge's verdicts on n replies: right, partly right, wrong, neither, or not asked as the
+    request failed."""
 
     n: int
     n_right: int
@@ -74,7 +76,8 @@ class Agreement(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def share(self) -> float | None:
-        """Share of the sampled replies on which judge and rules agree, 0 to 1; None if it was asked about none."""
+        """Share of the sampled replies on which judge and rules agree, 0 to 1; None if it was asked
+        about none."""
         n = sum(sampled.n - sampled.n_not_asked for sampled in (self.right, self.wrong))
         return (self.right.n_right + self.wrong.n_wrong) / n if n else None
 
@@ -112,7 +115,8 @@ class Judge:
         seed: int,
         prompt: str = YES_NO,
     ) -> None:
-        """Take a model, its name for people, the identity of its adapter's code, and the limit of a verdict."""
+        """Take a model, its name for people, the identity of its adapter's code, and the limit of a
+        verdict."""
         self.name = name
         self.seed = seed
         self.prompt = prompt
@@ -148,7 +152,8 @@ class Judge:
         if not isinstance(model, Model):
             model.close()
             raise UsageError(
-                f"--judge {name}: cannot be asked, as it does not answer in words; give another model"
+                f"--judge {name}: cannot be asked, as it does not answer in words; give another "
+                "model"
             )
         return cls(model, label(name, options), code, max_new_tokens, seed, prompt)
 
@@ -162,7 +167,8 @@ class Judge:
         return {"label": self.name, **self._identity, **asked}
 
     def verdict(self, record: Record, session: Session[NiehAnswer]) -> float | None:
-        """Return the judge's score, 0 to 1, or None if it gives none; it is asked unless the session has its verdict.
+        """Return the judge's score, 0 to 1, or None if it gives none; it is asked unless the
+        session has its verdict.
 
         Raises:
             ModelError: the judge cannot be asked.
@@ -203,7 +209,8 @@ def judge_replies(
     """Judge the replies of a run.
 
     Args:
-        records: all records of the run, with today's strict scores; those without scores are left out.
+        records: all records of the run, with today's strict scores; those without scores are left
+            out.
         judge: the judge.
         session: the journal that has the verdicts.
         track: wraps the replies that the judge is asked about, to show its progress.
@@ -233,7 +240,8 @@ def judge_replies(
 def _sample(
     scored: Sequence[Record], unsure: set[UnitKey], seed: int
 ) -> tuple[list[Record], list[Record]]:
-    """Return replies to open-ended questions that are right, and that are plainly wrong, from all trajectories."""
+    """Return replies to open-ended questions that are right, and that are plainly wrong, from all
+    trajectories."""
     sure = [
         r
         for r in scored

@@ -1,7 +1,7 @@
 """The requests of a stored run, made again from its header and its set.
 
-A journal has the hash of each request, not the request. A request that was made again is returned only if it has that
-hash, so what is shown is what was sent.
+A journal has the hash of each request, not the request. A request that was made again is returned
+only if it has that hash, so what is shown is what was sent.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,5 @@
-"""What scoring replies again has changed, and how a judge agrees with the rules: `rescored.json`, and tables."""
+"""What scoring replies again has changed, and how a judge agrees with the rules: `rescored.json`,
+and tables."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -80,7 +81,8 @@ class RescoringReport(msgspec.Struct, frozen=True, kw_only=True):
 def find_changes(
     before: Mapping[UnitKey, Mapping[str, float]], records: Sequence[Record], names: Sequence[str]
 ) -> dict[str, Change]:
-    """Compare the scores of a task's records with those before, by unit: a change for each metric."""
+    """Compare the scores of a task's records with those before, by unit: a change for each
+    metric."""
     return {
         name: _change(before, [r for r in records if name in r.payload.scores], name)
         for name in names
@@ -112,7 +114,8 @@ def _mean(scores: Sequence[float]) -> float | None:
 
 
 def sources_of(config: Mapping[str, Any]) -> dict[str, str]:
-    """Return for each metric of a rescored run's config by whom it is, in words; {} for any other run."""
+    """Return for each metric of a rescored run's config by whom it is, in words; {} for any other
+    run."""
     if "rescored" not in config:
         return {}
     by: dict[str, str] = dict(
@@ -130,7 +133,8 @@ def sources_of(config: Mapping[str, Any]) -> dict[str, str]:
 
 
 def change_table(report: RescoringReport, sources: Mapping[str, str]) -> Table:
-    """Return the means today and in the journal, a row for each task and metric, with by whom a metric is."""
+    """Return the means today and in the journal, a row for each task and metric, with by whom a
+    metric is."""
     rows = [
         Row((task, *cells))
         for task, changes in report.tasks.items()
@@ -166,7 +170,8 @@ def _percent(share: float | None) -> str:
 
 
 def agreement_table(agreement: Agreement, judge: str) -> Table:
-    """Return what a judge of that name says: where the rules are unsure, and where they are sure."""
+    """Return what a judge of that name says: where the rules are unsure, and where they are
+    sure."""
     rows = (
         _verdicts_row("the rules are unsure of", agreement.unsure),
         _verdicts_row("are right by the rules (sample)", agreement.right),

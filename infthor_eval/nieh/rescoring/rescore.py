@@ -1,7 +1,7 @@
 """Scores of today's scorers over the replies in a run's journal, as a run of its own.
 
-The journal alone is needed: its records have the gold answers. So runs can be scored again whose model or set is no
-longer there, and runs of imported replies.
+The journal alone is needed: its records have the gold answers. So runs can be scored again whose
+model or set is no longer there, and runs of imported replies.
 """
 
 from collections.abc import Sequence
@@ -144,7 +144,8 @@ class Rescoring:
         return {"name": self.scorer.name, "metrics": list(self.own.names), **self.scorer.source}
 
     def _score(self, record: Record, session: Session[NiehAnswer]) -> Record:
-        """Return a record with today's scores by rule; failed without a reply, or if the own scorer fails on it."""
+        """Return a record with today's scores by rule; failed without a reply, or if the own scorer
+        fails on it."""
         today = msgspec.structs.replace(record, usage=NOTHING, attempt=1)
         if record.payload.reply is None:
             return today
@@ -189,7 +190,8 @@ def read_source(folder: Path) -> Source:
     header = read_header(folder)
     if header.suite != NiehSuite.name:
         raise UsageError(
-            f"{folder}: is a run of {header.suite}; give a run of {NiehSuite.name}, which has replies"
+            f"{folder}: is a run of {header.suite}; give a run of {NiehSuite.name}, which has "
+            "replies"
         )
     return Source(*read_run(folder, RECORDS))
 
@@ -197,7 +199,8 @@ def read_source(folder: Path) -> Source:
 def score_again(
     source: Source, scorer: OwnScorer | None = None, judge: Judge | None = None
 ) -> Rescoring:
-    """Set up a run with the scores of both scorers today, and of a scorer of one's own and a judge if there are any.
+    """Set up a run with the scores of both scorers today, and of a scorer of one's own and a judge
+    if there are any.
 
     Raises:
         UsageError: the own scorer calls a metric as one of ours is called.

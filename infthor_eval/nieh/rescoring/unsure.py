@@ -1,20 +1,23 @@
 """The replies of which the rules are unsure: neither right nor plainly wrong.
 
-The rules read words: they can tell that "Sofa" is not the SideTable, but not whether "the small table" is. A reply is
-unsure if
+The rules read words: they can tell that "Sofa" is not the SideTable, but not whether "the small
+table" is. A reply is unsure if
 
 * its question is open-ended: the first gold answer is a text other than yes and no,
 * it is not empty, and has less than full marks under `strict`, and
-* a piece of it is not accounted for. Pieces are what commas, semicolons, line ends and the word "and" separate.
+* a piece of it is not accounted for. Pieces are what commas, semicolons, line ends and the word
+  "and" separate.
 
 A piece is accounted for if it is
 
-* another known answer, word for word: a gold answer of other open-ended questions of this type in the run, but not of
-  this question. Case, blanks, marks and a beginning such as "on the" do not matter. Yes, no and a number in digits are
-  known too: they are never the answer to an open-ended question;
+* another known answer, word for word: a gold answer of other open-ended questions of this type in
+  the run, but not of this question. Case, blanks, marks and a beginning such as "on the" do not
+  matter. Yes, no and a number in digits are known too: they are never the answer to an open-ended
+  question;
 * or, where several answers are wanted, one of them under `strict`, which has counted it.
 
-Synonyms and near misses of other answers account for nothing: "on table" is a synonym of several of them.
+Synonyms and near misses of other answers account for nothing: "on table" is a synonym of several of
+them.
 """
 
 import re
@@ -37,7 +40,8 @@ _NEVER_OPEN_ENDED = re.compile(r"yes|no|\d+")
 
 
 class KnownAnswers:
-    """The gold answers of a run's open-ended questions by type, and the replies that they leave open."""
+    """The gold answers of a run's open-ended questions by type, and the replies that they leave
+    open."""
 
     def __init__(self, records: Sequence[Record]) -> None:
         """Take all records of a run, failed ones too: their questions have answers all the same."""
@@ -46,7 +50,8 @@ class KnownAnswers:
             self._names[record.payload.question_type].update(map(_name, record.payload.answers))
 
     def is_unsure(self, record: Record) -> bool:
-        """Return True if the rules are unsure of a reply that `strict` has scored; see the module for the rule."""
+        """Return True if the rules are unsure of a reply that `strict` has scored; see the module
+        for the rule."""
         payload = record.payload
         said = last_line(payload.reply or "")
         if not said or not is_open_ended(record) or payload.scores["strict"] >= 1.0:
@@ -65,6 +70,7 @@ def _is_accounted_for(piece: str, answers: Sequence[Answer], others: set[str]) -
 
 
 def _name(text: Answer) -> str:
-    """Return what an answer is known by: its letters alone, without a beginning such as "on the"."""
+    """Return what an answer is known by: its letters alone, without a beginning such as "on
+    the"."""
     words = " ".join(plain_form(str(text).lower()).split())
     return _BEGINNING.sub("", words).replace(" ", "")

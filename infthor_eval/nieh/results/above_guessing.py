@@ -1,8 +1,8 @@
 """The share of what could not be guessed that a run got: 0 for a guesser, 1 for all right.
 
-Of a form of questions with the score s and the guess g it is (s - g) / (1 - g); forms are pooled by their questions.
-That equals the mean over questions of (their score - their guess) / (1 - g), so it has intervals, and runs can be
-paired. A form that is in two files counts as two.
+Of a form of questions with the score s and the guess g it is (s - g) / (1 - g); forms are pooled by
+their questions. That equals the mean over questions of (their score - their guess) / (1 - g), so it
+has intervals, and runs can be paired. A form that is in two files counts as two.
 docs/reference/metrics.md says what it assumes.
 """
 
@@ -16,13 +16,15 @@ from infthor_eval.statistics import bootstrap_interval
 
 __all__ = ["SOLVED", "AboveGuessing", "FormScore", "above_guessing", "score_above_guessing"]
 
-# A form with a better guess counts as solved by guessing: what is left of it is a few questions, and a run that errs on
-# one of them more than the guesser would lose more than it could win on all others.
+# A form with a better guess counts as solved by guessing: what is left of it is a few questions,
+# and a run that errs on one of them more than the guesser would lose more than it could win on all
+# others.
 SOLVED = 0.95
 
 
 class FormScore(msgspec.Struct, frozen=True):
-    """The questions of a form: their number, the run's mean score, and the mean of the best guesser on them."""
+    """The questions of a form: their number, the run's mean score, and the mean of the best guesser
+    on them."""
 
     n: int
     score: float

@@ -1,4 +1,5 @@
-"""The form of replies, apart from whether they are right: a leaning to yes, and replies that are no answer at all."""
+"""The form of replies, apart from whether they are right: a leaning to yes, and replies that are no
+answer at all."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -29,7 +30,8 @@ class YesNo(msgspec.Struct, frozen=True):
 
 
 def yes_no(records: Sequence[Record]) -> YesNo:
-    """Return the bias on the yes/no questions among a task's: does a model always say yes, or neither?"""
+    """Return the bias on the yes/no questions among a task's: does a model always say yes, or
+    neither?"""
     asked = [record for record in records if _gold(record) in ({"yes"}, {"no"})]
     said = Counter(says_yes_or_no(last_line(record.payload.reply or "")) for record in asked)
     n = len(asked)
@@ -42,7 +44,8 @@ def yes_no(records: Sequence[Record]) -> YesNo:
 
 
 def format_failures(records: Sequence[Record], max_new_tokens: int | None) -> dict[str, int]:
-    """Count a task's replies that are not of the form asked for, by reason; one with two faults counts in both."""
+    """Count a task's replies that are not of the form asked for, by reason; one with two faults
+    counts in both."""
     counts: Counter[str] = Counter()
     for record in records:
         if record.payload.reply is not None:

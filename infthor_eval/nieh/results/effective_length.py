@@ -1,8 +1,10 @@
-"""The effective length of a model's context: the longest at which it keeps 85 % of its score on the clue frames.
+"""The effective length of a model's context: the longest at which it keeps 85 % of its score on the
+clue frames.
 
-The rule is NoLiMa's (Modarressi et al. 2025), with the model's own score on the clue frames alone as its base. It is
-applied to windows of growing size around the evidence (`nieh_haystack`), to the last frames (`nieh_truncate_head`) and
-to whole trajectories by their length (`nieh_full`); to plain scores and to those above guessing.
+The rule is NoLiMa's (Modarressi et al. 2025), with the model's own score on the clue frames alone
+as its base. It is applied to windows of growing size around the evidence (`nieh_haystack`), to the
+last frames (`nieh_truncate_head`) and to whole trajectories by their length (`nieh_full`); to plain
+scores and to those above guessing.
 """
 
 import math
@@ -42,7 +44,8 @@ class Series:
 
 
 def effective_lengths(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return a table with a row per model, kind of context and scorer; none without a run on the clue frames."""
+    """Return a table with a row per model, kind of context and scorer; none without a run on the
+    clue frames."""
     rows = []
     for series in find_series(runs):
         by_score = {point.length: point.score for point in series.points}
@@ -64,15 +67,17 @@ def effective_lengths(runs: Sequence[RunSummary]) -> list[Table]:
     names = ("base", "effective length", "base above guessing", "effective length above guessing")
     heads = [Column(name, False) for name in ("model", "context", "scorer")]
     note = (
-        f"Effective length: the longest context, in thousand tokens, up to which {KEPT:.0%} of the base, the score on "
-        "the clue frames alone, is kept. A row of whole trajectories has their lengths in bins."
+        f"Effective length: the longest context, in thousand tokens, up to which {KEPT:.0%} of the "
+        "base, the score on the clue frames alone, is kept. A row of whole trajectories has their "
+        "lengths in bins."
     )
     columns = (*heads, *map(Column, names), Column("scores by length", False))
     return [Table("Effective length of the context", columns, tuple(rows), (note,))]
 
 
 def effective_length(base: float | None, scores: Mapping[str, float | None]) -> str:
-    """Return the longest of some lengths, ascending, up to which the base is kept; `-` if there is no base above 0."""
+    """Return the longest of some lengths, ascending, up to which the base is kept; `-` if there is
+    no base above 0."""
     if base is None or base <= 0:
         return "-"
     lengths = [length for length, score in scores.items() if score is not None]
@@ -92,7 +97,8 @@ def _is_lost(score: float, base: float) -> bool:
 
 
 def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
-    """Yield the series of each model that has also been asked on the clue frames of the same set."""
+    """Yield the series of each model that has also been asked on the clue frames of the same
+    set."""
     by_subject: dict[str, list[tuple[RunSummary, str, TaskSummary]]] = {}
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
@@ -130,7 +136,8 @@ def _about(run: RunSummary, task: str) -> Mapping[str, object]:
 def _lengths(
     items: Sequence[tuple[RunSummary, str, TaskSummary]],
 ) -> dict[str, list[tuple[float, TaskSummary]]]:
-    """Return the tasks by kind of context, each with its size in thousand tokens (0: binned), ascending."""
+    """Return the tasks by kind of context, each with its size in thousand tokens (0: binned),
+    ascending."""
     chosen: dict[str, list[tuple[float, TaskSummary]]] = {}
     for run, name, task in items:
         config = run.header.config["tasks"][name]["config"]["dataset_kwargs"]

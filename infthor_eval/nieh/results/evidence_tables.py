@@ -1,4 +1,5 @@
-"""Tables on the evidence: was it among the shown frames, and how far from the end; and what was got above guessing."""
+"""Tables on the evidence: was it among the shown frames, and how far from the end; and what was got
+above guessing."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -21,9 +22,11 @@ _WITH_INTERVAL = "In brackets: 95 % interval, clustered by trajectory; in parent
 
 
 def evidence_tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the tables by share of the clue frames shown and by distance of the last clue, as far as they are known.
+    """Return the tables by share of the clue frames shown and by distance of the last clue, as far
+    as they are known.
 
-    A task that shows all evidence of all samples is not in the first, which would say nothing of it.
+    A task that shows all evidence of all samples is not in the first, which would say nothing of
+    it.
     """
     distances = _used(runs)
     shown = list(_rows(runs, lambda cells: cells.by_shown_clues, SHOWN_CLUES, _hides_evidence))
@@ -71,8 +74,8 @@ def above_guessing_notes(runs: Sequence[RunSummary]) -> list[str]:
         else ""
     )
     return [
-        "above guessing: % of what cannot be guessed that was got, 0 for the best guesser and 100 for all right, with "
-        f"its interval over resampled trajectories.{left_out}"
+        "above guessing: % of what cannot be guessed that was got, 0 for the best guesser and 100 "
+        f"for all right, with its interval over resampled trajectories.{left_out}"
     ]
 
 

@@ -26,7 +26,8 @@ class MemorySummary(msgspec.Struct, frozen=True):
         privileged: it is given what no agent can know.
         budget: most tokens of what is recalled; None for the memory's own limit.
         n_frames: recalled frames of a question.
-        n_tokens: tokens of a question with all that is shown, as the model counts them; None if it does not.
+        n_tokens: tokens of a question with all that is shown, as the model counts them; None if it
+            does not.
     """
 
     name: str
@@ -37,21 +38,24 @@ class MemorySummary(msgspec.Struct, frozen=True):
 
 
 class MemoryTimes(msgspec.Struct, frozen=True):
-    """Seconds of a task's memory: to observe a trajectory, and to recall for a question, both on average."""
+    """Seconds of a task's memory: to observe a trajectory, and to recall for a question, both on
+    average."""
 
     build_s: float
     recall_s: float
 
 
 def subject_of(label: str) -> str:
-    """Return the label of a run without its memory: "nano (budget=1k, seed=2)" is "nano (seed=2)"."""
+    """Return the label of a run without its memory: "nano (budget=1k, seed=2)" is "nano
+    (seed=2)"."""
     return _OF_MEMORY.sub("", label).replace("(, ", "(").replace(" ()", "")
 
 
 def summarise_memory(
     config: Mapping[str, Any], about: Mapping[str, Any], records: Sequence[Record]
 ) -> MemorySummary | None:
-    """Return the summary of a task's memory, given the run's config and the task's; None if it has none."""
+    """Return the summary of a task's memory, given the run's config and the task's; None if it has
+    none."""
     recalls = [record.payload.recall for record in records if record.payload.recall is not None]
     memory = about.get("sources", {}).get("memory")
     if memory is None or not recalls:

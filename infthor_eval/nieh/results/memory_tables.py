@@ -1,4 +1,5 @@
-"""The table of memories: what each got right, what it recalled of the evidence, and what that took."""
+"""The table of memories: what each got right, what it recalled of the evidence, and what that
+took."""
 
 from collections.abc import Iterator, Sequence
 
@@ -25,10 +26,12 @@ _NUMBERS = (
     "recall s",
 )
 _NOTES = (
-    "Accuracy in %, by the main scorer. all clues, some, none: accuracy where all, some and none of the clue frames "
-    "were recalled or are the current view; in parentheses: % of the questions that have evidence.",
-    "frames, tokens: of a question on average, the current view's tokens included. build s: seconds to observe a "
-    "trajectory; recall s: to recall for a question, notes that the model writes included.",
+    "Accuracy in %, by the main scorer. all clues, some, none: accuracy where all, some and none "
+    "of the clue frames were recalled or are the current view; in parentheses: % of the questions "
+    "that have evidence.",
+    "frames, tokens: of a question on average, the current view's tokens included. build s: "
+    "seconds to observe a trajectory; recall s: to recall for a question, notes that the model "
+    "writes included.",
     "* is given what no agent can know: the simulator's metadata, and the oracle the clues.",
 )
 
@@ -41,7 +44,8 @@ def memory_tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _rows(runs: Sequence[RunSummary]) -> Iterator[tuple[tuple[str | int, ...], Row]]:
-    """Yield rows with their place: by subject and task, the budgets of a memory below each other."""
+    """Yield rows with their place: by subject and task, the budgets of a memory below each
+    other."""
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():

@@ -1,8 +1,8 @@
 """Repeated answers: the mean of each question, and how far the answers of one question agree.
 
-Summaries are over questions, so a question that was asked N times counts once, with its mean scores. What a set of
-other trajectories would change and what another drawing would change are two things: the intervals of all tables are
-over trajectories, `drawing` is of the drawing alone.
+Summaries are over questions, so a question that was asked N times counts once, with its mean
+scores. What a set of other trajectories would change and what another drawing would change are two
+things: the intervals of all tables are over trajectories, `drawing` is of the drawing alone.
 """
 
 import math
@@ -32,14 +32,16 @@ class RepeatSummary(msgspec.Struct, frozen=True):
         n_repeats: times that each question was asked.
         n_questions: number of questions.
         mean: mean score of all answers.
-        drawing: half the width of the 95 % interval of the mean over other drawings of answers to the same questions.
+        drawing: half the width of the 95 % interval of the mean over other drawings of answers to
+            the same questions.
         consensus: mean score of each question's commonest answer, the first of equals.
         agreement: mean share of a question's answers that say the same as the commonest.
         always: share of the questions that every answer got right, with full marks.
         sometimes: share that some answers got right and others not.
         never: share that none got right.
         variance_within: mean variance of the scores of one question.
-        variance_between: variance of the questions' true means: that of the observed means without what drawing adds.
+        variance_between: variance of the questions' true means: that of the observed means without
+            what drawing adds.
     """
 
     n_repeats: int
@@ -56,12 +58,14 @@ class RepeatSummary(msgspec.Struct, frozen=True):
 
 
 def by_question(records: Sequence[Record]) -> list[list[Record]]:
-    """Return the records of each question in its variant, given records in the order of their keys."""
+    """Return the records of each question in its variant, given records in the order of their
+    keys."""
     return [list(same) for _, same in groupby(records, key=lambda record: record.key.once)]
 
 
 def mean_record(records: Sequence[Record]) -> Record:
-    """Return a record of one question's answers with their mean scores, and the first failure if there is any."""
+    """Return a record of one question's answers with their mean scores, and the first failure if
+    there is any."""
     if len(records) == 1:
         return records[0]
     names = {name for record in records for name in record.payload.scores}
@@ -104,7 +108,8 @@ def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> Rep
 
 
 def _vote(records: Sequence[Record], metric: str) -> tuple[float, float]:
-    """Return the score of the commonest answer, and the share of the answers that say it; failures say nothing."""
+    """Return the score of the commonest answer, and the share of the answers that say it; failures
+    say nothing."""
     replies = [record.payload.reply if record.failure is None else None for record in records]
     said = [None if reply is None else plain_form(last_line(reply)).casefold() for reply in replies]
     counts = Counter(text for text in said if text is not None)

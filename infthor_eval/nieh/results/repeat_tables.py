@@ -24,11 +24,12 @@ _NUMBERS = (
     "between",
 )
 _NOTES = (
-    "95 %: interval over other trajectories, with all that drawing adds. drawing: what the mean moves by if the same "
-    "questions are asked again (95 %). consensus: score of each question's commonest answer; agreement: share of its "
-    "answers that say it.",
-    "always, sometimes, never: questions with full marks in all, some, none of their answers. within, between: "
-    "standard deviation of the scores of one question, and of the questions' true means, in points.",
+    "95 %: interval over other trajectories, with all that drawing adds. drawing: what the mean "
+    "moves by if the same questions are asked again (95 %). consensus: score of each question's "
+    "commonest answer; agreement: share of its answers that say it.",
+    "always, sometimes, never: questions with full marks in all, some, none of their answers. "
+    "within, between: standard deviation of the scores of one question, and of the questions' true "
+    "means, in points.",
 )
 
 

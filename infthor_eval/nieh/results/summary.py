@@ -1,7 +1,7 @@
 """The summary of a run of NIEH: a pure function of its journal.
 
-Cache hits are not in it: they differ between a run and the same run resumed. What a memory took is a field of its own,
-`took`, which results.json leaves out.
+Cache hits are not in it: they differ between a run and the same run resumed. What a memory took is
+a field of its own, `took`, which results.json leaves out.
 """
 
 import math
@@ -62,10 +62,11 @@ Record = UnitRecord[NiehAnswer]
 
 
 class Score(msgspec.Struct, frozen=True):
-    """A mean score under one metric, from 0 to 1; the reference scorer can exceed 1 where a reply repeats itself.
+    """A mean score under one metric, from 0 to 1; the reference scorer can exceed 1 where a reply
+    repeats itself.
 
-    Standard error and 95 % intervals are by trajectory, and None with fewer than two. `bootstrap` is the interval over
-    resampled trajectories; None also if all scores are equal.
+    Standard error and 95 % intervals are by trajectory, and None with fewer than two. `bootstrap`
+    is the interval over resampled trajectories; None also if all scores are equal.
     """
 
     mean: float
@@ -77,7 +78,8 @@ class Score(msgspec.Struct, frozen=True):
 
 
 class Cell(msgspec.Struct, frozen=True):
-    """The scores of n samples by metric; empty if n is 0. A sample on which the model failed counts as wrong."""
+    """The scores of n samples by metric; empty if n is 0. A sample on which the model failed counts
+    as wrong."""
 
     n: int
     n_failed: int
@@ -85,11 +87,13 @@ class Cell(msgspec.Struct, frozen=True):
 
 
 class EvidenceCells(msgspec.Struct, frozen=True):
-    """The scores of samples by what was shown of their evidence; samples of which it is not known are in no cell.
+    """The scores of samples by what was shown of their evidence; samples of which it is not known
+    are in no cell.
 
     Attributes:
         by_shown_clues: cells of the samples with all, some and none of their clue frames shown.
-        by_distance: cells by the number of frames between the last clue and the end of the trajectory ("50-99").
+        by_distance: cells by the number of frames between the last clue and the end of the
+            trajectory ("50-99").
     """
 
     by_shown_clues: dict[str, Cell]
@@ -97,14 +101,16 @@ class EvidenceCells(msgspec.Struct, frozen=True):
 
 
 class LengthCell(msgspec.Struct, frozen=True):
-    """The scores of samples with a context of about one length, and their scores above guessing by scorer."""
+    """The scores of samples with a context of about one length, and their scores above guessing by
+    scorer."""
 
     cell: Cell
     above_guessing: dict[str, float | None]
 
 
 class SkippedSummary(msgspec.Struct, frozen=True):
-    """The number of samples that were not asked, by reason; and the mean by metric if they were counted as wrong."""
+    """The number of samples that were not asked, by reason; and the mean by metric if they were
+    counted as wrong."""
 
     n: int
     by_reason: dict[str, int]
@@ -123,18 +129,20 @@ class TaskSummary(msgspec.Struct, frozen=True):
 
     Attributes:
         simulator: simulator that rendered the frames; None if the set does not say.
-        by_clues: cells of the columns of Table 4; of absence questions, which are in the total too; and of open-ended
-            questions, which are in the other columns too.
+        by_clues: cells of the columns of Table 4; of absence questions, which are in the total too;
+            and of open-ended questions, which are in the other columns too.
         by_file: cells by question file, in a set of several.
-        evidence: cells by what was shown of the evidence: of all samples ("total"), and of each file.
+        evidence: cells by what was shown of the evidence: of all samples ("total"), and of each
+            file.
         by_length: cells by thousand tokens of the context ("32-64").
         above_guessing: the share of what cannot be guessed that the replies got, by scorer.
         format_failures: number of replies that are not of the form asked for, by reason.
         n_thought: number of replies behind thoughts.
-        tokens_per_right: tokens of all replies, thoughts included, for each right answer under the main metric; None
-            if none is right or the model counts no tokens.
+        tokens_per_right: tokens of all replies, thoughts included, for each right answer under the
+            main metric; None if none is right or the model counts no tokens.
         below_full_marks: samples with a score below 1, by metric.
-        scores: scores by metric and trajectory, in the order of the samples' keys, by which runs are paired.
+        scores: scores by metric and trajectory, in the order of the samples' keys, by which runs
+            are paired.
         memory: the memory that recalled what was shown; None if there is none.
     """
 
@@ -164,8 +172,8 @@ class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
     """The summary of a run by task.
 
     Attributes:
-        tasks: summaries over questions. Where answers were repeated, each question counts with its mean scores; replies
-            are counted in `yes_no`, `format_failures` and `failures` alone.
+        tasks: summaries over questions. Where answers were repeated, each question counts with its
+            mean scores; replies are counted in `yes_no`, `format_failures` and `failures` alone.
         took: what their memories took, which differs from run to run.
         repeats: how the repeated answers to their questions compare.
     """
@@ -283,7 +291,8 @@ def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Ce
 
 
 def is_open_ended(record: Record) -> bool:
-    """Return the published test of a question: the first gold answer decides, a number in quotes counts as a text."""
+    """Return the published test of a question: the first gold answer decides, a number in quotes
+    counts as a text."""
     first = record.payload.answers[0]
     return isinstance(first, str) and first.strip().lower() not in ("yes", "no")
 
@@ -308,7 +317,8 @@ def _in_order(
     name_of: Callable[[Record], str | None],
     names: Sequence[str],
 ) -> dict[str, Cell]:
-    """Return the cells of the groups that have samples, in the order of their names; some samples are in none."""
+    """Return the cells of the groups that have samples, in the order of their names; some samples
+    are in none."""
     chosen = {name: [record for record in records if name_of(record) == name] for name in names}
     return {name: _cell(of_group, metrics) for name, of_group in chosen.items() if of_group}
 

@@ -1,4 +1,5 @@
-"""NIEH results as tables: accuracy by clues beside the published rows, by depth, gain by frames, form of replies."""
+"""NIEH results as tables: accuracy by clues beside the published rows, by depth, gain by frames,
+form of replies."""
 
 from collections.abc import Iterator, Sequence
 
@@ -33,23 +34,27 @@ __all__ = ["clues_table", "overview", "tables"]
 _NAMES = (Column("model", False), Column("task", False))
 _METRIC = Column("scorer", False)
 _LEGEND = (
-    "total: all questions, with those on absences. Open-ended questions are in the columns by clues too.",
-    "95 %: interval clustered by trajectory, valid near 0 and 100 %. bootstrap: interval over resampled trajectories, "
-    "which assumes no distribution of the scores. If the two differ much, there are few trajectories.",
+    "total: all questions, with those on absences. Open-ended questions are in the columns by "
+    "clues too.",
+    "95 %: interval clustered by trajectory, valid near 0 and 100 %. bootstrap: interval over "
+    "resampled trajectories, which assumes no distribution of the scores. If the two differ much, "
+    "there are few trajectories.",
 )
 _EMBEDDED = (
-    "Questions on frames of the embedded simulator: not comparable with the published rows, which are on AI2-THOR's "
-    "own frames."
+    "Questions on frames of the embedded simulator: not comparable with the published rows, which "
+    "are on AI2-THOR's own frames."
 )
 
 
 def tables(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the tables of runs: by depth and by clues, the gains over blank frames, and the form of the replies.
+    """Return the tables of runs: by depth and by clues, the gains over blank frames, and the form
+    of the replies.
 
-    Published rows by clues are below ours; a published table of other columns (question types, question files) is a
-    table of its own beside runs in its context, with ours in it where they have its columns. The tables by depth and
-    of gains need a task with depths, and a pair of runs on true and on blank frames. Those of the evidence, of the
-    effective length and of memories are there if a task shows part of a trajectory.
+    Published rows by clues are below ours; a published table of other columns (question types,
+    question files) is a table of its own beside runs in its context, with ours in it where they
+    have its columns. The tables by depth and of gains need a task with depths, and a pair of runs
+    on true and on blank frames. Those of the evidence, of the effective length and of memories are
+    there if a task shows part of a trajectory.
     """
     contexts = {task.context for _, _, task in _tasks(runs)}
     others = [
@@ -71,7 +76,8 @@ def tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def overview(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return the accuracy of each task with its intervals, and the tables of gains, memories and repeats if any.
+    """Return the accuracy of each task with its intervals, and the tables of gains, memories and
+    repeats if any.
 
     A task that asked nothing is a line below the table.
     """
@@ -104,7 +110,10 @@ def _left_out(task: TaskSummary) -> tuple[str, str]:
 def _nothing_asked(name: str, task: TaskSummary) -> str:
     reasons = list(task.skipped.by_reason)
     more = f", and {len(reasons) - 1} more reasons" if len(reasons) > 1 else ""
-    return f"{name}: nothing asked, {task.skipped.n} skipped{f': {reasons[0]}{more}' if reasons else ''}"
+    return (
+        f"{name}: nothing asked, {task.skipped.n} "
+        f"skipped{f': {reasons[0]}{more}' if reasons else ''}"
+    )
 
 
 def _is_by_clues(table: PublishedTable) -> bool:
@@ -123,7 +132,8 @@ def _tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, TaskSummary]]
 
 
 def clues_table(runs: Sequence[RunSummary]) -> Table:
-    """Return the accuracy by number of clues: a row per run, task and metric, then the published rows."""
+    """Return the accuracy by number of clues: a row per run, task and metric, then the published
+    rows."""
     apart = (OPEN_ENDED, ABSENCE, "above guessing")
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", "skipped", "failed")
     rows, notes = (
@@ -180,7 +190,8 @@ def _cells(task: TaskSummary, metric: str) -> list[str]:
 
 
 def _intervals(cell: Cell, metric: str) -> tuple[str, str]:
-    """Return the clustered interval, and that over resampled trajectories; one trajectory has neither."""
+    """Return the clustered interval, and that over resampled trajectories; one trajectory has
+    neither."""
     score = cell.scores.get(metric)
     if score is None:
         return _range(None, None), _range(None, None)
@@ -216,7 +227,8 @@ def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterat
 
 
 def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
-    """Yield the differences of a run of the published model from its row; = if its interval has the published value."""
+    """Yield the differences of a run of the published model from its row; = if its interval has the
+    published value."""
     if not row.matches(run.header.config["model"]) or frames_of(run) != SHOWN:
         return
     for _, name, task in _tasks([run]):
@@ -252,7 +264,8 @@ def _difference(cell: Cell, value: float | None, metric: str) -> str:
 
 
 def _beside(table: PublishedTable, runs: Sequence[RunSummary]) -> Table:
-    """Return the published rows, and the runs that asked in the same context and have one of the columns."""
+    """Return the published rows, and the runs that asked in the same context and have one of the
+    columns."""
     rows = [
         Row(
             (row.name, _made_by(row, table), table.metric, *map("{:.2f}".format, row.values)),
@@ -285,14 +298,18 @@ def _made_by(row: PublishedRow, table: PublishedTable) -> str:
 
 
 def _gains_table(runs: Sequence[RunSummary]) -> list[Table]:
-    """Return a table of the gain of each run over its run on blank frames, if there is such a pair."""
+    """Return a table of the gain of each run over its run on blank frames, if there is such a
+    pair."""
     rows = [
         Row((name_of(gain.run), gain.task, gain.metric, *_gain_cells(gain)))
         for gain in find_gains(runs)
     ]
     if not rows:
         return []
-    note = "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval compare` has it."
+    note = (
+        "95 %: of the total, paired by question and clustered by trajectory, as `infthor-eval "
+        "compare` has it."
+    )
     title = "Gain over the same model's run on blank frames, in points"
     columns = (*CLUE_COLUMNS, "95 %", OPEN_ENDED, ABSENCE)
     return [Table(title, (*_NAMES, _METRIC, *map(Column, columns)), tuple(rows), (note,))]
@@ -338,7 +355,8 @@ def _depth_table(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _replies_table(runs: Sequence[RunSummary]) -> Table:
-    """Return the bias to yes, the length of replies, and those that are no answer: a row per run and task."""
+    """Return the bias to yes, the length of replies, and those that are no answer: a row per run
+    and task."""
     thought = any(task.n_thought for _, _, task in _tasks(runs))
     numbers = ["yes/no questions", "gold yes, %", "said yes, %", "tokens per right answer"]
     numbers += ["with thoughts"] if thought else []

@@ -1,8 +1,10 @@
-"""Cross-validation of questions (paper, A.1.3): a filter over the replies of several models to the clue frames.
+"""Cross-validation of questions (paper, A.1.3): a filter over the replies of several models to the
+clue frames.
 
-A question is kept if at least one model answers it correctly: with full marks by default, with any part of them in the
-published filter (of its 829 questions with one clue 20 have partial credit alone). One with several clues that no model
-answers may still be a good, hard question: a person inspects it and decides. All others are rejected.
+A question is kept if at least one model answers it correctly: with full marks by default, with any
+part of them in the published filter (of its 829 questions with one clue 20 have partial credit
+alone). One with several clues that no model answers may still be a good, hard question: a person
+inspects it and decides. All others are rejected.
 """
 
 import itertools
@@ -52,9 +54,12 @@ class Verdicts:
     """The judged questions.
 
     Attributes:
-        kept: questions that at least one model answered correctly, or that a person decided to keep.
-        rejected: questions that no model answered correctly, with one clue, or that a person decided to drop.
-        to_inspect: questions with several clues that no model answered correctly, without a decision.
+        kept: questions that at least one model answered correctly, or that a person decided to
+            keep.
+        rejected: questions that no model answered correctly, with one clue, or that a person
+            decided to drop.
+        to_inspect: questions with several clues that no model answered correctly, without a
+            decision.
     """
 
     kept: list[JudgedQuestion] = field(default_factory=list)
@@ -91,7 +96,8 @@ def judge_questions(
         partial_credit: whether any part of them is one already, as in the published filter.
 
     Raises:
-        DataError: a model was not asked one of the questions, or a decision is about a question of another set.
+        DataError: a model was not asked one of the questions, or a decision is about a question of
+            another set.
     """
     check_decisions(decisions, questions)
     verdicts = Verdicts()
@@ -124,7 +130,8 @@ def check_decisions(decisions: Mapping[str, str], questions: Iterable[Question])
     unknown = sorted(set(decisions) - {question.id for question in questions})
     if unknown:
         raise DataError(
-            f"the decisions are about {unknown[0]}, which is not in the set; take the list of this set"
+            f"the decisions are about {unknown[0]}, which is not in the set; take the list of this "
+            "set"
         )
 
 
@@ -135,10 +142,11 @@ def _reply(question: Question, model: str, replies: Mapping[str, str | None]) ->
 
 
 def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path | None:
-    """Write the questions that a person must decide on; the person fills the last column with keep or drop.
+    """Write the questions that a person must decide on; the person fills the last column with keep
+    or drop.
 
-    Decisions in an existing list are kept. A list with decisions on other questions is renamed, and its new path is
-    returned; else None.
+    Decisions in an existing list are kept. A list with decisions on other questions is renamed, and
+    its new path is returned; else None.
 
     Raises:
         DataError: an existing list cannot be read.

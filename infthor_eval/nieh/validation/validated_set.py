@@ -24,7 +24,8 @@ INSPECTION = "inspection.csv"
 
 
 def check_output(out: Path, data: NiehSet) -> None:
-    """Refuse an output folder whose contents the validated set would damage; called before the models run.
+    """Refuse an output folder whose contents the validated set would damage; called before the
+    models run.
 
     Raises:
         UsageError: it is the folder of the set itself.
@@ -33,7 +34,8 @@ def check_output(out: Path, data: NiehSet) -> None:
     prepare_folder(out)
     if out.resolve() == data.root.resolve():
         raise UsageError(
-            f"--out {out}: is the set itself, in which every question would be listed twice; give another"
+            f"--out {out}: is the set itself, in which every question would be listed twice; give "
+            "another"
         )
     link = out / "metadata"
     if os.path.lexists(link) and link.resolve() != (data.root / "metadata").resolve():
@@ -46,7 +48,8 @@ def write_validated_set(out: Path, data: NiehSet, verdicts: Verdicts) -> Path | 
     """Write the validated set into a folder, created if needed; its frames are linked, not copied.
 
     Returns:
-        New path of an existing inspection list, if it has decisions that the new one has no rows for.
+        New path of an existing inspection list, if it has decisions that the new one has no rows
+        for.
 
     Raises:
         DataError: a file cannot be written.

@@ -19,7 +19,8 @@ class ActorFactory:
 
     Attributes:
         sees: whether they look at frames.
-        trained_words: words of plans and actions that the subject was trained on; None if it does not say.
+        trained_words: words of plans and actions that the subject was trained on; None if it does
+            not say.
     """
 
     sees: bool
@@ -28,7 +29,8 @@ class ActorFactory:
 
 
 def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> ActorFactory:
-    """Return the factory of a model, or of a baseline, which is fitted to all trajectories; TypeError for others."""
+    """Return the factory of a model, or of a baseline, which is fitted to all trajectories;
+    TypeError for others."""
     if isinstance(subject, PlanBaseline):
         subject.fit(trajectories)
         return ActorFactory(False, lambda task, trajectory: subject.actor(trajectory, task.words))

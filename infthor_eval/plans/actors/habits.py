@@ -1,4 +1,5 @@
-"""What experts did next, by the words of their plan and the action before: how far an agent gets without a frame."""
+"""What experts did next, by the words of their plan and the action before: how far an agent gets
+without a frame."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -16,10 +17,12 @@ _Key = tuple[str, ...]
 
 
 class Habits:
-    """The most frequent next action in the most similar known situation; of equally frequent ones the first by name.
+    """The most frequent next action in the most similar known situation; of equally frequent ones
+    the first by name.
 
-    A situation is the plan's text, the number of actions so far, and the last action. If it is unknown, less and less
-    of it is compared (`_situations`). Actions are learned with placeholders for the plan's own objects.
+    A situation is the plan's text, the number of actions so far, and the last action. If it is
+    unknown, less and less of it is compared (`_situations`). Actions are learned with placeholders
+    for the plan's own objects.
     """
 
     def __init__(self, trajectories: Iterable[Trajectory], words: Words) -> None:

@@ -51,7 +51,8 @@ class AgentConfig:
 class ModelActor:
     """Asks a model for one action after the other.
 
-    Within a plan the conversation is only appended to, so that the model's prefix cache stays valid.
+    Within a plan the conversation is only appended to, so that the model's prefix cache stays
+    valid.
     """
 
     def __init__(self, model: Model, config: AgentConfig) -> None:
@@ -93,7 +94,8 @@ class ModelActor:
         return Act(answer_of(reply).answer, reply)
 
     def observe(self, outcome: StepOutcome) -> None:
-        """See `PlanActor`; the action is appended as it was understood, not as the model wrote it."""
+        """See `PlanActor`; the action is appended as it was understood, not as the model wrote
+        it."""
         self._observation = outcome.observation
         if self._asks_anew:
             return

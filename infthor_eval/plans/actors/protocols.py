@@ -1,4 +1,5 @@
-"""The protocols of actors and baselines: an actor begins a plan, and acts until the plan is over."""
+"""The protocols of actors and baselines: an actor begins a plan, and acts until the plan is
+over."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,8 @@ __all__ = ["Act", "CountingActor", "EndedActor", "PlanActor", "PlanBaseline", "P
 
 @dataclass(frozen=True)
 class Act:
-    """An action that an actor chose, as a text or a call of AI2-THOR's, and the model's reply (None for baselines)."""
+    """An action that an actor chose, as a text or a call of AI2-THOR's, and the model's reply (None
+    for baselines)."""
 
     action: str | Mapping[str, Any]
     reply: Reply | None = None
@@ -67,9 +69,11 @@ class CountingActor(PlanActor, Protocol):
     """An actor with a model that may count tokens."""
 
     def tokens_between(self, first: int, last: int) -> int | None:
-        """Return the tokens of the whole history from one frame to another; None if the model counts none.
+        """Return the tokens of the whole history from one frame to another; None if the model
+        counts none.
 
-        Frames are numbered from the trajectory's first; the history is that before the plan that has begun.
+        Frames are numbered from the trajectory's first; the history is that before the plan that
+        has begun.
         """
 
 

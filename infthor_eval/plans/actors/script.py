@@ -20,15 +20,15 @@ _PLAN = re.compile(rf"({'|'.join(_VERBS)}) (?:the )?(\S+)(?: in the (\S+))?")
 def read_plan(plan: str) -> tuple[str, tuple[str, ...]]:
     """Return the verb of a plan and the objects that it names.
 
-    Natural words in lower case become object types; the published names are in capitals and stay as they are, as any
-    other word does.
+    Natural words in lower case become object types; the published names are in capitals and stay as
+    they are, as any other word does.
 
     Args:
         plan: text of the plan ("put the mug in the sink", or "put the Mug in the Sink").
 
     Returns:
-        ("put", ("Mug", "SinkBasin")), or ("put", ("Mug", "Sink")); the whole text and no objects if it is not of the
-        usual form.
+        ("put", ("Mug", "SinkBasin")), or ("put", ("Mug", "Sink")); the whole text and no objects if
+        it is not of the usual form.
     """
     match = _PLAN.fullmatch(plan)
     if match is None:
@@ -54,7 +54,8 @@ def replace_objects(plan: str, types: Sequence[str]) -> str:
 
 
 def scripted_action(plan: str, done: Sequence[str]) -> str:
-    """Return the next action of a plan's script, after the actions done so far; its last action is repeated."""
+    """Return the next action of a plan's script, after the actions done so far; its last action is
+    repeated."""
     actions = _script(*read_plan(plan))
     return actions[min(len(done), len(actions) - 1)]
 
@@ -83,7 +84,8 @@ def _treat(item: str, appliance: str, treatment: list[str]) -> list[str]:
 
 
 def _inside(receptacle: str, action: str) -> list[str]:
-    """Return the action, with the receptacle opened before and closed after it if it is closed at first."""
+    """Return the action, with the receptacle opened before and closed after it if it is closed at
+    first."""
     if receptacle not in _CLOSED:
         return [action]
     return [f"OpenObject {receptacle}", action, f"CloseObject {receptacle}"]

@@ -1,7 +1,9 @@
-"""Where the object of a plan was last in view before the agent needs it: what a memory would have to recall.
+"""Where the object of a plan was last in view before the agent needs it: what a memory would have
+to recall.
 
-The trajectory's object log has the types in view at each frame. A final task needs an object and a place that were seen
-at the two ends of the trajectory before it (`infthor_eval.generation.final_task`).
+The trajectory's object log has the types in view at each frame. A final task needs an object and a
+place that were seen at the two ends of the trajectory before it
+(`infthor_eval.generation.final_task`).
 """
 
 from collections.abc import Sequence
@@ -19,7 +21,8 @@ _TO_RECEPTACLE = {PlanKind.PUT, PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 
 
 def object_logs(trajectory: Trajectory) -> Sequence[ObjectLog]:
-    """Return what each frame shows, by the trajectory's own log; empty if it has none for every frame."""
+    """Return what each frame shows, by the trajectory's own log; empty if it has none for every
+    frame."""
     log = trajectory.object_log
     if len(log) != len(trajectory.plan.low_actions) + 1:
         return ()
@@ -32,7 +35,8 @@ def object_logs(trajectory: Trajectory) -> Sequence[ObjectLog]:
 def clue_step(
     logs: Sequence[ObjectLog], trajectory: Trajectory, plan: Plan, before: int
 ) -> int | None:
-    """Return the last frame, up to `before`, with a plan's object in view, or its receptacle if the plan goes there.
+    """Return the last frame, up to `before`, with a plan's object in view, or its receptacle if the
+    plan goes there.
 
     None if it was never in view, or if that is not known.
     """

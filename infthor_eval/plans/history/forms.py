@@ -27,9 +27,9 @@ class FullHistory:
 class PublishedHistory:
     """The whole history as the published loop writes it.
 
-    Three things differ from `FullHistory`: the first action of each past plan stands behind two marks, as the plan's
-    own is there already; behind every goal is the first frame of the scene, which the loop keeps from its last set-up;
-    plans that belong to no task are left out.
+    Three things differ from `FullHistory`: the first action of each past plan stands behind two
+    marks, as the plan's own is there already; behind every goal is the first frame of the scene,
+    which the loop keeps from its last set-up; plans that belong to no task are left out.
     """
 
     needs_state: ClassVar[bool] = False
@@ -49,16 +49,19 @@ class PublishedHistory:
 
 
 class LastTokens:
-    """As many of the last plans as fit, after the goal that they belong to and the frame that they begin with.
+    """As many of the last plans as fit, after the goal that they belong to and the frame that they
+    begin with.
 
-    Whole plans are left out, from the first on, and the goal is repeated if the rest would begin without it. So every
-    window has the form of a trajectory's beginning, which is what the models were trained on.
+    Whole plans are left out, from the first on, and the goal is repeated if the rest would begin
+    without it. So every window has the form of a trajectory's beginning, which is what the models
+    were trained on.
     """
 
     needs_state: ClassVar[bool] = False
 
     def __init__(self, n_tokens: int) -> None:
-        """Set the maximum number of tokens before the model's first action; the plan's own steps come on top."""
+        """Set the maximum number of tokens before the model's first action; the plan's own steps
+        come on top."""
         self._n_tokens = n_tokens
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
@@ -67,7 +70,8 @@ class LastTokens:
         least, most = 1, len(segments)  # number of last segments
         if not self._fits(segments, least, count):
             raise ModelError(
-                f"the plan alone takes more than {self._n_tokens} tokens; give --history last:N a larger N"
+                f"the plan alone takes more than {self._n_tokens} tokens; give --history last:N a "
+                "larger N"
             )
         while least < most:
             middle = (least + most + 1) // 2
@@ -105,8 +109,8 @@ def history_named(text: str, memory: MemoryChoice) -> History:
     """Return the history of a value of `--history`.
 
     Args:
-        text: "full", "published", "goals", "plans", "last:N" (N tokens), "text", "retrieved:K" or "frames:K" (K
-            frames), or "memory".
+        text: "full", "published", "goals", "plans", "last:N" (N tokens), "text", "retrieved:K" or
+            "frames:K" (K frames), or "memory".
         memory: the options of memories.
 
     Raises:
@@ -123,7 +127,8 @@ def history_named(text: str, memory: MemoryChoice) -> History:
         return MemoryChoice("clip-view", f"k={size}", None, memory.retriever, memory.blank).open()
     if memory.retriever is not None:
         raise UsageError(
-            f"--retriever: --history {text} retrieves no frames; leave it out, or use --history frames:K"
+            f"--retriever: --history {text} retrieves no frames; leave it out, or use --history "
+            "frames:K"
         )
     if kind in _SIZED and size:
         return _SIZED[kind](size)

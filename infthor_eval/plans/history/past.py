@@ -23,10 +23,14 @@ class Past:
     Attributes:
         segments: segments of the plans before.
         present: the plan's own segment, without a step.
-        state: the state of room and agent in words, as far as it was seen; empty if no history needs it.
-        logs: what each frame up to the present one shows, for memories that are given it; empty if it is not known.
-        clue: number of the last frame with what the plan needs in view (`clue_steps`); None if there is none.
-        trajectory: the trajectory's own file, for what it has retrieved (`retrieved_frames`); None if it is not known.
+        state: the state of room and agent in words, as far as it was seen; empty if no history
+            needs it.
+        logs: what each frame up to the present one shows, for memories that are given it; empty if
+            it is not known.
+        clue: number of the last frame with what the plan needs in view (`clue_steps`); None if
+            there is none.
+        trajectory: the trajectory's own file, for what it has retrieved (`retrieved_frames`); None
+            if it is not known.
     """
 
     segments: Sequence[PlanSegment]
@@ -78,7 +82,8 @@ class Past:
 
 
 class History(Protocol):
-    """Selects what a model is given of the past; `needs_state` tells whether it needs the state in words."""
+    """Selects what a model is given of the past; `needs_state` tells whether it needs the state in
+    words."""
 
     needs_state: ClassVar[bool]
 

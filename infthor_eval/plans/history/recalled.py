@@ -27,7 +27,8 @@ __all__ = ["MemoryChoice", "RecalledHistory"]
 
 
 class RecalledHistory:
-    """What a memory recalls of the steps before the present one (`infthor_eval.memory`), the goal, and that frame.
+    """What a memory recalls of the steps before the present one (`infthor_eval.memory`), the goal,
+    and that frame.
 
     The memory observes each step once, as long as one episode goes on.
     """
@@ -53,7 +54,8 @@ class RecalledHistory:
         self._privileged = self._memory.capabilities.privileged
         if self._memory.capabilities.writes:
             raise UsageError(
-                f"the memory {name} needs a model that writes for it, as agents do not; take another"
+                f"the memory {name} needs a model that writes for it, as agents do not; take "
+                "another"
             )
         self.identity()  # opens what the memory needs now, rather than at the first plan
         self._observed: list[Observation] = []
@@ -72,7 +74,8 @@ class RecalledHistory:
         """Return what is recalled, in order.
 
         Raises:
-            DataError: a frame cannot be read, or the trajectory lacks what a privileged memory needs.
+            DataError: a frame cannot be read, or the trajectory lacks what a privileged memory
+                needs.
             ModelError: there is a budget and the model counts no tokens, or the memory exceeds it.
             UserCodeError: the memory fails.
         """

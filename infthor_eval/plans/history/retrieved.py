@@ -1,8 +1,10 @@
-"""An agent's image memory as the trajectory's own file names it (`retrieved_image`), as the published script reads it.
+"""An agent's image memory as the trajectory's own file names it (`retrieved_image`), as the
+published script reads it.
 
-The file has, for low-level actions, the names of the frames that a retriever found before each (`top20`). A name is
-looked up in `images`, which has the action that each frame was taken at; what is shown is this run's own frame after
-that action, so that past and present come from one simulator.
+The file has, for low-level actions, the names of the frames that a retriever found before each
+(`top20`). A name is looked up in `images`, which has the action that each frame was taken at; what
+is shown is this run's own frame after that action, so that past and present come from one
+simulator.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,7 +33,8 @@ class _Image(msgspec.Struct):
 
 
 class RetrievedFrames:
-    """The K frames that the trajectory's file says were retrieved for a plan's first action, the goal, and the plan."""
+    """The K frames that the trajectory's file says were retrieved for a plan's first action, the
+    goal, and the plan."""
 
     needs_state: ClassVar[bool] = False
 
@@ -52,8 +55,8 @@ class RetrievedFrames:
         """Return the frames in the file's order, 336x336 pixels.
 
         Raises:
-            DataError: the file names none for this action, or a frame that is not known or not yet taken; or a frame
-                cannot be read or written.
+            DataError: the file names none for this action, or a frame that is not known or not yet
+                taken; or a frame cannot be read or written.
         """
         frames = [step.frame for step in past.observations()]
         if past.trajectory is None:
@@ -63,7 +66,8 @@ class RetrievedFrames:
 
 
 def require_retrieved(trajectories: Iterable[Trajectory], task: str) -> None:
-    """Check before the work that some trajectory names retrieved frames; `task` is named in the message.
+    """Check before the work that some trajectory names retrieved frames; `task` is named in the
+    message.
 
     Raises:
         DataError: none does.
@@ -74,7 +78,8 @@ def require_retrieved(trajectories: Iterable[Trajectory], task: str) -> None:
 
 
 def retrieved_steps(trajectory: Trajectory, action: int, k: int) -> Sequence[int]:
-    """Return the frames that a trajectory's file says were retrieved before an action: 0 is the first, n + 1 after n.
+    """Return the frames that a trajectory's file says were retrieved before an action: 0 is the
+    first, n + 1 after n.
 
     Raises:
         DataError: it names none, or one that is not known or is taken after the action.
@@ -106,7 +111,8 @@ def _names(retrieved: Mapping[str, Any] | None, action: int, k: int, place: str)
 
 
 def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
-    """Return the step of each named frame; of several frames of one action all stand for its last one."""
+    """Return the step of each named frame; of several frames of one action all stand for its last
+    one."""
     where, hint = (
         f"trajectory {trajectory.traj_id}: images is no list of low_idx and image_name",
         "restore the file",
@@ -117,7 +123,8 @@ def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
 
 
 def _resized(frame: FrameRef) -> FrameRef:
-    """Return a frame in the published size, in a file beside it (an episode's folder, which ends with the episode).
+    """Return a frame in the published size, in a file beside it (an episode's folder, which ends
+    with the episode).
 
     Raises:
         DataError: it cannot be read or written.

@@ -1,7 +1,9 @@
-"""Plans one by one as the published chat scripts ask for them: a system prompt, and no text of the plan.
+"""Plans one by one as the published chat scripts ask for them: a system prompt, and no text of the
+plan.
 
-`--history goals` is `run_interactive_eval_qwen.py`, `--history plans` `run_interactive_eval_history.py`, both of branch
-`dev`. As in the default protocol, every plan begins in the true state.
+`--history goals` is `run_interactive_eval_qwen.py`, `--history plans`
+`run_interactive_eval_history.py`, both of branch `dev`. As in the default protocol, every plan
+begins in the true state.
 """
 
 from infthor_eval.household.sequence_text import ACT
@@ -14,7 +16,8 @@ __all__ = ["chat_form"]
 
 
 def chat_form(history: History) -> FinalForm | None:
-    """Return how an agent with this history is asked in a chat; None if it continues the bare sequence."""
+    """Return how an agent with this history is asked in a chat; None if it continues the bare
+    sequence."""
     if isinstance(history, GoalHistory):
         return FinalForm(system_prompt("goals"), history, ends=(ACT,))
     if isinstance(history, PlanHistory):

@@ -1,13 +1,14 @@
-"""Final tasks as the published scripts run them (`--protocol published`): in one go, and without the text of a plan.
+"""Final tasks as the published scripts run them (`--protocol published`): in one go, and without
+the text of a plan.
 
-The expert carries out all tasks but the last; the agent then has the last one, its plans following each other in the
-world that it has made. It is told the goal alone, in one of three forms:
+The expert carries out all tasks but the last; the agent then has the last one, its plans following
+each other in the world that it has made. It is told the goal alone, in one of three forms:
 
-- interleaved (`--history full`): the whole history as a user's turn. After the first plan, done or failed, the script
-  ends; the other plans are never tried, and count as not done.
-- memory as text (`--history text`) and as frames (`--history retrieved:K`, the frames that the trajectory's file names,
-  or `frames:K`, those nearest to the present one): each action is asked for anew, with the memory and the present
-  frame. After a failure the next plan follows.
+- interleaved (`--history full`): the whole history as a user's turn. After the first plan, done or
+  failed, the script ends; the other plans are never tried, and count as not done.
+- memory as text (`--history text`) and as frames (`--history retrieved:K`, the frames that the
+  trajectory's file names, or `frames:K`, those nearest to the present one): each action is asked
+  for anew, with the memory and the present frame. After a failure the next plan follows.
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,8 @@ class FinalForm:
     Attributes:
         system: text of the system's turn.
         history: what the agent is given before its first action.
-        asks_anew: whether each action is asked for anew; else its actions and frames are added to the history.
+        asks_anew: whether each action is asked for anew; else its actions and frames are added to
+            the history.
         goes_on: whether later plans are tried after the first.
         ends: texts that end a reply.
     """
@@ -51,7 +53,8 @@ class FinalForm:
     ends: tuple[str, ...] = ()
 
     def decoding(self, seed: int) -> Decoding:
-        """Return the decoding: as Qwen2.5-VL's own settings have it, greedy with the checkpoint's penalty."""
+        """Return the decoding: as Qwen2.5-VL's own settings have it, greedy with the checkpoint's
+        penalty."""
         return Decoding(max_new_tokens=_MAX_TOKENS, seed=seed, stop=self.ends)
 
 
@@ -100,7 +103,8 @@ def final_form(history: History, name: str) -> FinalForm:
 
 
 def with_recorded_state(past: Past, trajectory: Trajectory, first: int) -> Past:
-    """Return a past with the state that the trajectory's own file has for an action, if it has one."""
+    """Return a past with the state that the trajectory's own file has for an action, if it has
+    one."""
     recorded = (trajectory.state_summary or {}).get(str(first))
     return past if recorded is None else replace(past, state=recorded)
 

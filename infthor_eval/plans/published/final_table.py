@@ -1,4 +1,5 @@
-"""The published table of final long-horizon tasks from the published plan logs: plans done of plans counted."""
+"""The published table of final long-horizon tasks from the published plan logs: plans done of plans
+counted."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -12,14 +13,16 @@ __all__ = ["count_plans", "final_table"]
 
 _TITLE = "final long-horizon tasks"
 _NOTES = (
-    "95 %: interval of the total, clustered by trajectory. Trajectories whose set-up failed have no plan in the log.",
+    "95 %: interval of the total, clustered by trajectory. Trajectories whose set-up failed have "
+    "no plan in the log.",
 )
 
 
 def final_table(logs: Sequence[PlanLog]) -> Table:
     """Return the table as logs (at least one) give it, each row above the printed one.
 
-    A log whose name is not that of a printed row stands alone; printed rows that no log is of are listed below.
+    A log whose name is not that of a printed row stands alone; printed rows that no log is of are
+    listed below.
     """
     published = next(table for table in published_tables("plans") if table.title == _TITLE)
     by_log = {row.log: row for row in published.rows if row.log is not None}
@@ -102,7 +105,8 @@ def _percent(count: PlanCount) -> str:
 def _printed(
     row: PublishedRow, table: PublishedTable, counts: Mapping[str, PlanCount]
 ) -> tuple[list[str], list[str]]:
-    """Return the printed cells, those that do not follow with a mark, and a note on each of these."""
+    """Return the printed cells, those that do not follow with a mark, and a note on each of
+    these."""
     cells, notes = [], []
     for name, value in zip(table.columns, row.values, strict=True):
         follows = _percent(counts[name]) == f"{value:.1f}"
@@ -110,7 +114,8 @@ def _printed(
         if not follows:
             why = _explanation(f"{value:.1f}", name, counts)
             notes.append(
-                f"*: {row.name}, {name}: printed {value:.1f}, in the log {_cell(counts[name])}. {why}"
+                f"*: {row.name}, {name}: printed {value:.1f}, in the log {_cell(counts[name])}. "
+                f"{why}"
             )
     return cells, notes
 

@@ -1,8 +1,9 @@
-"""Goals of tasks as the published functions test them (`env/tasks.py`), by the name of the task's type.
+"""Goals of tasks as the published functions test them (`env/tasks.py`), by the name of the task's
+type.
 
-They differ from ALFRED's, which `household.goals` tests: no lamp is ever asked for, so that looking at an object in
-light never counts; objects are told apart by the first part of their ids, so that no slice is ever asked for by its
-type; the basin of a sink is found in tasks of two objects alone.
+They differ from ALFRED's, which `household.goals` tests: no lamp is ever asked for, so that looking
+at an object in light never counts; objects are told apart by the first part of their ids, so that
+no slice is ever asked for by its type; the basin of a sink is found in tasks of two objects alone.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -26,7 +27,8 @@ class Treated:
 
 @dataclass(frozen=True)
 class Scene:
-    """What goals are tested on: all objects by id, the ids of those that are held, and what was done to objects."""
+    """What goals are tested on: all objects by id, the ids of those that are held, and what was
+    done to objects."""
 
     objects: Mapping[str, ThorObject]
     held: tuple[str, ...]
@@ -59,7 +61,8 @@ def _inside(item: ThorObject, receptacles: Iterable[ThorObject]) -> bool:
 
 
 def _targets(info: TaskInfo, scene: Scene) -> tuple[list[ThorObject], list[ThorObject], int]:
-    """Return a task's objects, its receptacles, and the number of slices that are asked for and lacking."""
+    """Return a task's objects, its receptacles, and the number of slices that are asked for and
+    lacking."""
     items = scene.named(info.pickup, _pickupable)
     n_slices = sum("Sliced" in item.object_id for item in items)
     if info.pickup is None:
@@ -111,7 +114,8 @@ def _place_with_movable(info: TaskInfo, scene: Scene) -> bool:
 
 
 def _put(info: TaskInfo, scene: Scene) -> bool:
-    """What is put away after a task: anything of a name lies in anything of another, and the hand is empty."""
+    """What is put away after a task: anything of a name lies in anything of another, and the hand
+    is empty."""
     wanted = {info.pickup, info.movable}
     receptacles = [] if scene.held else scene.named(info.receptacle, _receptacle)
     inside = (key for receptacle in receptacles for key in receptacle.receptacle_object_ids or ())
@@ -131,5 +135,6 @@ _GOALS: Mapping[str, Callable[[TaskInfo, Scene], bool]] = {
 
 
 def goal_holds(info: TaskInfo, scene: Scene) -> bool:
-    """Return whether the goal of a task holds; KeyError if its name, with blanks or underscores, is unknown."""
+    """Return whether the goal of a task holds; KeyError if its name, with blanks or underscores, is
+    unknown."""
     return _GOALS[info.goal.replace(" ", "_")](info, scene)

@@ -1,7 +1,8 @@
 """The counts of a published plan log as a run: a record per plan, of its kind, done or not.
 
-Which of a trajectory's plans of one kind were done is not in the log: those done come first. Shares and their intervals
-by trajectory do not depend on it. Nothing else is in the log, so there are no goals, steps and rewards.
+Which of a trajectory's plans of one kind were done is not in the log: those done come first. Shares
+and their intervals by trajectory do not depend on it. Nothing else is in the log, so there are no
+goals, steps and rewards.
 """
 
 from collections.abc import Iterator
@@ -48,7 +49,8 @@ class ImportedCounts:
 
 
 def import_counts(log: PlanLog, model: str | None = None) -> ImportedCounts:
-    """Return the run that a log holds; `model` names it, None for the name in that of a published log.
+    """Return the run that a log holds; `model` names it, None for the name in that of a published
+    log.
 
     Raises:
         UsageError: the log names no model and none is given.
@@ -65,7 +67,8 @@ def import_counts(log: PlanLog, model: str | None = None) -> ImportedCounts:
     records = tuple(record for row in log.rows if row.line not in mixed for record in _records(row))
     if not records:
         raise DataError(
-            f"{log.path}: none of its plans can be imported; give a log that counts goto, pick and put"
+            f"{log.path}: none of its plans can be imported; give a log that counts goto, pick and "
+            "put"
         )
     without = [row.traj_id for row in log.rows if not row.total.n]
     unread = (*log.unread, *refused)

@@ -1,7 +1,9 @@
-"""What the published loop logs of a trajectory (`agent.log`): a row for each action of the agent, with running totals.
+"""What the published loop logs of a trajectory (`agent.log`): a row for each action of the agent,
+with running totals.
 
-`total_reward` is set to the expert's at the beginning of each plan; `agent_reward` goes on from plan to plan. The
-reward of an action that completes a plan enters neither, as the loop returns before it adds it.
+`total_reward` is set to the expert's at the beginning of each plan; `agent_reward` goes on from
+plan to plan. The reward of an action that completes a plan enters neither, as the loop returns
+before it adds it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -36,7 +38,8 @@ class LogRow:
 
 
 def log_rows(plans: Sequence[PlanRecord]) -> Iterator[LogRow]:
-    """Yield the rows of a trajectory's plans, in time order and run under the published rules; the first is `INIT`."""
+    """Yield the rows of a trajectory's plans, in time order and run under the published rules; the
+    first is `INIT`."""
     last = LogRow()
     yield last
     n_expert, expert_total, agent_total = 0, 0.0, 0.0

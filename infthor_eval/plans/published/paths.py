@@ -1,8 +1,10 @@
-"""Distances as the published script has them: the length of the path that its search finds, up to the first wall.
+"""Distances as the published script has them: the length of the path that its search finds, up to
+the first wall.
 
-The search is networkx's A* on a graph of cells and directions, with a heuristic that overestimates turns. So a path
-need not be a shortest one, which one is found hangs on the order of nodes and edges and on sums in single precision,
-and paths that were found answer for each of their nodes. All of it is kept, as the published rewards follow from it.
+The search is networkx's A* on a graph of cells and directions, with a heuristic that overestimates
+turns. So a path need not be a shortest one, which one is found hangs on the order of nodes and
+edges and on sums in single precision, and paths that were found answer for each of their nodes. All
+of it is kept, as the published rewards follow from it.
 """
 
 from collections.abc import Iterable
@@ -28,7 +30,8 @@ _AHEAD = ((0, 1), (1, 0), (0, -1), (-1, 0))  # by quarter turn
 
 
 class OffGridError(ValueError):
-    """A pose is not on the graph, or has no quarter turn; the published search fails with an assertion."""
+    """A pose is not on the graph, or has no quarter turn; the published search fails with an
+    assertion."""
 
 
 class PublishedGraph:
@@ -37,7 +40,8 @@ class PublishedGraph:
     def __init__(self, cells: Iterable[tuple[int, int]]) -> None:
         """Build the graph of some cells (x, z) of 0.25 m, of which there is at least one."""
         reachable = set(cells)
-        # The coordinates are numpy's, as with them sums of costs and distances are rounded otherwise.
+        # The coordinates are numpy's, as with them sums of costs and distances are rounded
+        # otherwise.
         points = np.array(sorted(reachable), dtype=np.int32)
         (x_min, z_min), (x_max, z_max) = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
         self.graph = nx.DiGraph()
@@ -72,7 +76,8 @@ def _estimate(node: _Node, goal: _Node) -> int:
 
 
 class PublishedPaths:
-    """The paths that were found in a graph so far: an earlier search answers for all nodes of its path."""
+    """The paths that were found in a graph so far: an earlier search answers for all nodes of its
+    path."""
 
     def __init__(
         self, graph: PublishedGraph, known: dict[tuple[_Node, _Node], list[_Node]] | None = None
@@ -86,7 +91,8 @@ class PublishedPaths:
     def n_actions(self, pose: Pose, goal: Pose) -> int:
         """Return the number of actions of the path from a pose to another; raises OffGridError.
 
-        It ends at the first wall, wherever the goal is. Looks count if the angles differ by a multiple of 30 degrees.
+        It ends at the first wall, wherever the goal is. Looks count if the angles differ by a
+        multiple of 30 degrees.
         """
         start, end = pose[:3], goal[:3]
         for node in (start, end):

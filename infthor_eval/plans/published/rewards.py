@@ -1,7 +1,7 @@
 """Rewards of plans exactly as the published functions give them (`env/tasks.py`, `env/reward.py`).
 
-What they do otherwise than one would expect is kept, and listed in docs/plan-rewards.md. Where they raise an exception,
-which ends the published script, `UnscoredError` is raised here.
+What they do otherwise than one would expect is kept, and listed in docs/plan-rewards.md. Where they
+raise an exception, which ends the published script, `UnscoredError` is raised here.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -117,7 +117,8 @@ class PublishedTask:
         except (KeyError, IndexError, TypeError, ValueError) as error:
             sub_goal = self.plan[index].discrete_action.action
             raise UnscoredError(
-                f"the published rewards fail at {state.last_action:.40} in sub-goal {sub_goal:.40} ({error}); use"
+                f"the published rewards fail at {state.last_action:.40} in sub-goal {sub_goal:.40} "
+                f"({error}); use"
                 " --rewards default"
             ) from error
         self.previous = state
@@ -197,7 +198,8 @@ class PublishedTask:
     def _state_reward(
         self, step: "_Step", kind: PlanKind, is_done: Callable[[ThorObject], bool]
     ) -> tuple[float, bool]:
-        """Return the reward of a state that the plan's object is in, by whatever action it came there."""
+        """Return the reward of a state that the plan's object is in, by whatever action it came
+        there."""
         item = step.state.objects.get(
             _required(self._planner_action(step.index).object_id, "objectId")
         )
@@ -240,7 +242,8 @@ class PublishedTask:
         return self.rules.rewards[kind] * is_done, is_done
 
     def _put_next(self, step: "_Step") -> ThorObject | None:
-        """Return the object of the plan two further on, which puts away what was heated or cooled; None at the end."""
+        """Return the object of the plan two further on, which puts away what was heated or cooled;
+        None at the end."""
         if step.index + 2 >= len(self.plan):
             return None
         object_id = _required(self._planner_action(step.index + 2).object_id, "objectId")

@@ -1,9 +1,11 @@
-"""The published loop's tasks along a trajectory (`run_interactive_eval.py`): which state each plan is rewarded from.
+"""The published loop's tasks along a trajectory (`run_interactive_eval.py`): which state each plan
+is rewarded from.
 
-The loop sets up a task at its first plan, and again after each plan, before the expert repeats that plan. So the agent
-meets a task that has counted the expert's actions of the plan before, from the first sub-goal on. In the first plan of
-each task the state before the agent's first action is the scene's first one. A sub-goal without actions ends the loop.
-The scripts of final tasks go on with the next task, and look at the last one before the final one alone.
+The loop sets up a task at its first plan, and again after each plan, before the expert repeats that
+plan. So the agent meets a task that has counted the expert's actions of the plan before, from the
+first sub-goal on. In the first plan of each task the state before the agent's first action is the
+scene's first one. A sub-goal without actions ends the loop. The scripts of final tasks go on with
+the next task, and look at the last one before the final one alone.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +31,8 @@ _FIRST = "TeleportFull"  # the last action of a scene that was set up
 
 
 class PublishedReward:
-    """The rewards of one plan from its start on, as the published loop gives them; `goal_reached` see `PlanReward`."""
+    """The rewards of one plan from its start on, as the published loop gives them; `goal_reached`
+    see `PlanReward`."""
 
     def __init__(self, task: PublishedTask, sub_goal: int) -> None:
         self._task, self._sub_goal = task, sub_goal
@@ -40,9 +43,10 @@ class PublishedReward:
     ) -> StepReward:
         """Return the reward of an agent's action; see `PlanReward.after`.
 
-        A put into a receptacle counts as refused, though it was carried out: the script binds its event to a name of
-        another spelling, and takes the error that follows for a failure. Switching on or off is refused, as the script
-        sends `ToggleObject`, which AI2-THOR does not have.
+        A put into a receptacle counts as refused, though it was carried out: the script binds its
+        event to a name of another spelling, and takes the error that follows for a failure.
+        Switching on or off is refused, as the script sends `ToggleObject`, which AI2-THOR does not
+        have.
 
         Raises:
             UnscoredError: the published functions raise an exception.
@@ -118,7 +122,8 @@ class PublishedScript:
         """Return a plan that the expert has passed.
 
         Raises:
-            UnscoredError: the published functions raise an exception before its end, or the plan belongs to no task.
+            UnscoredError: the published functions raise an exception before its end, or the plan
+                belongs to no task.
         """
         passed = self._passed.get(index)
         if passed is None:
@@ -166,7 +171,8 @@ class PublishedScript:
     def _planner_reward(
         self, met: PublishedTask, sub_goal: int, replayed: Sequence[Replayed]
     ) -> float:
-        """Return what an agent earns that repeats the expert; up to where the published functions fail, if they do."""
+        """Return what an agent earns that repeats the expert; up to where the published functions
+        fail, if they do."""
         reward = PublishedReward(met.copy(), sub_goal)
         total = 0.0
         try:
@@ -181,7 +187,8 @@ class PublishedScript:
 
 
 def _first_empty(plans: Sequence[Plan], tasks: Sequence[TrajectoryTask]) -> int | None:
-    """Return the place of the first sub-goal of a task that has no actions, None if all have some."""
+    """Return the place of the first sub-goal of a task that has no actions, None if all have
+    some."""
     acted = {plan.high for plan in plans}
     every = (high for task in tasks for high in range(task.first_high, task.end_high))
     return next((high for high in every if high not in acted), None)

@@ -1,4 +1,5 @@
-"""What agents are told by the published scripts and trainers of branch `dev`, word for word (`prompts.yaml`)."""
+"""What agents are told by the published scripts and trainers of branch `dev`, word for word
+(`prompts.yaml`)."""
 
 from functools import cache
 from pathlib import Path

@@ -1,6 +1,7 @@
 """Cumulative reward along trajectories of plans, from journals alone.
 
-A trajectory's curve is a step function: at the end of each plan, in time order, it has the reward of all plans so far.
+A trajectory's curve is a step function: at the end of each plan, in time order, it has the reward
+of all plans so far.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,7 +44,8 @@ FACETS: Mapping[str, Facet] = {
 
 
 def plan_curves(runs: Sequence[PlansRun], task: str | None = None) -> RewardCurves:
-    """Compute the curves of runs (at least one) of a task (None: the only one they share); see `compute_curves`.
+    """Compute the curves of runs (at least one) of a task (None: the only one they share); see
+    `compute_curves`.
 
     Plans that a run excludes are left out of all of them.
 
@@ -74,7 +76,8 @@ def _over_steps(units: Earned[PlanRecord]) -> StepFunction:
 
 
 def _context(record: UnitRecord[PlanRecord]) -> float | None:
-    """Return the context tokens of the plan's last request; None if the model does not count, or was not asked."""
+    """Return the context tokens of the plan's last request; None if the model does not count, or
+    was not asked."""
     steps = record.payload.steps
     return (
         record.tokens.context

@@ -1,4 +1,5 @@
-"""What a replay shows of an agent at one step, as plain values: no simulator is needed to draw it."""
+"""What a replay shows of an agent at one step, as plain values: no simulator is needed to draw
+it."""
 
 from dataclasses import dataclass
 
@@ -31,7 +32,8 @@ class FloorPose:
 
 @dataclass(frozen=True)
 class MapObject:
-    """An object from above: its type, its box's corners of lowest and highest x and z, whether the plan names it."""
+    """An object from above: its type, its box's corners of lowest and highest x and z, whether the
+    plan names it."""
 
     name: str
     low: Point
@@ -73,7 +75,8 @@ class PlanObservation:
 
 @dataclass(frozen=True)
 class PlanTitle:
-    """What a plan asks for, its number from 1 on, and the numbers of the expert's and of the agent's actions."""
+    """What a plan asks for, its number from 1 on, and the numbers of the expert's and of the
+    agent's actions."""
 
     number: int
     n_plans: int
@@ -110,7 +113,8 @@ class PlanFrame(EpisodeFrame[PlanTitle, PlanObservation]):
         action: the action in words; empty if the reply could not be executed.
         reply: reply of the model if it is not the action; else empty.
         wrong: what was wrong with the action; empty if nothing was.
-        goal_reached: whether the goal of the whole task was reached in the plan; set at its end alone.
+        goal_reached: whether the goal of the whole task was reached in the plan; set at its end
+            alone.
     """
 
     rewards: PlanRewards

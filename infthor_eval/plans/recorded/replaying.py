@@ -50,12 +50,14 @@ class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
     """What a run recorded of the plans of one trajectory."""
 
     def between(self, first: int, last: int) -> list[Record]:
-        """Return the records of plans by number, from 1 on, ends included; UsageError if the run lacks some of them."""
+        """Return the records of plans by number, from 1 on, ends included; UsageError if the run
+        lacks some of them."""
         lowest, highest = (self.records[place].payload.index + 1 for place in (0, -1))
         if not lowest <= first <= last <= highest:
             chosen = f"{first}" if first == last else f"{first}-{last}"
             raise UsageError(
-                f"--plans {chosen}: the run has plans {lowest} to {highest} of {self.trajectory}; give some of these"
+                f"--plans {chosen}: the run has plans {lowest} to {highest} of {self.trajectory}; "
+                "give some of these"
             )
         return [record for record in self.records if first <= record.payload.index + 1 <= last]
 
@@ -83,7 +85,8 @@ def replay_plans(
 
 
 class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
-    """A simulator in which recorded plans are replayed. It is started, and the scene restored, for the first plan."""
+    """A simulator in which recorded plans are replayed. It is started, and the scene restored, for
+    the first plan."""
 
     def __init__(
         self,
@@ -152,7 +155,8 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
         )
 
     def _rewards(self, plan: PlanRecord, number: int) -> PlanRewards:
-        """Return the rewards after a number of actions; excluded plans of the trajectory do not count."""
+        """Return the rewards after a number of actions; excluded plans of the trajectory do not
+        count."""
         steps = plan.steps[:number]
         earned = sum(step.reward for step in steps)
         so_far = [item.payload for item in self._recorded.records if item.excluded is None]
@@ -229,11 +233,17 @@ def _words(config: PlanTaskConfig) -> Words:
 def _difference(step: StepRecord, outcome: StepOutcome, is_over: bool, is_last: bool) -> str:
     message = outcome.info.message
     if bool(step.message) != bool(message):
-        return f"{step.action} {_success_text(message)} now, and {_success_text(step.message)} in the run"
+        return (
+            f"{step.action} {_success_text(message)} now, and {_success_text(step.message)} in the "
+            "run"
+        )
     if abs(outcome.reward - step.reward) > _TOLERANCE:
         return f"{step.action} earns {outcome.reward:g} now, and {step.reward:g} in the run"
     if is_over != is_last:
-        return f"the plan {'ends' if is_over else 'goes on'} now, and {'goes on' if is_over else 'ends'} in the run"
+        return (
+            f"the plan {'ends' if is_over else 'goes on'} now, and "
+            f"{'goes on' if is_over else 'ends'} in the run"
+        )
     return ""
 
 
@@ -242,7 +252,8 @@ def _success_text(message: str) -> str:
 
 
 def _action_text(step: StepRecord) -> str:
-    """Return the action in words; of an action given as a call, as by a baseline, the record has its name alone."""
+    """Return the action in words; of an action given as a call, as by a baseline, the record has
+    its name alone."""
     object_id = (step.call or {}).get("objectId")
     if isinstance(object_id, str) and step.call is not None and step.action == step.call["action"]:
         return str(text_of(step.action, object_id))

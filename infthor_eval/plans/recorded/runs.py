@@ -19,7 +19,8 @@ __all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
 
 
 class PlanTaskConfig(TaskConfig, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules` decodes it.
+    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules`
+    decodes it.
 
     All of these are None for imported counts.
     """
@@ -49,7 +50,8 @@ class PlansRun(RecordedRun[PlanRecord, PlanTaskConfig]):
 
 
 def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[PlanRecord]:
-    """Find the plans of a task (None: the only one shared) in trajectories that all runs (at least one) have in full.
+    """Find the plans of a task (None: the only one shared) in trajectories that all runs (at least
+    one) have in full.
 
     Raises:
         UsageError: they share no task or several, or their reward rules differ.
@@ -64,7 +66,8 @@ def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[Plan
     for run, config in zip(runs, configs, strict=True):
         if config.rewards != configs[0].rewards:
             raise UsageError(
-                f"{runs[0].label} and {run.label} have different reward rules; draw runs with the same --rewards"
+                f"{runs[0].label} and {run.label} have different reward rules; draw runs with the "
+                "same --rewards"
             )
     differences = difference_notes(
         "continuation after a failed plan", runs, [it.after_failure for it in configs]

@@ -65,7 +65,8 @@ def _panel(path: Path, title: str, named: object, curves: RewardCurves) -> Panel
     for name in map(str, named):
         if name not in labels:
             raise DataError(
-                f"{path}: {title!r:.60}: {name!r:.60} is none of the runs; there are {', '.join(labels)}"
+                f"{path}: {title!r:.60}: {name!r:.60} is none of the runs; there are "
+                f"{', '.join(labels)}"
             )
     return Panel(title, tuple(dict.fromkeys(map(str, named))))
 

@@ -37,7 +37,8 @@ def draw_curves(
 
 
 def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
-    """Return a figure with a row per panel, with the bound in each, and a column for each facet that some run has."""
+    """Return a figure with a row per panel, with the bound in each, and a column for each facet
+    that some run has."""
     facets = {
         name: facet
         for name, facet in curves.facets.items()
@@ -99,7 +100,8 @@ def _draw_curve(axes: Axes, curve: Curve, look: Look, order: int) -> None:
         lw=look.width,
         zorder=order,
     )
-    # A dot marks the end: where contexts were cut, many plans end at the last place and the line rises there.
+    # A dot marks the end: where contexts were cut, many plans end at the last place and the line
+    # rises there.
     axes.plot(curve.places[-1:], means[-1:], marker="o", ms=3.5, color=look.colour, zorder=order)
     low = [
         mean if estimate.low is None else estimate.low
@@ -117,5 +119,6 @@ def _draw_curve(axes: Axes, curve: Curve, look: Look, order: int) -> None:
 def _heading(curves: RewardCurves) -> list[str]:
     intervals = ", 95 % intervals shaded" if curves.n_trajectories > 1 else ""
     mean = f"mean over {trajectories_text(curves.n_trajectories)}{intervals}"
-    # A line each: together they would be wider than a figure of one panel, and be wrapped in the middle.
+    # A line each: together they would be wider than a figure of one panel, and be wrapped in the
+    # middle.
     return [f"Cumulative reward on {curves.task}", mean, *filter(None, [embedded_label(curves)])]

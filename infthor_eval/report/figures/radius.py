@@ -119,7 +119,10 @@ def _draw_panel(axes: Axes, lines: Sequence[RadiusLine], looks: Mapping[str, Loo
 
 def _heading(success: SuccessByRadius) -> list[str]:
     intervals = ", 95 % intervals beside the points" if success.n_trajectories > 1 else ""
-    title = f"Success by radius on {success.task}: episodes of {trajectories_text(success.n_trajectories)}{intervals}"
+    title = (
+        f"Success by radius on {success.task}: episodes of "
+        f"{trajectories_text(success.n_trajectories)}{intervals}"
+    )
     return [title, *_label(success)]
 
 

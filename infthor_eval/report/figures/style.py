@@ -1,4 +1,5 @@
-"""The style of all figures: colours and lines of runs, texts around panels, files in PNG and SVG."""
+"""The style of all figures: colours and lines of runs, texts around panels, files in PNG and
+SVG."""
 
 import io
 import re
@@ -29,8 +30,9 @@ __all__ = [
     "save_figure",
 ]
 
-# Okabe and Ito's colours, which colour-blind readers can tell apart, without yellow (too faint for a line) and black
-# (the bound's). Runs beyond their number take them again with another style of line; dashes are the bound's.
+# Okabe and Ito's colours, which colour-blind readers can tell apart, without yellow (too faint for
+# a line) and black (the bound's). Runs beyond their number take them again with another style of
+# line; dashes are the bound's.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _STYLES = ("solid", "dotted", "dashdot")
 _SETTINGS: dict[Any, Any] = {
@@ -43,10 +45,12 @@ _SETTINGS: dict[Any, Any] = {
     "grid.linewidth": 0.6,
     "text.parse_math": False,  # a name with two dollar signs is no formula
     "svg.fonttype": "none",  # texts stay texts: searchable and editable
-    "svg.hashsalt": "infthor-eval",  # otherwise ids of clip paths are random, and equal figures differ
+    # otherwise ids of clip paths are random, and equal figures differ
+    "svg.hashsalt": "infthor-eval",
 }
 _SVG_METADATA: dict[str, Any] = {"Date": None}  # a date would make equal figures differ
-# On a page, ink takes the page's colours, which matplotlib cannot write: these placeholders are replaced afterwards.
+# On a page, ink takes the page's colours, which matplotlib cannot write: these placeholders are
+# replaced afterwards.
 _INK, _GRID = "#010203", "#040506"
 _PAGE_SETTINGS: dict[Any, Any] = {
     **dict.fromkeys(
@@ -84,7 +88,8 @@ def looks_of(labels: Iterable[str], together: Iterable[Collection[str]] = ()) ->
 
     Args:
         labels: labels of the runs.
-        together: labels that share a panel; they have different colours as long as there are enough.
+        together: labels that share a panel; they have different colours as long as there are
+            enough.
     """
     # The colours of one style of line, then those of the next.
     all_looks = [Look(colour, style, 1.5) for style in _STYLES for colour in _COLOURS]
@@ -99,7 +104,8 @@ def looks_of(labels: Iterable[str], together: Iterable[Collection[str]] = ()) ->
 
 
 def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG and return the files' paths; the same figure gives the same bytes of SVG.
+    """Write a figure as PNG and SVG and return the files' paths; the same figure gives the same
+    bytes of SVG.
 
     Args:
         draw: draws the figure; called with the style in effect.
@@ -115,7 +121,8 @@ def save_figure(draw: Callable[[], Figure], folder: Path, name: str) -> list[Pat
 
 
 def inline_svg(draw: Callable[[], Figure]) -> str:
-    """Return a figure as an element of a page, in the page's colours (light or dark) and no wider than its column."""
+    """Return a figure as an element of a page, in the page's colours (light or dark) and no wider
+    than its column."""
     with _in_style(_PAGE_SETTINGS):
         text, figure = io.StringIO(), draw()
         figure.savefig(text, format="svg", transparent=True, metadata=_SVG_METADATA)
@@ -130,7 +137,8 @@ def inline_svg(draw: Callable[[], Figure]) -> str:
 
 @contextmanager
 def _in_style(more: dict[Any, Any] | None = None) -> Iterator[None]:
-    """Apply the style, instead of the user's settings of matplotlib, which would change the picture."""
+    """Apply the style, instead of the user's settings of matplotlib, which would change the
+    picture."""
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS | (more or {}))
@@ -161,7 +169,8 @@ def add_legend(axes: Axes, entries: Sequence[tuple[str, Look]]) -> None:
 
 
 def add_words(figure: Figure, heading: Sequence[str], notes: Sequence[str], width: float) -> None:
-    """Write the lines of the heading above the panels, and the notes below them; `width` is the figure's, in inches."""
+    """Write the lines of the heading above the panels, and the notes below them; `width` is the
+    figure's, in inches."""
     settings: dict[str, Any] = {"x": 0.01, "ha": "left"}
     wrapped = [
         part for line in heading for part in textwrap.wrap(printable(line), round(width * 12))

@@ -1,4 +1,5 @@
-"""The addresses of the page on a run: the page, its script and styles, and the state that it asks for each second."""
+"""The addresses of the page on a run: the page, its script and styles, and the state that it asks
+for each second."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ __all__ = ["live_routes"]
 
 
 def live_routes(run: LiveRun) -> list[Route]:
-    """Return the routes of the page on a run, which read it and nothing else; the extra `page` must be installed."""
+    """Return the routes of the page on a run, which read it and nothing else; the extra `page` must
+    be installed."""
     from starlette.responses import Response
     from starlette.routing import Route
 

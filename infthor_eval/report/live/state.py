@@ -1,4 +1,5 @@
-"""What the page on a run shows: a pure function of the run's folder at a moment, worked out again as it grows."""
+"""What the page on a run shows: a pure function of the run's folder at a moment, worked out again
+as it grows."""
 
 import time
 from collections import Counter
@@ -25,7 +26,8 @@ Status = Literal["waiting", "running", "ended", "stopped", "done", "unknown"]
 _N_NEWEST = 30  # samples that are shown
 _N_FAILURES = 50
 _LONGEST = 2000  # characters of a text
-_REST = 9  # times as long as the metrics took they rest, so that they take a tenth of a processor at most
+# times as long as the metrics took they rest, so that they take a tenth of a processor at most
+_REST = 9
 
 
 class LiveSample(msgspec.Struct, frozen=True):
@@ -53,7 +55,8 @@ class Totals(msgspec.Struct, frozen=True):
     """Sums over the samples that are there.
 
     Attributes:
-        seconds: of all samples, in seconds of each; more than on the clock if several are evaluated at once.
+        seconds: of all samples, in seconds of each; more than on the clock if several are evaluated
+            at once.
         reasons: number of failed samples by reason, the most frequent first.
     """
 
@@ -69,8 +72,9 @@ class LiveState(msgspec.Struct, frozen=True, kw_only=True):
     """The run at a moment.
 
     Attributes:
-        status: "waiting" before its first line; "running" while a process of this machine holds the journal; "done"
-            and "stopped" by its results; "ended" if it has none; "unknown" where the system has no list of locks.
+        status: "waiting" before its first line; "running" while a process of this machine holds the
+            journal; "done" and "stopped" by its results; "ended" if it has none; "unknown" where
+            the system has no list of locks.
         folder: folder of the run, or the one where it is waited for.
         problem: why the journal cannot be read; empty if it can.
         age: seconds since something was written; None before the first line.
@@ -110,7 +114,8 @@ class LiveRun:
         """Read nothing yet.
 
         Args:
-            folder: folder of the run, or one above it: the run below it that was written last, once there is one.
+            folder: folder of the run, or one above it: the run below it that was written last, once
+                there is one.
             find_suite: returns the suite of a name.
             find_presenter: returns the presenter of a suite.
         """

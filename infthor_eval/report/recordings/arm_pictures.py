@@ -1,4 +1,5 @@
-"""Frames of an arm's replayed episodes as pictures: the view beside the arm's reach, and the request below."""
+"""Frames of an arm's replayed episodes as pictures: the view beside the arm's reach, and the
+request below."""
 
 from collections.abc import Iterable, Iterator
 from functools import partial
@@ -35,8 +36,14 @@ def arm_pictures(frames: Iterable[ArmFrame], heading: str) -> Iterator[Image.Ima
 def draw_arm_title(frame: ArmFrame, heading: str) -> Image.Image:
     """Draw the card before an episode; for an episode in which nobody acted it has the reason."""
     title = frame.title
-    place = f"{title.kind}, episode {title.number} of {title.n_episodes} (the expert's action {title.action})"
-    settings = f"radius of the hand's sphere {title.radius:g} m; a success earns {frame.max_reward:g} points"
+    place = (
+        f"{title.kind}, episode {title.number} of {title.n_episodes} (the expert's action "
+        f"{title.action})"
+    )
+    settings = (
+        f"radius of the hand's sphere {title.radius:g} m; a success earns {frame.max_reward:g} "
+        "points"
+    )
     lines = [
         Line("", place, 26, colour=FAINT),
         Line("", one_line(title.instruction), 46, "-Bold", most=2),

@@ -19,7 +19,8 @@ _WIDTH = 2 * _EDGE + _SIDE + COLUMNS * (_CELL + _GAP) - _GAP
 
 
 def shown_steps(n_steps: int) -> list[int]:
-    """Return the steps of an episode that are shown: its start (0), its last step, and some between, evenly spaced."""
+    """Return the steps of an episode that are shown: its start (0), its last step, and some
+    between, evenly spaced."""
     return choose_evenly(range(n_steps + 1), COLUMNS)
 
 
@@ -27,7 +28,8 @@ def draw_sheet(episodes: Sequence[Sequence[ArmFrame]], heading: str) -> Image.Im
     """Draw the sheet, with the run and the trajectory as its heading.
 
     Args:
-        episodes: the frames of each episode that are shown (`shown_steps`), at most `COLUMNS`, in time order.
+        episodes: the frames of each episode that are shown (`shown_steps`), at most `COLUMNS`, in
+            time order.
     """
     row = _CELL + _CAPTION + _GAP
     picture = Image.new("RGB", (_WIDTH, _TOP + len(episodes) * row), "white")
@@ -46,7 +48,8 @@ def draw_sheet(episodes: Sequence[Sequence[ArmFrame]], heading: str) -> Image.Im
 
 
 def sheet_rows(frames: Iterable[ArmFrame]) -> Iterator[list[ArmFrame]]:
-    """Yield the frames of each episode that are shown; a difference between two of them is noted at the later one."""
+    """Yield the frames of each episode that are shown; a difference between two of them is noted at
+    the later one."""
     row: list[ArmFrame] = []
     note = ""
     for frame in frames:

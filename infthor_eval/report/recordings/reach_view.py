@@ -1,4 +1,5 @@
-"""An arm and the objects near it, from above and from the side; the agent looks to the right in both views."""
+"""An arm and the objects near it, from above and from the side; the agent looks to the right in
+both views."""
 
 from PIL import Image, ImageDraw
 
@@ -91,7 +92,8 @@ class _Pane:
         _draw_dot(pen, (x, y), 6 * OVERSAMPLING, _HAND)
 
     def _write_names(self, pen: ImageDraw.ImageDraw) -> None:
-        """Write each name in the middle of its object; beside it if it is small and the instruction names it."""
+        """Write each name in the middle of its object; beside it if it is small and the instruction
+        names it."""
         occupied: list[tuple[float, float]] = []
         for item in sorted(self._items, key=lambda item: not item.is_named):
             face = font(13, "-Bold") if item.is_named else font(12)

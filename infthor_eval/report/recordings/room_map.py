@@ -200,7 +200,8 @@ class _Name(NamedTuple):
 
 
 def _name(item: MapObject, scale: _Scale, size: int) -> _Name | None:
-    """Place a name in the object's box, or beside it if the plan names it and the box is too small."""
+    """Place a name in the object's box, or beside it if the plan names it and the box is too
+    small."""
     face = font(14, "-Bold") if item.is_named else font(12)
     x, y = scale.at(_middle(item))
     wide, high = (
@@ -238,7 +239,8 @@ def _middle(item: MapObject) -> Point:
 def _draw_legend(
     pen: ImageDraw.ImageDraw, legend: Sequence[tuple[float, str, str]], size: int
 ) -> None:
-    """Draw the dots of the legend; its text is written into the final picture, as letters need no oversampling."""
+    """Draw the dots of the legend; its text is written into the final picture, as letters need no
+    oversampling."""
     fine, radius, y = size * OVERSAMPLING, 6 * OVERSAMPLING, (size - _LEGEND / 2) * OVERSAMPLING
     pen.rectangle((0, fine - _LEGEND * OVERSAMPLING, fine, fine), fill="white")
     for left, _, colour in legend:

@@ -1,4 +1,5 @@
-"""Presenter of manipulation: what an arm did step by step, its reward, and its success by radius."""
+"""Presenter of manipulation: what an arm did step by step, its reward, and its success by
+radius."""
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -98,7 +99,8 @@ def _model_runs(runs: Sequence[ReportRun]) -> list[ArmRun]:
 
 
 def _runs_by_radius(runs: Sequence[ReportRun]) -> list[ArmRun]:
-    """Runs named after their models and radii, or by all options that differ if that is ambiguous."""
+    """Runs named after their models and radii, or by all options that differ if that is
+    ambiguous."""
     named = label_by_radius(_model_runs(runs))
     return (
         named
@@ -144,7 +146,8 @@ class ManipulationPresenter(PlainPresenter):
         return metric == self.main_metric
 
     def sections(self, runs: Sequence[ReportRun]) -> Iterator[Section]:
-        """See `Presenter.sections`: reward along trajectories, and success by radius where there are several radii."""
+        """See `Presenter.sections`: reward along trajectories, and success by radius where there
+        are several radii."""
         from infthor_eval.report.figures.radius import radii_figure, radii_table
         from infthor_eval.report.suites.reward_curves import (
             DrawnFigure,

@@ -1,4 +1,5 @@
-"""Chart of memories: accuracy against the tokens of a question, a curve for each memory over its budgets."""
+"""Chart of memories: accuracy against the tokens of a question, a curve for each memory over its
+budgets."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple

@@ -1,4 +1,5 @@
-"""Charts of NIEH results: accuracy by clues, type, evidence shown and depth, and gains over frames and guessing."""
+"""Charts of NIEH results: accuracy by clues, type, evidence shown and depth, and gains over frames
+and guessing."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -72,7 +73,8 @@ def _by_clues(task: str, lines: Sequence[_Line]) -> Chart:
 
 
 def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
-    """Draw accuracy by the share of the clue frames that were shown, and by distance of the last clue; by file."""
+    """Draw accuracy by the share of the clue frames that were shown, and by distance of the last
+    clue; by file."""
     for file in lines[0].task.evidence:
         of_file = f"{task}, {short_name(file)}" if len(lines[0].task.evidence) > 1 else task
 
@@ -102,7 +104,8 @@ def _by_columns(
     cells_of: Callable[[_Line], Mapping[str, Cell]],
     label: str,
 ) -> Chart:
-    """Draw a column per name, with the dots of all lines; the counts are those of the first line."""
+    """Draw a column per name, with the dots of all lines; the counts are those of the first
+    line."""
 
     def draw() -> Figure:
         figure = Figure(figsize=(_PANEL[0] + LEGEND, _PANEL[1]), layout="constrained")
@@ -182,7 +185,8 @@ def _describe(lines: Sequence[_Line]) -> str:
 
 
 def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
-    """Draw the gain of each run over blank frames, a row per task; None if no run on blank frames is among them."""
+    """Draw the gain of each run over blank frames, a row per task; None if no run on blank frames
+    is among them."""
     rows = [
         (f"{name_of(gain.run)}, {gain.task}", total)
         for gain in find_gains([run.summary for run in runs])
@@ -234,7 +238,8 @@ def _by_rows(
 
 
 def _heat_map(run: ReportRun) -> Chart | None:
-    """Draw accuracy by depth of the needle and size of the context; None if no task of the run has depths."""
+    """Draw accuracy by depth of the needle and size of the context; None if no task of the run has
+    depths."""
     tasks = {
         int(run.dataset(name).get("ctx_size") or 0): task
         for name, task in run.summary.summary.tasks.items()

@@ -31,4 +31,7 @@ def _facts(step: Step) -> FrameFacts:
 
 
 def _pose(pose: LoggedPose) -> str:
-    return f"x {pose.x:.2f} m, z {pose.z:.2f} m; turned {pose.rotation:.0f}°, camera {pose.horizon:.0f}° down"
+    return (
+        f"x {pose.x:.2f} m, z {pose.z:.2f} m; turned {pose.rotation:.0f}°, camera "
+        f"{pose.horizon:.0f}° down"
+    )

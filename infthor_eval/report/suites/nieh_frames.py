@@ -1,4 +1,5 @@
-"""Frames of questions: the clues with their neighbours, or some of all frames where there are no clues."""
+"""Frames of questions: the clues with their neighbours, or some of all frames where there are no
+clues."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +27,8 @@ def find_timelines(
 ) -> Timelines:
     """See `Presenter.timelines`; a set that is missing or has changed since the run has a note.
 
-    Clues of all questions get their pictures before any neighbour does, as there is a limit on the size of all.
+    Clues of all questions get their pictures before any neighbour does, as there is a limit on the
+    size of all.
     """
     sets, logs = RunSets(runs, data), _TrajectoryFacts()
     chosen: dict[UnitKey, _FrameChoice] = {}

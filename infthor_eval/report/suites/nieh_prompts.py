@@ -98,7 +98,8 @@ def _film(part: ContextPart, places: Mapping[FrameRef, int], ablation: str) -> P
 def _frames(
     what: str, frames: Sequence[FrameRef], places: Mapping[FrameRef, int], ablation: str
 ) -> PromptFrames:
-    """Return frames by their places; frames of another trajectory, blank or decoded ones have none in this one."""
+    """Return frames by their places; frames of another trajectory, blank or decoded ones have none
+    in this one."""
     found = [places.get(frame) for frame in frames]
     own = [place for place in found if place is not None]
     is_own = len(own) == len(found)

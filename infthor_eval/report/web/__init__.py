@@ -1,1 +1,2 @@
-"""Runs as one page that works offline: their results, and every sample with its frames and replies."""
+"""Runs as one page that works offline: their results, and every sample with its frames and
+replies."""

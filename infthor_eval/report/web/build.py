@@ -30,7 +30,8 @@ class PageRequest:
     """Options of the page.
 
     Attributes:
-        data: folder of the questions' set, or of the trajectories; None for the one that each run names.
+        data: folder of the questions' set, or of the trajectories; None for the one that each run
+            names.
         scenes: folder of recorded floor plans, for replays.
         episodes: number of episodes of each run to replay.
         pictures: maximum size of all pictures together, in bytes.

@@ -29,7 +29,8 @@ _SCRIPTS = (
     "report.js",
 )  # one script on the page, in this order
 
-# In a script element "</script" and "<!--" would end or twist it; the line separators end a line of a script.
+# In a script element "</script" and "<!--" would end or twist it; the line separators end a line of
+# a script.
 _ESCAPED = {
     "<": "\\u003c",
     ">": "\\u003e",
@@ -161,7 +162,8 @@ def _data(page: Page) -> Markup:
 
 
 def _share_details(samples: list[Any]) -> tuple[list[Any], list[tuple[str, str]]]:
-    """Return samples with the numbers of their details, and the details: many samples have the same."""
+    """Return samples with the numbers of their details, and the details: many samples have the
+    same."""
     facts: Numbered[tuple[str, str]] = Numbered()
     for sample in samples:
         for result in filter(None, sample["results"]):

@@ -1,6 +1,7 @@
 """Episodes replayed for the page: a journal has every action and no frame."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +18,8 @@ from infthor_eval.runs import UnitKey, UnitRecord
 __all__ = ["EpisodePictures", "EpisodeReplays"]
 
 Record = UnitRecord[Any]
-# Pixels of a map's side: drawn larger than it is shown, since small letters are easier to read when they are reduced.
+# Pixels of a map's side: drawn larger than it is shown, since small letters are easier to read when
+# they are reduced.
 _DRAWN, _SHOWN = 560, 300
 _WORK = "episodes replayed"
 
@@ -66,7 +68,8 @@ class EpisodeReplays:
             progress.begin(_WORK, n_episodes)
 
     def replay(self, run: ReportRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
-        """Replay the chosen episodes of a run; return their pictures, and why a trajectory could not be replayed."""
+        """Replay the chosen episodes of a run; return their pictures, and why a trajectory could
+        not be replayed."""
         pictures: dict[UnitKey, EpisodePictures] = {}
         notes: list[str] = []
         replay = run.presenter.replay
@@ -105,9 +108,7 @@ class EpisodeReplays:
             return EpisodePictures()
         name = f"{run.folder}/{record.key.task}/{record.key}"
         numbers = [
-            self._thumbnails.add(
-                f"{name}/{number}", lambda frame=observation.frame: Image.fromarray(frame)
-            )  # type: ignore[misc]
+            self._thumbnails.add(f"{name}/{number}", partial(Image.fromarray, observation.frame))
             for number, observation in enumerate(seen)
         ]
         at_end = self._thumbnails.add(

@@ -33,7 +33,10 @@ def costs_table(runs: Sequence[ReportRun]) -> Table:
     """Return speed and cost, with a row per run."""
     tokens = ("tokens read", "of them cached, %", "tokens written")
     columns = ("samples", "seconds", "samples / s", "requests", *tokens, "cost")
-    note = "Seconds are the samples' own, added up: several workers take less by the clock. Cost is in US dollars."
+    note = (
+        "Seconds are the samples' own, added up: several workers take less by the clock. Cost is "
+        "in US dollars."
+    )
     return Table(
         "", (Column("run", False), *map(Column, columns)), tuple(map(_cost_row, runs)), (note,)
     )
@@ -50,7 +53,8 @@ def _cost_row(run: ReportRun) -> Row:
 
 
 def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
-    """Return the numbers of failed, excluded, retried, skipped and missing units by reason; None if there are none."""
+    """Return the numbers of failed, excluded, retried, skipped and missing units by reason; None if
+    there are none."""
     rows = [
         Row((run.label, task, what, str(n), reason))
         for run in runs

@@ -162,7 +162,8 @@ def _result(source: _Source, record: Record, pictures: EpisodePictures) -> Sampl
 
 
 def _with_pictures(steps: Sequence[StepRow], frames: Sequence[int | None]) -> tuple[StepRow, ...]:
-    """The first frame is the start; an episode that ends early in the replay has fewer frames than steps."""
+    """The first frame is the start; an episode that ends early in the replay has fewer frames than
+    steps."""
     return tuple(
         msgspec.structs.replace(step, picture=frames[number]) if number < len(frames) else step
         for number, step in enumerate(steps, 1)

@@ -25,7 +25,8 @@ class FrameFacts(msgspec.Struct, frozen=True, omit_defaults=True):
 
     Attributes:
         step: number of the step; None if it is not known.
-        action: the action before the frame, in the log's words; empty for the first frame, and where the log has none.
+        action: the action before the frame, in the log's words; empty for the first frame, and
+            where the log has none.
         error: why the simulator refused the action; empty if it did not.
         objects: types of the visible objects.
         held: types of the objects in the agent's hand.
@@ -89,8 +90,8 @@ class PromptFrames(msgspec.Struct, frozen=True):
 
     Attributes:
         what: what they are, in words ("frames", "blank frames", "video of 1 frames per second").
-        places: first and last place in the trajectory of each stretch of neighbours, in the order shown; empty where
-            they are no frames of it.
+        places: first and last place in the trajectory of each stretch of neighbours, in the order
+            shown; empty where they are no frames of it.
         n: number of frames.
     """
 
@@ -145,7 +146,8 @@ class SampleResult(msgspec.Struct, frozen=True, omit_defaults=True):
         reason: why the sample failed or was excluded.
         faults: faults after which it was retried.
         seconds: time it took.
-        tokens: number of context tokens, of cached ones among them, and of reply tokens; None if unknown.
+        tokens: number of context tokens, of cached ones among them, and of reply tokens; None if
+            unknown.
         details: further facts by name.
         steps: steps of an episode.
         start: number of the thumbnail of the frame before the first step.

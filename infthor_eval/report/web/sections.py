@@ -32,7 +32,8 @@ class Section:
         charts: charts, above the tables.
         tables: tables with the numbers.
         notes: remarks, a paragraph each.
-        is_linked: whether the head of the page has a link to it; parts of another section have none.
+        is_linked: whether the head of the page has a link to it; parts of another section have
+            none.
     """
 
     key: str

@@ -1,4 +1,5 @@
-"""Reading the journal of a run while the run writes it: nothing is locked or written, so the run does not notice."""
+"""Reading the journal of a run while the run writes it: nothing is locked or written, so the run
+does not notice."""
 
 import os
 from collections import deque
@@ -65,7 +66,8 @@ class FollowedJournal:
         return self.log.header
 
     def read(self) -> bool:
-        """Read what is new; return whether there was anything. A last line without its end is left for the next time.
+        """Read what is new; return whether there was anything. A last line without its end is left
+        for the next time.
 
         Raises:
             DataError: a line is bad.
@@ -113,10 +115,11 @@ class FollowedJournal:
 
 
 def is_written(run: Path) -> bool | None:
-    """Return whether a process of this machine holds a journal, as runs do while they go on; None if that is not known.
+    """Return whether a process of this machine holds a journal, as runs do while they go on; None
+    if that is not known.
 
-    The system's list of locks is read: to try a lock would be to hold it for a moment, and a run that starts in that
-    moment would be refused.
+    The system's list of locks is read: to try a lock would be to hold it for a moment, and a run
+    that starts in that moment would be refused.
 
     Raises:
         OSError: a shard was moved away meanwhile.

@@ -1,13 +1,13 @@
 """The journal of a run: every finished unit, one JSON line each, on disk before it counts.
 
-A journal is a folder of shards, which are read together. A shard belongs to one worker: number 0 to the driver, the
-others to the workers of a pool. Only its owner writes it, and holds a lock on it while it does, so a line needs no
-coordination with other processes, and a second run in the same folder is refused. The first line of each shard is the
-run's header.
+A journal is a folder of shards, which are read together. A shard belongs to one worker: number 0 to
+the driver, the others to the workers of a pool. Only its owner writes it, and holds a lock on it
+while it does, so a line needs no coordination with other processes, and a second run in the same
+folder is refused. The first line of each shard is the run's header.
 
-A record is looked up by its unit's key, and counts only if the fingerprint of the unit's inputs is the same, so a
-result from other inputs is never used. A line that a killed process left unfinished is cut off when its shard is opened
-again.
+A record is looked up by its unit's key, and counts only if the fingerprint of the unit's inputs is
+the same, so a result from other inputs is never used. A line that a killed process left unfinished
+is cut off when its shard is opened again.
 """
 
 import fcntl
@@ -79,7 +79,8 @@ class Journal(Generic[P]):
             path.parent.mkdir(parents=True, exist_ok=True)
             if path.exists():
                 require_file(path, "take it out of the run's folder")
-            # Unbuffered: bytes that a full disk refused must not be written later, when the file is closed.
+            # Unbuffered: bytes that a full disk refused must not be written later, when the file is
+            # closed.
             self._file: FileIO = path.open("a+b", buffering=0)
         except OSError as error:
             raise UsageError(
@@ -110,18 +111,21 @@ class Journal(Generic[P]):
         return self._log.records
 
     def find_record(self, key: UnitKey, fingerprint: str) -> UnitRecord[P] | None:
-        """Return the record of a unit with a result from these inputs; a failed unit is tried again by the next run."""
+        """Return the record of a unit with a result from these inputs; a failed unit is tried again
+        by the next run."""
         record = self._log.units.get(key)
         if record is None or record.failure is not None or record.fingerprint != fingerprint:
             return None
         return record
 
     def latest_records(self, keys: Iterable[UnitKey]) -> tuple[UnitRecord[P], ...]:
-        """Return the latest records of these units, failed ones included; units without a record are left out."""
+        """Return the latest records of these units, failed ones included; units without a record
+        are left out."""
         return tuple(self._log.units[key] for key in keys if key in self._log.units)
 
     def result_of(self, key: UnitKey) -> UnitRecord[P] | None:
-        """Return the latest record of a unit if it has a result, from whatever inputs, else None."""
+        """Return the latest record of a unit if it has a result, from whatever inputs, else
+        None."""
         record = self._log.units.get(key)
         return None if record is None or record.failure is not None else record
 
@@ -130,7 +134,8 @@ class Journal(Generic[P]):
         self._log.add(record)
 
     def add_from(self, worker: int, record: UnitRecord[P]) -> None:
-        """Add a record that a worker has put on disk; where its shard is not visible here, write it into this one.
+        """Add a record that a worker has put on disk; where its shard is not visible here, write it
+        into this one.
 
         Raises:
             DataError: it cannot be written.
@@ -146,11 +151,13 @@ class Journal(Generic[P]):
             read_shard(path, self._decoder, self._log)
 
     def holds(self, record: UnitRecord[P]) -> bool:
-        """Return whether this very object is in the journal: a record that the suite found there and yielded as is."""
+        """Return whether this very object is in the journal: a record that the suite found there
+        and yielded as is."""
         return self._log.units.get(record.key) is record
 
     def append(self, record: UnitRecord[P]) -> UnitRecord[P]:
-        """Write a record; it is on disk when this returns. The returned record has the number of its attempt.
+        """Write a record; it is on disk when this returns. The returned record has the number of
+        its attempt.
 
         Raises:
             DataError: it cannot be written, or the shard was deleted or replaced.
@@ -202,7 +209,8 @@ class Journal(Generic[P]):
         ):  # threads must not mix their lines
             while line:  # an unbuffered write may take a part of the line only
                 line = line[self._file.write(line) :]
-            # Before the record counts: after a crash of the machine a unit is done if and only if its line is there.
+            # Before the record counts: after a crash of the machine a unit is done if and only if
+            # its line is there.
             os.fsync(self._file.fileno())
 
     def check_file(self) -> None:
@@ -217,7 +225,8 @@ class Journal(Generic[P]):
             is_same = False
         if not is_same:
             raise DataError(
-                f"{self._path}: was deleted or replaced while the run wrote it; run the same command again"
+                f"{self._path}: was deleted or replaced while the run wrote it; run the same "
+                "command again"
             )
 
 
@@ -236,7 +245,8 @@ def _lock(file: BinaryIO | FileIO, path: Path, wait_s: float = 0.0) -> None:
 
 
 def recover(run: Path, header: RunHeader, types: RecordTypes[Any]) -> int:
-    """Move the bad lines of a run's shards to a file beside them, so that their units are tried again.
+    """Move the bad lines of a run's shards to a file beside them, so that their units are tried
+    again.
 
     The header replaces a bad first line. Returns the number of bad lines.
 

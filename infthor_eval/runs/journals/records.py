@@ -1,7 +1,7 @@
 """The lines of a journal: the run's header, records of units, and cached artifacts.
 
-A line is a JSON object whose `type` is one of the three. A unit's envelope is the same for every suite. Its payload
-is the suite's own, and tagged in turn.
+A line is a JSON object whose `type` is one of the three. A unit's envelope is the same for every
+suite. Its payload is the suite's own, and tagged in turn.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,8 @@ class UnitKey(NamedTuple):
     Attributes:
         task: name of the task.
         id: id of the question or the episode.
-        variant: variant of the task's evaluation of it ("depth=0.4"); empty where there is only one.
+        variant: variant of the task's evaluation of it ("depth=0.4"); empty where there is only
+            one.
         repeat: number of its repetition, from 1, where it is evaluated several times.
     """
 
@@ -61,7 +62,8 @@ class UnitKey(NamedTuple):
 
 
 class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Tokens of a unit's requests, of those that were not encoded again, and of its replies; None if not counted."""
+    """Tokens of a unit's requests, of those that were not encoded again, and of its replies; None
+    if not counted."""
 
     context: Count | None = None
     cached: Count | None = None
@@ -104,12 +106,14 @@ class UnitRecord(
     """A unit that was evaluated, or the reason why it could not be.
 
     Attributes:
-        cluster: name of what it shares with units that are right or wrong together (a trajectory), for intervals.
+        cluster: name of what it shares with units that are right or wrong together (a trajectory),
+            for intervals.
         fingerprint: hash of all its inputs; empty if they could not be read.
         payload: the suite's own struct.
         attempt: number of the attempt, from 1.
         failure: reason why there is no result; None if there is one.
-        excluded: reason why the unit does not count, through no fault of the subject; None if it counts.
+        excluded: reason why the unit does not count, through no fault of the subject; None if it
+            counts.
         faults: faults that were retried, a line each.
         seconds: duration.
         tokens: tokens of the unit.
@@ -146,7 +150,8 @@ class ArtifactRecord(
     tag_field="type",
     tag="artifact",
 ):
-    """A cached artifact: an intermediate result of a suite that a resumed run does not compute again.
+    """A cached artifact: an intermediate result of a suite that a resumed run does not compute
+    again.
 
     Attributes:
         fingerprint: hash of all its inputs, by which it is looked up.
@@ -165,7 +170,8 @@ class RecordTypes(Generic[P_co]):
 
     Attributes:
         unit: payload of its units.
-        artifact: payload of its cached artifacts, a union if there are several kinds; None where it caches none.
+        artifact: payload of its cached artifacts, a union if there are several kinds; None where it
+            caches none.
     """
 
     unit: type[P_co]
@@ -178,7 +184,8 @@ class RecordTypes(Generic[P_co]):
 
 
 def describe_failure(error: Exception) -> str:
-    """Return the message of an expected error, or type, place and message of another exception, in one line."""
+    """Return the message of an expected error, or type, place and message of another exception, in
+    one line."""
     if isinstance(error, InfthorError):
         return str(error)
     return f"{describe_exception(error)}; fix the suite and run the same command again"
@@ -199,7 +206,8 @@ class Unit(Generic[P]):
     payload: P
 
     def without_inputs(self) -> "Unit[P]":
-        """Return what can record its failure in another process, without the inputs that only the suite needs."""
+        """Return what can record its failure in another process, without the inputs that only the
+        suite needs."""
         return Unit(self.key, self.cluster, self.payload)
 
     def record(self, fingerprint: str, payload: P, **envelope: Any) -> UnitRecord[P]:

@@ -41,7 +41,8 @@ class JournalSession(Generic[P]):
         self.journal.cache_artifact(fingerprint, artifact, usage)
 
     def append_new(self, record: UnitRecord[P]) -> tuple[UnitRecord[P], bool]:
-        """Put a suite's record on disk unless it is there already; return it, and True if it was there."""
+        """Put a suite's record on disk unless it is there already; return it, and True if it was
+        there."""
         if self.journal.holds(record):
             return record, True
         return self.journal.append(self._note_changed_inputs(record)), False
@@ -51,5 +52,8 @@ class JournalSession(Generic[P]):
         earlier = self.journal.result_of(record.key)
         if earlier is None or not record.fingerprint or earlier.fingerprint == record.fingerprint:
             return record
-        changed = f"its inputs changed since attempt {earlier.attempt}: a frame, a text or a trajectory is another now"
+        changed = (
+            f"its inputs changed since attempt {earlier.attempt}: a frame, a text or a trajectory "
+            "is another now"
+        )
         return msgspec.structs.replace(record, faults=(*record.faults, changed))

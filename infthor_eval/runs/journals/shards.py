@@ -47,14 +47,16 @@ _HINT = (
 
 @dataclass
 class RunLog(Generic[P]):
-    """The contents of all shards of a run: latest records of units, and artifacts by fingerprint."""
+    """The contents of all shards of a run: latest records of units, and artifacts by
+    fingerprint."""
 
     header: RunHeader | None = None
     units: dict[UnitKey, UnitRecord[P]] = field(default_factory=dict)
     artifacts: dict[str, ArtifactRecord[Any]] = field(default_factory=dict)
 
     def add(self, record: UnitRecord[P] | ArtifactRecord[Any]) -> None:
-        """Add a record. Of several of one unit the last attempt counts; of one attempt by two workers, the result."""
+        """Add a record. Of several of one unit the last attempt counts; of one attempt by two
+        workers, the result."""
         if isinstance(record, ArtifactRecord):
             self.artifacts[record.fingerprint] = record
             return
@@ -93,7 +95,8 @@ def read_header(run: Path) -> RunHeader:
         return parse_header(shards[0], next(iter(read_lines(shards[0])), b""))
     if (run / _FORMAT_1).is_file():
         raise DataError(
-            f"{run}: its journal is of format 1, this version reads {FORMAT}; run the evaluation again"
+            f"{run}: its journal is of format 1, this version reads {FORMAT}; run the evaluation "
+            "again"
         )
     raise DataError(f"{run}: no journal in it; give the folder of a run")
 
@@ -205,7 +208,8 @@ def parse_record(
 
 
 def read_lines(path: Path) -> list[bytes]:
-    """Return the complete lines of a shard; a last line without its end is still being written, or never will be."""
+    """Return the complete lines of a shard; a last line without its end is still being written, or
+    never will be."""
     content = read_bytes(path, "restore the file")
     return content[: content.rfind(b"\n") + 1].splitlines()
 
@@ -215,7 +219,8 @@ class _AnyFormat(msgspec.Struct):
 
 
 def check_format(path: Path, line: bytes) -> None:
-    """Refuse a shard whose first line is the header of another format; a line that is no header passes.
+    """Refuse a shard whose first line is the header of another format; a line that is no header
+    passes.
 
     Raises:
         DataError: names both formats, and what to do.
@@ -226,7 +231,8 @@ def check_format(path: Path, line: bytes) -> None:
         return
     if version != FORMAT:
         raise DataError(
-            f"{path}: a journal of format {version}, this version reads {FORMAT}; run the command again with --fresh"
+            f"{path}: a journal of format {version}, this version reads {FORMAT}; run the command "
+            "again with --fresh"
         )
 
 

@@ -1,4 +1,5 @@
-"""Tracebacks of exceptions in adapters and suites, in a text file beside the shards of the journal."""
+"""Tracebacks of exceptions in adapters and suites, in a text file beside the shards of the
+journal."""
 
 import re
 import traceback
@@ -32,10 +33,12 @@ class TracebackFile:
         self._lock = Lock()
 
     def append(self, key: UnitKey, attempt: int, error: Exception) -> str:
-        """Append the traceback of an unexpected exception, or of the cause of a `UserCodeError`, that failed a unit.
+        """Append the traceback of an unexpected exception, or of the cause of a `UserCodeError`,
+        that failed a unit.
 
         Returns:
-            Name of the file within the run's folder; empty for an expected error, which needs no traceback.
+            Name of the file within the run's folder; empty for an expected error, which needs no
+            traceback.
         """
         exception = error.__cause__ if isinstance(error, UserCodeError) else error
         if exception is None or isinstance(exception, InfthorError):

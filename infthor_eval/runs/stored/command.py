@@ -1,4 +1,5 @@
-"""The command of a run: its options in `run.yaml` beside the results, with which it can be repeated."""
+"""The command of a run: its options in `run.yaml` beside the results, with which it can be
+repeated."""
 
 import shlex
 from collections.abc import Iterator, Mapping
@@ -29,8 +30,8 @@ class StoredCommand:
     """The command of a run in `run.yaml`.
 
     Attributes:
-        options: options of `infthor-eval run` by their long names with `_` for `-`; several values are a list, those
-            of `model_args` a mapping.
+        options: options of `infthor-eval run` by their long names with `_` for `-`; several values
+            are a list, those of `model_args` a mapping.
     """
 
     path: Path
@@ -100,7 +101,8 @@ def read_options(path: Path) -> dict[str, Any]:
 
 
 def _options_of(request: RunRequest) -> dict[str, Any]:
-    """Return all options of a request. Keys of servers are none: they come from the environment only."""
+    """Return all options of a request. Keys of servers are none: they come from the environment
+    only."""
     tasks, given = request.tasks, dict(request.model_options)
     if _CHECKPOINT in given:
         given[_CHECKPOINT] = _absolute(given[_CHECKPOINT])
@@ -133,7 +135,8 @@ def _non_default(options: Any) -> dict[str, Any]:
 
 
 def _absolute(text: str) -> str:
-    """Return a path that exists as an absolute one, which holds in any folder; a name of the hub as it is."""
+    """Return a path that exists as an absolute one, which holds in any folder; a name of the hub as
+    it is."""
     return str(Path(text).absolute()) if Path(text).exists() else text
 
 

@@ -1,4 +1,5 @@
-"""Labels of runs that are shown beside each other: their names, and the options that differ where names are equal."""
+"""Labels of runs that are shown beside each other: their names, and the options that differ where
+names are equal."""
 
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -24,8 +25,9 @@ _NOT_SHOWN = {
 def label_runs(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str] = ()) -> list[str]:
     """Return a label for each run.
 
-    Runs of one suite and name are told apart by the options that differ: `qwen2.5-vl (dtype=float16)`. Runs of the same
-    tasks that have equal options too get the names of their folders instead.
+    Runs of one suite and name are told apart by the options that differ: `qwen2.5-vl
+    (dtype=float16)`. Runs of the same tasks that have equal options too get the names of their
+    folders instead.
 
     Args:
         runs: folder and header of each run.

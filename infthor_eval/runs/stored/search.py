@@ -24,7 +24,8 @@ class StoredRun:
 
     Attributes:
         n_done: number of units with a record, failed ones included.
-        n_missing: number of units that were not attempted; None if the run was killed before it wrote results.
+        n_missing: number of units that were not attempted; None if the run was killed before it
+            wrote results.
         primary_metrics: primary metric of each task; empty if there are no results yet.
         changed: time of the last change to the journal, in seconds since 1970.
     """

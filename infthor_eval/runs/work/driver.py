@@ -25,7 +25,8 @@ class Observer(Protocol):
     """Follows a run."""
 
     def begin(self, workload: Workload[Unit[Any]], n_recovered: int) -> None:
-        """Called before the first unit, with all the work and the number of bad lines taken out of the journal."""
+        """Called before the first unit, with all the work and the number of bad lines taken out of
+        the journal."""
 
     def done(self, record: UnitRecord[Any], resumed: bool) -> None:
         """Called for each unit; `resumed` if its record is that of an earlier, stopped run."""
@@ -74,17 +75,19 @@ def execute(
 ) -> RunOutcome[U, P]:
     """Load the model, do what the journal does not hold yet, and write the results.
 
-    The folder `<output>/<name>/<tasks>-<config hash>/` holds the journal, `run.yaml` (the options of the command),
-    `results.json` (the summary) and `scores.jsonl` (of every unit), equal for equal runs, and `usage.json`.
+    The folder `<output>/<name>/<tasks>-<config hash>/` holds the journal, `run.yaml` (the options
+    of the command), `results.json` (the summary) and `scores.jsonl` (of every unit), equal for
+    equal runs, and `usage.json`.
 
     Args:
         run: the prepared run.
         observer: follows the run.
-        should_stop: called after each unit; once it returns True, the units in hand are finished, and the results so
-            far are written.
+        should_stop: called after each unit; once it returns True, the units in hand are finished,
+            and the results so far are written.
 
     Raises:
-        UsageError: another process at the same run, a subject that the suite cannot evaluate, or nothing to do.
+        UsageError: another process at the same run, a subject that the suite cannot evaluate, or
+            nothing to do.
         ModelError: the model cannot be loaded.
         DataError: the journal has a bad line, or the results cannot be written.
     """
@@ -126,7 +129,8 @@ def _start_executor(run: PreparedRun[U, P], report: Callable[[str], None]) -> Ex
 def _write_results(
     run: PreparedRun[U, P], folder: Path, workload: Workload[Unit[Any]], journal: Journal[P]
 ) -> tuple[RunSummary, list[UnitRecord[P]], Usage]:
-    """Write the results of the units that the journal has by now; return summary, records and usage."""
+    """Write the results of the units that the journal has by now; return summary, records and
+    usage."""
     asked = {
         unit.key for group in workload.groups for unit in group.units
     }  # the journal may hold more

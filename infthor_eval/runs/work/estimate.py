@@ -1,9 +1,11 @@
-"""Estimates of a run's time, requests, tokens and money: a few units are done, and the rest is estimated from them.
+"""Estimates of a run's time, requests, tokens and money: a few units are done, and the rest is
+estimated from them.
 
-The first unit of a group pays for what the group shares (encoding or replaying a trajectory), the others only for
-themselves. So each quantity of a group with n units on f frames is estimated as
+The first unit of a group pays for what the group shares (encoding or replaying a trajectory), the
+others only for themselves. So each quantity of a group with n units on f frames is estimated as
 
-    f * (excess of a first unit over a later one, per measured frame) + n * (quantity of a later unit)
+    f * (excess of a first unit over a later one, per measured frame) + n * (quantity of a later
+    unit)
 """
 
 import time
@@ -67,7 +69,8 @@ class Quantities:
 
 @dataclass(frozen=True)
 class _MeasuredGroup:
-    """The frames of a group, task and quantities of each measured unit, and task and reason of each failed one."""
+    """The frames of a group, task and quantities of each measured unit, and task and reason of each
+    failed one."""
 
     frames: int
     quantities: Sequence[tuple[str, Quantities]]
@@ -87,7 +90,8 @@ class TaskEstimate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """The estimate of a run by task (none if all measured units failed), and task and reason of each failed unit."""
+    """The estimate of a run by task (none if all measured units failed), and task and reason of
+    each failed unit."""
 
     workload: Workload
     tasks: Sequence[TaskEstimate]
@@ -95,7 +99,8 @@ class Estimate:
 
 
 class _MeasuringSession:
-    """A `Session` without records, as every unit is to be measured; artifacts are cached in memory."""
+    """A `Session` without records, as every unit is to be measured; artifacts are cached in
+    memory."""
 
     def __init__(self) -> None:
         self._artifacts: dict[str, Any] = {}
@@ -138,7 +143,8 @@ def estimate_run(
 
 
 def _measure(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_MeasuredGroup]:
-    """Do a few units of each task: of groups of all sizes, the first, the middle and the last unit."""
+    """Do a few units of each task: of groups of all sizes, the first, the middle and the last
+    unit."""
     session = _MeasuringSession()
     for group in _choose_groups(
         evaluation.workload.groups, max(1, round(n_units / _UNITS_OF_A_GROUP))
@@ -172,7 +178,8 @@ def _choose_groups(groups: Sequence[Group[U]], n: int) -> Iterator[Group[U]]:
 def estimate_tasks(
     workload: Workload[Unit[Any]], measured: Sequence[_MeasuredGroup]
 ) -> list[TaskEstimate]:
-    """Estimate each task of a workload by measured groups of it, with at least one unit that has not failed."""
+    """Estimate each task of a workload by measured groups of it, with at least one unit that has
+    not failed."""
     later = _later_units(measured)
     excess = _first_unit_excess(measured, later)
     estimates = []
@@ -193,7 +200,8 @@ def estimate_tasks(
 
 
 def _later_units(measured: Sequence[_MeasuredGroup]) -> Mapping[str, Quantities]:
-    """Return the mean quantities of units that are not the first of their group, by task; under "" of all tasks."""
+    """Return the mean quantities of units that are not the first of their group, by task; under ""
+    of all tasks."""
     by_task: dict[str, list[Quantities]] = {}
     for group in measured:
         for task, quantities in group.quantities[1:] or group.quantities:
@@ -205,7 +213,8 @@ def _later_units(measured: Sequence[_MeasuredGroup]) -> Mapping[str, Quantities]
 def _first_unit_excess(
     measured: Sequence[_MeasuredGroup], later: Mapping[str, Quantities]
 ) -> Callable[[Group[Unit[Any]]], Quantities]:
-    """Return a function of a group: the excess of a first unit over a later one per frame, in groups of its task."""
+    """Return a function of a group: the excess of a first unit over a later one per frame, in
+    groups of its task."""
     totals: dict[str, Quantities] = {}
     frames: Counter[str] = Counter()
     for group in measured:

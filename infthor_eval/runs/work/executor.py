@@ -35,7 +35,8 @@ class Executor(Protocol[P]):
     def evaluate(
         self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
     ) -> Iterator[tuple[UnitRecord[P], bool]]:
-        """Do all groups, or stop after the units in hand; yield every record as soon as it is on disk."""
+        """Do all groups, or stop after the units in hand; yield every record as soon as it is on
+        disk."""
 
     def samples(self, records: Sequence[UnitRecord[P]]) -> Iterator[UnitSample]:
         """Convert records for other readers, in their order; not after `close`."""

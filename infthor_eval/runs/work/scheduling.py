@@ -15,7 +15,8 @@ def run_groups(
     do: Callable[[Group[U]], Iterable[UnitRecord[P]]],
     max_in_flight: int,
 ) -> Iterator[UnitRecord[P]]:
-    """Yield the records of all groups as soon as they are there; several in flight are done in a thread each."""
+    """Yield the records of all groups as soon as they are there; several in flight are done in a
+    thread each."""
     if max_in_flight == 1 or len(groups) <= 1:
         for group in groups:
             yield from do(group)

@@ -1,7 +1,8 @@
 """A run by several workers: each loads the subject, does groups, and writes a shard of the journal.
 
-The driver loads no model. It learns the run's header and workload from the first worker, and hands out groups by
-number, each with the records that earlier runs or a lost worker left of it. So nothing travels but numbers and records.
+The driver loads no model. It learns the run's header and workload from the first worker, and hands
+out groups by number, each with the records that earlier runs or a lost worker left of it. So
+nothing travels but numbers and records.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -32,8 +33,8 @@ __all__ = ["WorkerPoolExecutor"]
 
 
 _SHARD_WAIT_S = 20.0
-# A unit that kills its worker (out of memory, say) must not fail the others of its group: after so many losses in a
-# row the group is split, and each of its units gets so many tries alone.
+# A unit that kills its worker (out of memory, say) must not fail the others of its group: after so
+# many losses in a row the group is split, and each of its units gets so many tries alone.
 _GROUP_TRIES = 3
 _UNIT_TRIES = 2
 _BATCH = 256  # records that a worker converts at a time
@@ -41,7 +42,8 @@ _BATCH = 256  # records that a worker converts at a time
 
 @dataclass(frozen=True)
 class _Greeting:
-    """What the driver learns from a worker before it hands out work: units without what only the suite needs."""
+    """What the driver learns from a worker before it hands out work: units without what only the
+    suite needs."""
 
     header: RunHeader
     workload: Workload[Unit[Any]]
@@ -124,7 +126,8 @@ class _Evaluator(Generic[U, P]):
 
     def _open_session(self, folder: Path) -> JournalSession[P]:
         if self._session is None:
-            # A worker of a driver that was killed may still be ending, and holds the lock of the shard until then.
+            # A worker of a driver that was killed may still be ending, and holds the lock of the
+            # shard until then.
             journal = Journal(
                 folder, self._bound.header, self._records, worker=self._number, wait_s=_SHARD_WAIT_S
             )
@@ -134,7 +137,8 @@ class _Evaluator(Generic[U, P]):
 
 @dataclass(frozen=True)
 class _Progress(Generic[P]):
-    """The state of a run that all its portions share; `done` are the units whose records were yielded."""
+    """The state of a run that all its portions share; `done` are the units whose records were
+    yielded."""
 
     folder: Path
     journal: Journal[P]
@@ -146,7 +150,8 @@ class WorkerPoolExecutor(Generic[U, P]):
     """The executor of several workers; see `infthor_eval.runs.work.executor.Executor`."""
 
     def __init__(self, run: PreparedRun[U, P], report: Callable[[str], None]) -> None:
-        """Start the workers and wait for the first; `report` gets a line when one is lost or cannot be started.
+        """Start the workers and wait for the first; `report` gets a line when one is lost or cannot
+        be started.
 
         Raises:
             UsageError: there is no such cluster.
@@ -185,7 +190,10 @@ class WorkerPoolExecutor(Generic[U, P]):
         ]
         for portion, reason in (yield from self._do_portions(alone, progress, _UNIT_TRIES)).items():
             (unit,) = portion.select(groups).units
-            failure = f"worker after worker was lost at it ({reason}); give it more memory, or leave it out"
+            failure = (
+                f"worker after worker was lost at it ({reason}); give it more memory, or leave it "
+                "out"
+            )
             yield journal.append(unit.record_failure(failure)), False
         for worker in range(1, self._n_workers + 1):
             journal.reread(worker)  # for cached artifacts, which workers do not send
@@ -193,7 +201,8 @@ class WorkerPoolExecutor(Generic[U, P]):
     def _do_portions(
         self, portions: Sequence[_Portion], progress: _Progress[P], max_losses: int
     ) -> Generator[tuple[UnitRecord[P], bool], None, dict[_Portion, str]]:
-        """Have portions done; yield the records, and return the portions that were given up, with the reason."""
+        """Have portions done; yield the records, and return the portions that were given up, with
+        the reason."""
         journal = progress.journal
         given_up: dict[_Portion, str] = {}
 
@@ -246,7 +255,8 @@ class WorkerPoolExecutor(Generic[U, P]):
         self._pool.close()
 
     def _check_config(self, greeting: _Greeting) -> None:
-        """Refuse a worker that would evaluate something else: another version, a model that has changed."""
+        """Refuse a worker that would evaluate something else: another version, a model that has
+        changed."""
         theirs = greeting.header.config
         if self._expected is None:
             self._expected = theirs
@@ -256,7 +266,8 @@ class WorkerPoolExecutor(Generic[U, P]):
                 name for name in names if self._expected.get(name) != theirs.get(name)
             )
             raise UsageError(
-                f"the workers differ in {', '.join(differing)}; give all nodes the same versions and data"
+                f"the workers differ in {', '.join(differing)}; give all nodes the same versions "
+                "and data"
             )
 
     def _report_loss(self, event: Event) -> None:

@@ -1,7 +1,9 @@
-"""The untrained small model: Qwen2.5-VL's classes with random weights, and a tokenizer for household words.
+"""The untrained small model: Qwen2.5-VL's classes with random weights, and a tokenizer for
+household words.
 
-A frame is 112 x 112 pixels and takes 16 tokens. Words are single tokens. So is the introduction of every question of
-the published evaluation, which would otherwise be three quarters of a question's tokens.
+A frame is 112 x 112 pixels and takes 16 tokens. Words are single tokens. So is the introduction of
+every question of the published evaluation, which would otherwise be three quarters of a question's
+tokens.
 """
 
 from collections.abc import Iterable
@@ -28,7 +30,8 @@ TOKENS = GRID**2
 PATCHES = 4 * TOKENS  # a token merges two by two patches
 _SIDE = 14  # pixels of a patch
 _HEADS = 4
-# The processor rounds this to 112 x 112 pixels; with a limit of exactly 112 * 112 it would round down to 84 x 84.
+# The processor rounds this to 112 x 112 pixels; with a limit of exactly 112 * 112 it would round
+# down to 84 x 84.
 _PIXELS = 12_600
 _N_MERGED = 3000  # more than the number of words, so that every word is a token
 
@@ -115,7 +118,8 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
 
 
 def _rope_sections(head_width: int) -> list[int]:
-    """Return how many of a head's frequencies encode time, height and width, in about the family's proportion."""
+    """Return how many of a head's frequencies encode time, height and width, in about the family's
+    proportion."""
     frequencies = head_width // 2
     space = 3 * frequencies // 8
     return [frequencies - 2 * space, space, space]

@@ -19,8 +19,10 @@ from infthor_eval.training.nano.architecture import GRID, PATCHES, TOKENS
 __all__ = ["FrameDataset", "read_frame_dataset"]
 
 _READER_THREADS = 2
-_LEAST_PIXELS = 90  # smallest object that counts as shown: a thousandth of a 300 x 300 frame, as in the questions
-# An object is in a cell if its box covers this share of the cell, or has this share of its own area in the cell.
+# smallest object that counts as shown: a thousandth of a 300 x 300 frame, as in the questions
+_LEAST_PIXELS = 90
+# An object is in a cell if its box covers this share of the cell, or has this share of its own area
+# in the cell.
 _OF_CELL, _OF_OBJECT = 0.4, 0.5
 
 
@@ -31,10 +33,11 @@ class FrameDataset:
     Attributes:
         frames: distinct frames.
         types: object types, sorted.
-        pixels: patches of each frame, (frames, patches, values), in float16. The tower reads each frame twice, as two
-            time steps of a video; this has one of them.
+        pixels: patches of each frame, (frames, patches, values), in float16. The tower reads each
+            frame twice, as two time steps of a video; this has one of them.
         cells: types in each token's part of the frame, (frames, tokens, types).
-        shown: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames, types).
+        shown: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames,
+            types).
         present: types with any pixel in the frame, (frames, types).
     """
 
@@ -69,7 +72,8 @@ def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDa
             steps = sorted(read_steps(folder_of_steps), key=lambda step: step.img_idx)
             if any(step.seen is None for step in steps):
                 raise DataError(
-                    f"{folder_of_steps}: does not list the objects in its frames; replay the trajectory"
+                    f"{folder_of_steps}: does not list the objects in its frames; replay the "
+                    "trajectory"
                 )
             for frame, step in zip(data.frames(name), steps, strict=True):
                 frames.setdefault(frame.digest, (frame, step))
@@ -96,7 +100,8 @@ def _patches(frame: FrameRef, image_processor: Any) -> Tensor:
 
 
 def _type(key: str) -> str:
-    """Return the type in an object's id; that of the part or slice for "...|SinkBasin" and "...|AppleSliced_1"."""
+    """Return the type in an object's id; that of the part or slice for "...|SinkBasin" and
+    "...|AppleSliced_1"."""
     first, *_, last = key.split("|")
     return last.partition("_")[0] if last[:1].isalpha() else first
 

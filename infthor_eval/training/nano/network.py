@@ -1,7 +1,8 @@
-"""The small model as a network with two losses: of sequences, and of the objects in each part of a frame.
+"""The small model as a network with two losses: of sequences, and of the objects in each part of a
+frame.
 
-The vision loss compares the tower's features with the embeddings of the objects' names, in all spellings that occur in
-texts. So words and images share one space before the decoder is trained.
+The vision loss compares the tower's features with the embeddings of the objects' names, in all
+spellings that occur in texts. So words and images share one space before the decoder is trained.
 """
 
 from collections.abc import Sequence
@@ -65,7 +66,8 @@ class NanoNetwork(SequenceModel):
         return [rows[self._index_by_digest[frame.digest]] for frame in frames]
 
     def frames_of(self, sequences: Sequence[TrainingSequence]) -> tuple[list[int], Tensor]:
-        """Return the indices in the dataset and the features of the frames of some sequences, each frame once."""
+        """Return the indices in the dataset and the features of the frames of some sequences, each
+        frame once."""
         indices = self._indices([frame for sequence in sequences for frame in sequence.frames])
         return indices, self.frame_features(indices)
 
@@ -76,7 +78,8 @@ class NanoNetwork(SequenceModel):
         ]
 
     def cache_features(self) -> None:
-        """Compute the features of all frames once, for all later sequences; the tower is not trained any more.
+        """Compute the features of all frames once, for all later sequences; the tower is not
+        trained any more.
 
         The tower takes four fifths of a step's time.
         """
@@ -98,8 +101,9 @@ class NanoNetwork(SequenceModel):
     def vision_loss(self, features: Tensor, indices: Sequence[int], spelling: int) -> Tensor:
         """Return the loss of recognising objects by the features, a scalar.
 
-        It is the sum of a loss for the types in each part of a frame and one for the types that the whole frame shows.
-        The latter ignores types that are present but too far away to count as shown.
+        It is the sum of a loss for the types in each part of a frame and one for the types that the
+        whole frame shows. The latter ignores types that are present but too far away to count as
+        shown.
 
         Args:
             features: features of frames, (frames, tokens, hidden).

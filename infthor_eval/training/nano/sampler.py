@@ -152,7 +152,8 @@ class SequenceSampler:
         Args:
             n: number of questions.
             synthetic_share: probability of a synthetic one.
-            recalled_share: probability of another one to be asked as behind a memory instead of on its clue frames.
+            recalled_share: probability of another one to be asked as behind a memory instead of on
+                its clue frames.
             n_others: most frames that do not matter among those that a memory recalls.
         """
         return [self._question(synthetic_share, recalled_share, n_others) for _ in range(n)]
@@ -167,7 +168,8 @@ class SequenceSampler:
         return self._rng.choice(self._questions)
 
     def _recalled_question(self, n_others: int) -> TrainingSequence:
-        """Return a question on its clue frames among others, and the last view, as the evaluation of memories asks."""
+        """Return a question on its clue frames among others, and the last view, as the evaluation
+        of memories asks."""
         data, sample = self._rng.choice(self._samples)
         last = len(data.frames(sample.question.traj_id)) - 1
         clues = set() if sample.question.absence else set(sample.frames)
@@ -211,8 +213,8 @@ class SequenceSampler:
     def _presence_question(self) -> TrainingSequence:
         """Return a question for the presence of an object in one frame.
 
-        Names are sampled by the number of frames that show them, for "yes" as for "no", so that the name does not give
-        away the answer.
+        Names are sampled by the number of frames that show them, for "yes" as for "no", so that the
+        name does not give away the answer.
         """
         is_present = self._rng.random() < 0.5
         for _ in range(_MAX_TRIES):

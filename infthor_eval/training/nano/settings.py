@@ -25,7 +25,8 @@ class SceneSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     Attributes:
         kinds: kinds of rooms.
-        first: number of the first scene of each kind; the scenes of the bundled sets have lower numbers.
+        first: number of the first scene of each kind; the scenes of the bundled sets have lower
+            numbers.
         count: scenes of each kind.
         min_steps: fewest steps of a trajectory.
     """
@@ -50,21 +51,24 @@ class NanoRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         scenes: scenes to generate data in if no data are given.
         hidden: width of vision tower and decoder.
         layers: layers of each.
-        vision_steps: steps of the first stage, in which the tower learns which objects are in which part of a frame,
-            by the embeddings of their names.
-        text_steps: steps of the second stage, in which the decoder learns to act by the words of synthetic plans
-            without frames. The tower is frozen from here on.
-        joint_steps: steps of the third stage, in which the decoder learns to answer questions and to act.
+        vision_steps: steps of the first stage, in which the tower learns which objects are in which
+            part of a frame, by the embeddings of their names.
+        text_steps: steps of the second stage, in which the decoder learns to act by the words of
+            synthetic plans without frames. The tower is frozen from here on.
+        joint_steps: steps of the third stage, in which the decoder learns to answer questions and
+            to act.
         frames_per_step: frames in each step of the first stage.
         text_plans_per_step: synthetic plans in each step of the second stage.
         questions_per_step: questions in each step of the third stage.
-        synthetic_questions: share of these that are synthetic questions for the presence of an object in any frame.
-        recalled_questions: share of the others that are asked as behind a memory: the clue frames among frames that do
-            not matter, and the last view.
+        synthetic_questions: share of these that are synthetic questions for the presence of an
+            object in any frame.
+        recalled_questions: share of the others that are asked as behind a memory: the clue frames
+            among frames that do not matter, and the last view.
         recalled_frames: most frames among those that do not matter.
         windows_per_step: windows of histories in a step of the third stage.
         window_tokens: most tokens of a window.
-        single_plan_share: share of the steps of the third stage with single plans of histories instead of windows.
+        single_plan_share: share of the steps of the third stage with single plans of histories
+            instead of windows.
         plans_per_step: single plans in such a step.
         joint_text_plans_per_step: synthetic plans in each step of the third stage.
         text_plans_weight: weight of the loss on these.

@@ -37,8 +37,9 @@ class NanoProgress:
         stage: "vision", "text" or "joint".
         step: number of the step in the stage, from 1.
         n_steps: steps of the stage.
-        loss: loss in nats: per frame in the vision stage, per token in the text stage, and in the joint stage the sum
-            of the losses per token of answers, of actions, and of weighted synthetic plans.
+        loss: loss in nats: per frame in the vision stage, per token in the text stage, and in the
+            joint stage the sum of the losses per token of answers, of actions, and of weighted
+            synthetic plans.
     """
 
     stage: str
@@ -142,7 +143,8 @@ class _StageTrainer:
     def text_step(self) -> tuple[Tensor, Tensor]:
         """Return the loss of synthetic plans, plus that of some frames.
 
-        The embeddings of names change in this stage; the vision loss keeps them close to the features of the objects.
+        The embeddings of names change in this stage; the vision loss keeps them close to the
+        features of the objects.
         """
         recipe, indices = self._recipe, self._sampler.frames(_TEXT_STAGE_FRAMES)
         loss = self._token_loss(self._sampler.synthetic_plans(recipe.text_plans_per_step))
@@ -150,7 +152,8 @@ class _StageTrainer:
         return loss + recipe.vision_weight * vision_loss, loss.detach()
 
     def joint_step(self) -> tuple[Tensor, Tensor]:
-        """Return the loss of questions, histories and synthetic plans, plus that of the questions' frames.
+        """Return the loss of questions, histories and synthetic plans, plus that of the questions'
+        frames.
 
         Answers and actions have the same weight, though most tokens are actions.
         """
@@ -179,9 +182,11 @@ class _StageTrainer:
         )
 
     def _token_loss(self, sequences: Sequence[TrainingSequence]) -> Tensor:
-        """Return the mean loss per token of some sequences, which are computed in batches of about one length.
+        """Return the mean loss per token of some sequences, which are computed in batches of about
+        one length.
 
-        A question on one frame has 40 tokens, one behind a memory 300: most of a single batch would be padding.
+        A question on one frame has 40 tokens, one behind a memory 300: most of a single batch would
+        be padding.
         """
         by_length = sorted(sequences, key=lambda sequence: sequence.n_tokens)
         size = math.ceil(len(by_length) / _BATCHES)

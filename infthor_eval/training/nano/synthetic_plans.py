@@ -1,6 +1,7 @@
 """Synthetic plans: recorded plans with their actions, about other objects.
 
-The words of a plan and the objects of its actions correspond, so a model learns which words name which objects.
+The words of a plan and the objects of its actions correspond, so a model learns which words name
+which objects.
 """
 
 import random
@@ -14,10 +15,12 @@ __all__ = ["SyntheticPlans"]
 
 
 class SyntheticPlans:
-    """Plans and actions of experts in which each object is replaced by one from the same place of a similar plan."""
+    """Plans and actions of experts in which each object is replaced by one from the same place of a
+    similar plan."""
 
     def __init__(self, recorded: Iterable[tuple[str, Sequence[str]]]) -> None:
-        """Group recorded plans by their kind; those with actions that name no object of the plan (ways) are ignored."""
+        """Group recorded plans by their kind; those with actions that name no object of the plan
+        (ways) are ignored."""
         kinds: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
         for plan, actions in recorded:
             templates = tuple(open_action(action, plan) for action in actions)

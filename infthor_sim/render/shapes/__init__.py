@@ -1,4 +1,5 @@
-"""The shapes of the types of objects, one module per theme; importing this package registers all drawings."""
+"""The shapes of the types of objects, one module per theme; importing this package registers all
+drawings."""
 
 from importlib import import_module
 from pkgutil import iter_modules

@@ -1,4 +1,5 @@
-"""Building the shape of one object: coordinates run from -1 to 1 across the object's box, front towards +z."""
+"""Building the shape of one object: coordinates run from -1 to 1 across the object's box, front
+towards +z."""
 
 from collections.abc import Sequence
 from functools import partialmethod
@@ -23,8 +24,9 @@ def shade_of(color: Color, factor: float) -> Color:
 class Builder:
     """Collects the parts of one object.
 
-    Positions are fractions of the half box from its centre: (0, -1, 0) is the middle of the underside, (0, 0, 1) the
-    middle of the front. Half extents are fractions too, so (1, 1, 1) fills the box. Shapes so fit objects of any size.
+    Positions are fractions of the half box from its centre: (0, -1, 0) is the middle of the
+    underside, (0, 0, 1) the middle of the front. Half extents are fractions too, so (1, 1, 1) fills
+    the box. Shapes so fit objects of any size.
 
     Attributes:
         parts: primitives so far.
@@ -120,7 +122,8 @@ class Builder:
         glow: float = 0.0,
         top: bool = True,
     ) -> None:
-        """Add a box without its front: five boards, `WALL` thick with a lining in a colour of its own.
+        """Add a box without its front: five boards, `WALL` thick with a lining in a colour of its
+        own.
 
         Args:
             outside, inside: colours of the boards and of their lining.
@@ -165,7 +168,8 @@ class Builder:
     def open_top(
         self, color: Color, material: Material, wall: float, floor: float, glow: float = 0.0
     ) -> None:
-        """Add a box without its lid: four sides `wall` metres thick and a bottom; `glow` lights its inside.
+        """Add a box without its lid: four sides `wall` metres thick and a bottom; `glow` lights its
+        inside.
 
         Args:
             floor: height of the bottom's upper side in fractions.
@@ -189,10 +193,12 @@ class Builder:
             )
 
     def coin(
-        self, axis: int, at: Vector, half: Vector, color: Color, material: Material = Material.PLAIN, *,
+        self, axis: int, at: Vector, half: Vector, color: Color,
+        material: Material = Material.PLAIN, *,
         glow: float = 0.0,
     ) -> None:  # fmt: skip
-        """Add a round or oval disc whose flat sides face along `axis`; its half extents are fractions along x, y, z."""
+        """Add a round or oval disc whose flat sides face along `axis`; its half extents are
+        fractions along x, y, z."""
         metres = np.asarray(half, dtype=float) * self.half
         tilt, order = {0: ((0.0, 0.0, 90.0), [1, 0, 2]), 1: ((0.0, 0.0, 0.0), [0, 1, 2]),
                        2: ((90.0, 0.0, 0.0), [0, 2, 1])}[axis]  # fmt: skip
@@ -229,7 +235,8 @@ class Builder:
         *,
         glow: float = 0.0,
     ) -> None:
-        """Add a round bar on the middle line of `axis` from `start` to `end`, with its radii in metres there."""
+        """Add a round bar on the middle line of `axis` from `start` to `end`, with its radii in
+        metres there."""
         tilt = {0: (0.0, 0.0, -90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
         matrix = self._turn @ euler_matrix(tilt)
         widest = max(radii)
@@ -241,7 +248,8 @@ class Builder:
         )
 
     def rod(self, at: Vector, radius: float, length: float, axis: int, color: Color) -> None:
-        """Add a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2 (z)."""
+        """Add a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2
+        (z)."""
         tilt = {0: (0.0, 0.0, 90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
         matrix = self._turn @ euler_matrix(tilt)
         self.parts.append(
@@ -273,7 +281,8 @@ class Builder:
         material: Material,
         glow: float = 0.0,
     ) -> None:
-        """Add a box turned by `angle` degrees about an upright hinge, which is at a position in fractions.
+        """Add a box turned by `angle` degrees about an upright hinge, which is at a position in
+        fractions.
 
         The box's middle before turning, from the hinge, and its half extents are given in metres.
         """

@@ -41,8 +41,17 @@ def potato(b: Builder) -> None:
     b.ball((-0.08, 0.0, -0.34), (0.84, 0.96, 0.66), shade_of(color, 0.97), Material.STONE)
     b.ball((-0.3, 0.22, 0.05), (0.66, 0.72, 0.6), shade_of(color, 1.04), Material.STONE)
     eye = shade_of(color, 0.55)
-    for x, y, z in ((0.3, 0.72, 0.4), (-0.4, 0.82, -0.2), (0.72, 0.2, 0.2), (-0.74, 0.1, -0.5), (0.3, 0.72, -0.5),
-                    (0.25, 0.25, 0.9), (-0.1, 0.3, -0.94), (-0.55, 0.55, 0.5), (0.75, 0.1, -0.4)):  # fmt: skip
+    for x, y, z in (
+        (0.3, 0.72, 0.4),
+        (-0.4, 0.82, -0.2),
+        (0.72, 0.2, 0.2),
+        (-0.74, 0.1, -0.5),
+        (0.3, 0.72, -0.5),
+        (0.25, 0.25, 0.9),
+        (-0.1, 0.3, -0.94),
+        (-0.55, 0.55, 0.5),
+        (0.75, 0.1, -0.4),
+    ):
         b.ball((x, y, z), (0.1, 0.1, 0.07), eye)
 
 
@@ -63,7 +72,8 @@ def bread(b: Builder) -> None:
 def loaf(
     b: Builder, axis: int, share: float, length: float, color: Color, material: Material
 ) -> None:
-    """Add a tin loaf along `axis`, with a share of its width and height and a share of its length."""
+    """Add a tin loaf along `axis`, with a share of its width and height and a share of its
+    length."""
     at, half = (0.0, -0.3 * share, 0.0), [0.86 * share] * 3
     half[1], half[axis] = 0.7 * share, length
     b.box(at, half, shade_of(color, 0.92), material)

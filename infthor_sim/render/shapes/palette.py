@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from infthor_sim.render.primitives import Color
 
 __all__ = [
-    "BLACK", "BRASS", "CERAMICS", "CHROME", "CLOTHS", "DARK", "GLASS", "LEAF", "PAPER", "STEEL", "WHITE", "WOODS",
+    "BLACK", "BRASS", "CERAMICS", "CHROME", "CLOTHS", "DARK", "GLASS", "LEAF", "PAPER", "STEEL",
+    "WHITE", "WOODS",
     "pick",
 ]  # fmt: skip
 

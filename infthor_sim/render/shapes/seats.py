@@ -7,7 +7,8 @@ from infthor_sim.render.shapes.register import draws
 
 
 def _seat_level(b: Builder, usual: float) -> float:
-    """Return the height of the seat as a fraction of the half box: the object's surface height if it is known."""
+    """Return the height of the seat as a fraction of the half box: the object's surface height if
+    it is known."""
     if b.item.support is None:
         return usual
     return min(0.9, max(-0.8, b.item.support / float(b.half[1]) - 1))

@@ -10,7 +10,8 @@ from infthor_sim.render.shapes.register import draws
 
 @draws
 def card(b: Builder) -> None:
-    """A bright plastic card: a gold chip, a white line of numbers, and the two overlapping discs of its maker."""
+    """A bright plastic card: a gold chip, a white line of numbers, and the two overlapping discs of
+    its maker."""
     b.box(
         (0, -0.1, 0),
         (1, 0.9, 1),
@@ -46,7 +47,8 @@ def pencil(b: Builder) -> None:
 
 
 def _thickness(b: Builder) -> float:
-    """Return half of the second longest side, metres: the thickness of a round thing in a box around it."""
+    """Return half of the second longest side, metres: the thickness of a round thing in a box
+    around it."""
     return sorted(float(v) for v in b.half)[1]
 
 

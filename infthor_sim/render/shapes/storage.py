@@ -11,12 +11,15 @@ _FRIDGE_GRIP = (
     0.022  # metres that a fridge's grips stand out within its box, as recorded in FloorPlan28
 )
 _LIT = 0.2  # glow of the insides of open things: their contents would be hard to see otherwise
-_BODY = 0.82  # of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same share.
+# of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same
+# share.
+_BODY = 0.82
 _TRAY = 0.9  # top of a drawer's sides, in fractions: a little lower than its front
 _COLD: Color = (0.93, 0.97, 1.0)
 _TINTED: Color = (0.55, 0.76, 0.84)
 _WINDOW: Color = (0.13, 0.14, 0.16)
-# Of a fridge's shelves, in fractions: one looks down between glass and rim onto the lower ones, as through clear glass.
+# Of a fridge's shelves, in fractions: one looks down between glass and rim onto the lower ones, as
+# through clear glass.
 _GLASS_END, _RIM = 0.3, 0.76
 
 
@@ -29,9 +32,11 @@ def _door(
     high: float = 1.0,
     grip_in: float = 0.0,
 ) -> None:
-    """Add a hinged door over the front from height fraction `low` to `high`, at the object's openness.
+    """Add a hinged door over the front from height fraction `low` to `high`, at the object's
+    openness.
 
-    With `grip_in`, the grip is within the object's box, and the door so many metres behind its front.
+    With `grip_in`, the grip is within the object's box, and the door so many metres behind its
+    front.
     """
     side = b.item.hinge or -1
     width, height, depth = (float(v) for v in b.half)
@@ -65,7 +70,8 @@ def cabinet(b: Builder) -> None:
     """A cupboard of wood with one door."""
     color = pick(WOODS, b.style // 7 if b.item.asset_id else 2)
     if b.state.openness > 0:
-        b.open_front(shade_of(color, 0.8), shade_of(color, 1.2), Material.WOOD, b.item.floors[0], glow=_LIT,
+        b.open_front(shade_of(color, 0.8), shade_of(color, 1.2), Material.WOOD, b.item.floors[0],
+                     glow=_LIT,
                      top=not b.item.hollow)  # fmt: skip
     elif not b.item.hollow:
         back = b.thick(_LEAF, 2)
@@ -140,7 +146,8 @@ def _door_racks(b: Builder) -> None:
     hinge, inward = (side, 0.0, 1.0), -_LEAF - _FRIDGE_GRIP
     for low, high in ((-0.93, 0.26), (0.37, 0.96)):
         half, middle = (high - low) / 2 * height, (high + low) / 2 * height
-        b.hinged_box(hinge, (-side * width, middle, inward - 0.006), (width * 0.9, half, 0.006), angle, _COLD,
+        b.hinged_box(hinge, (-side * width, middle, inward - 0.006), (width * 0.9, half, 0.006),
+                     angle, _COLD,
                 Material.PLAIN, glow=0.3)  # fmt: skip
         for share in (-0.6, 0.1):
             offset = (-side * width, middle + share * half, inward - 0.035)
@@ -184,7 +191,8 @@ def microwave(b: Builder) -> None:
             door,
             Material.METAL,
         )
-        b.hinged_box((1, 0, 1), (-0.72 * wide, 0, -0.01), (0.55 * wide, 0.65 * high, 0.012), angle, _WINDOW,
+        b.hinged_box((1, 0, 1), (-0.72 * wide, 0, -0.01), (0.55 * wide, 0.65 * high, 0.012), angle,
+                     _WINDOW,
                 Material.GLASS)  # fmt: skip
         b.hinged_box(
             (1, 0, 1),

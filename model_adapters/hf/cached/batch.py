@@ -1,4 +1,5 @@
-"""Continuations of one encoded prefix, answered together: behind the prefix in one sequence, decoded in lockstep."""
+"""Continuations of one encoded prefix, answered together: behind the prefix in one sequence,
+decoded in lockstep."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -30,7 +31,8 @@ class _Branches:
 
     @torch.inference_mode()
     def feed(self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int) -> torch.Tensor:
-        """Encode all continuations; return the logits of each one's next token, (branches, vocabulary)."""
+        """Encode all continuations; return the logits of each one's next token, (branches,
+        vocabulary)."""
         logits: dict[int, torch.Tensor] = {}
         for group in self._groups(continuations, chunk_tokens):
             logits |= self._forward(
@@ -57,14 +59,16 @@ class _Branches:
 
     @torch.inference_mode()
     def step(self, tokens: Mapping[int, int]) -> torch.Tensor:
-        """Feed one token to each of some branches; return the logits of the next, (these branches, vocabulary)."""
+        """Feed one token to each of some branches; return the logits of the next, (these branches,
+        vocabulary)."""
         span = self._embed.words(list(tokens.values()), [self._ends[branch] for branch in tokens])
         for branch in tokens:
             self._ends[branch] += 1
         return self._logits(span.embeds, span.positions, list(tokens), slice(None))
 
     def _forward(self, group: Sequence[_Span]) -> dict[int, torch.Tensor]:
-        """Encode chunks of branches; return the logits behind each branch's last one, (vocabulary,)."""
+        """Encode chunks of branches; return the logits behind each branch's last one,
+        (vocabulary,)."""
         owners = [branch for branch, span in group for _ in span.embeds]
         last = {branch: at for at, branch in enumerate(owners)}
         positions = torch.cat([span.positions for _, span in group], dim=-1)
@@ -79,7 +83,8 @@ class _Branches:
         owners: Sequence[int],
         keep: slice | torch.Tensor,
     ) -> torch.Tensor:
-        """Encode tokens of the owners' branches; return the logits of the kept ones, (kept, vocabulary)."""
+        """Encode tokens of the owners' branches; return the logits of the kept ones, (kept,
+        vocabulary)."""
         places = []
         for branch in owners:
             places.append(self._places[branch])
@@ -106,10 +111,11 @@ def answer_together(
     replies: Sequence[ReplyState],
     chunk_tokens: int,
 ) -> None:
-    """Decode the replies to prompts that begin with the same `n_shared` pieces, each prompt with more behind them.
+    """Decode the replies to prompts that begin with the same `n_shared` pieces, each prompt with
+    more behind them.
 
-    `prefix` has encoded the shared pieces and nothing more, and has no more afterwards; `replies` are empty, one for
-    each prompt.
+    `prefix` has encoded the shared pieces and nothing more, and has no more afterwards; `replies`
+    are empty, one for each prompt.
     """
     continuations = [prompt[n_shared:] for prompt in prompts]
     branches = _Branches(model, embed, prefix, len(prompts))

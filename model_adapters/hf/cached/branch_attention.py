@@ -1,7 +1,8 @@
 """Attention of several continuations of one prefix that stand behind it in one sequence.
 
-Every token attends to the prefix and to the earlier tokens of its own continuation. So keys and values of the prefix
-are stored once and read once for all continuations, as in Hydragen (arXiv:2402.05099).
+Every token attends to the prefix and to the earlier tokens of its own continuation. So keys and
+values of the prefix are stored once and read once for all continuations, as in Hydragen
+(arXiv:2402.05099).
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,7 +31,8 @@ def can_branch(model: Any) -> bool:
 
 
 class BranchAttention:
-    """Attention in a sequence that is a prefix and branches, which are continuations of it in pieces of any order.
+    """Attention in a sequence that is a prefix and branches, which are continuations of it in
+    pieces of any order.
 
     Args:
         config: config of the decoder.
@@ -53,7 +55,8 @@ class BranchAttention:
 
     @contextmanager
     def appended(self, branches: Sequence[int], places: Sequence[int]) -> Iterator[None]:
-        """Attend in this way within the context, in which the decoder is given some more tokens once.
+        """Attend in this way within the context, in which the decoder is given some more tokens
+        once.
 
         Args:
             branches: the branch of each token.
@@ -69,8 +72,8 @@ class BranchAttention:
         self._masks.clear()
         self._n_calls = 0
         name, before = f"branches_{id(self)}", self._config._attn_implementation
-        # transformers creates no mask for a name that it does not know. The function is put into the dictionary
-        # directly, because a registered one cannot be removed.
+        # transformers creates no mask for a name that it does not know. The function is put into
+        # the dictionary directly, because a registered one cannot be removed.
         ALL_ATTENTION_FUNCTIONS[name] = self._attention
         self._config._attn_implementation = name
         try:
@@ -118,7 +121,8 @@ class BranchAttention:
             raise ModelError(f"the model's attention has {added[0]}; set batch_size=1")
         self._n_calls += 1
         n_key_heads = key.shape[1]
-        # Heads that share keys become the second axis, along which a view repeats keys without a copy.
+        # Heads that share keys become the second axis, along which a view repeats keys without a
+        # copy.
         shared = (n_key_heads, query.shape[1] // n_key_heads)
         output = scaled_dot_product_attention(
             query.unflatten(1, shared)[0],
@@ -130,7 +134,8 @@ class BranchAttention:
         return output.flatten(0, 1).transpose(0, 1)[None], None
 
     def _mask(self, window: int | None, query: Tensor) -> Tensor:
-        """Return what is added to the scores, (new tokens, all tokens): 0 or minus infinity, beside the queries."""
+        """Return what is added to the scores, (new tokens, all tokens): 0 or minus infinity, beside
+        the queries."""
         key = (window, query.device)  # a model can be on several devices
         if key not in self._masks:
             self._masks[key] = self._new_mask(window, query.dtype).to(query.device)

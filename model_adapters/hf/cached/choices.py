@@ -20,7 +20,8 @@ class Choices:
         self._texts = ids
 
     def after(self, ids: Sequence[int]) -> set[int]:
-        """Return the tokens that continue these ids towards an allowed reply; none if the reply has to end."""
+        """Return the tokens that continue these ids towards an allowed reply; none if the reply has
+        to end."""
         prefix, n = tuple(ids), len(ids)
         return {choice[n] for choice in self._texts if len(choice) > n and choice[:n] == prefix}
 
@@ -32,7 +33,8 @@ class Choices:
 def read_choices(tokenizer: Any, decoding: Decoding) -> Choices | None:
     """Return the allowed replies as token ids, or None if the reply is free.
 
-    Each text has one spelling, the tokenizer's own: other sequences of tokens with the same text are not allowed.
+    Each text has one spelling, the tokenizer's own: other sequences of tokens with the same text
+    are not allowed.
 
     Raises:
         ModelError: a text has more tokens than the reply may have.
@@ -42,8 +44,8 @@ def read_choices(tokenizer: Any, decoding: Decoding) -> Choices | None:
         spelling = tuple(tokenizer(text, add_special_tokens=False)["input_ids"])
         if len(spelling) > decoding.max_new_tokens:
             raise ModelError(
-                f"the choice {text[:40]!r} has {len(spelling)} tokens and a reply may have {decoding.max_new_tokens}; "
-                "raise max_new_tokens"
+                f"the choice {text[:40]!r} has {len(spelling)} tokens and a reply may have "
+                f"{decoding.max_new_tokens}; raise max_new_tokens"
             )
         ids.setdefault(spelling, text)
     return Choices(ids) if ids else None

@@ -22,7 +22,8 @@ from model_adapters.protocols import Decoding
 
 __all__ = ["Generation", "ReplyState", "decode_replies", "extend_replies", "read_generation"]
 
-# Settings that change the reply and that this decoder does not support, with the values that switch them off.
+# Settings that change the reply and that this decoder does not support, with the values that switch
+# them off.
 _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
     "num_beams": (None, 1),
     "no_repeat_ngram_size": (None, 0),
@@ -38,11 +39,13 @@ _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
 
 @dataclass(frozen=True)
 class Generation:
-    """The generation settings of a checkpoint that are used; sampling settings come with each request.
+    """The generation settings of a checkpoint that are used; sampling settings come with each
+    request.
 
     Attributes:
         end_ids: tokens that end the turn.
-        repetition_penalty: penalty of tokens in context and reply, as in transformers (1.05 in Qwen2.5-VL).
+        repetition_penalty: penalty of tokens in context and reply, as in transformers (1.05 in
+            Qwen2.5-VL).
     """
 
     end_ids: frozenset[int]
@@ -66,7 +69,8 @@ def read_generation(config: GenerationConfig) -> Generation:
         type(end) is int and end >= 0 for end in listed
     ):
         raise ModelError(
-            f"the checkpoint's eos_token_id is {ends!r:.40}; use the id of a token, or a list of ids"
+            f"the checkpoint's eos_token_id is {ends!r:.40}; use the id of a token, or a list of "
+            "ids"
         )
     penalty = 1.0 if config.repetition_penalty is None else config.repetition_penalty
     if (
@@ -88,7 +92,8 @@ class ReplyState:
         decoding: decoding of the reply.
         context: all ids before the reply; read only if there is a repetition penalty.
         choices: allowed replies, or None for a free reply.
-        finished: called with the ids of a free reply after each token; returns whether it ends here.
+        finished: called with the ids of a free reply after each token; returns whether it ends
+            here.
 
     Attributes:
         decoding: decoding of the reply.
@@ -125,7 +130,8 @@ class ReplyState:
         return None if self._choices is None else self._choices.text(self.ids)
 
     def scores(self, logits: torch.Tensor) -> torch.Tensor:
-        """Return the scores of all next tokens, (vocabulary,), on the logits' device, without waiting for it."""
+        """Return the scores of all next tokens, (vocabulary,), on the logits' device, without
+        waiting for it."""
         return self._restrict(self._penalise(logits.float()))
 
     def take(self, scores: torch.Tensor, likeliest: int, score: float) -> None:
@@ -141,7 +147,8 @@ class ReplyState:
         """
         if not score > -math.inf:  # the maximum is NaN if any score is
             raise ModelError(
-                f"no token has a score after {len(self.ids)} tokens of the reply (NaN); try dtype=float32"
+                f"no token has a score after {len(self.ids)} tokens of the reply (NaN); try "
+                "dtype=float32"
             )
         token = likeliest if self.decoding.greedy else self._sample(scores)
         if token in self._generation.end_ids:
@@ -154,7 +161,8 @@ class ReplyState:
         self.done = len(self.ids) == self.decoding.max_new_tokens or self._ends_here()
 
     def _penalise(self, logits: torch.Tensor) -> torch.Tensor:
-        """Return logits with those of earlier tokens lowered by transformers' repetition penalty."""
+        """Return logits with those of earlier tokens lowered by transformers' repetition
+        penalty."""
         if self._penalised_ids is None:
             return logits
         self._penalised_ids = self._penalised_ids.to(
@@ -164,10 +172,12 @@ class ReplyState:
         return penalty(cast(Any, self._penalised_ids), cast(Any, logits[None]))[0]
 
     def _restrict(self, scores: torch.Tensor) -> torch.Tensor:
-        """Return scores in which only tokens that lead to a choice are finite; a free reply's are unchanged."""
+        """Return scores in which only tokens that lead to a choice are finite; a free reply's are
+        unchanged."""
         if self._choices is None:
             return scores
-        # A choice may be the beginning of another: where one is complete, the reply may end or go on.
+        # A choice may be the beginning of another: where one is complete, the reply may end or go
+        # on.
         allowed = self._choices.after(self.ids) | (
             self._generation.end_ids if self.choice is not None else set()
         )
@@ -200,8 +210,8 @@ def decode_replies(
 
     Args:
         logits: logits of the first token of each reply, (replies, vocabulary).
-        step: feeds tokens, by the numbers of the replies that are not done, and returns the logits of the next ones,
-            (these replies, vocabulary).
+        step: feeds tokens, by the numbers of the replies that are not done, and returns the logits
+            of the next ones, (these replies, vocabulary).
         replies: empty replies, which are filled in place.
     """
     numbers = list(range(len(replies)))

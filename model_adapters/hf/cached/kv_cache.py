@@ -1,8 +1,8 @@
 """A KV cache that is cut and refilled in place.
 
-transformers' DynamicCache concatenates, which copies the whole prefix for every decoded token and again after every
-crop. Here keys and values are views on buffers with spare capacity: an update writes its own rows only, and a crop
-moves no memory, so rewinding a conversation costs nothing.
+transformers' DynamicCache concatenates, which copies the whole prefix for every decoded token and
+again after every crop. Here keys and values are views on buffers with spare capacity: an update
+writes its own rows only, and a crop moves no memory, so rewinding a conversation costs nothing.
 """
 
 from dataclasses import dataclass
@@ -13,15 +13,17 @@ from transformers.cache_utils import Cache, DynamicLayer
 
 __all__ = ["BufferedCache"]
 
-_STEP = 1024  # capacities are multiples of this, so that a slightly longer question does not reallocate the prefix
+# capacities are multiples of this, so that a slightly longer question does not reallocate the
+# prefix
+_STEP = 1024
 
 
 @dataclass
 class _Allocation:
     """Allocation settings that a cache shares with its layers.
 
-    Layers do not refer to the cache itself: in a reference cycle, unused buffers would stay in memory beside their
-    successors until Python's cyclic garbage collector runs.
+    Layers do not refer to the cache itself: in a reference cycle, unused buffers would stay in
+    memory beside their successors until Python's cyclic garbage collector runs.
     """
 
     storage: (
@@ -34,10 +36,11 @@ class BufferedCache(Cache):
     """A cache of `BufferedLayer`s, which are created as the model reaches its layers."""
 
     def __init__(self, storage: torch.device | None = None) -> None:
-        """Create an empty cache with buffers on the `storage` device; on that of the layers' weights where None.
+        """Create an empty cache with buffers on the `storage` device; on that of the layers'
+        weights where None.
 
-        With the CPU as storage, only the computing layer's keys and values are on the weights' device: a context that
-        does not fit on the device runs, at the speed of the connection.
+        With the CPU as storage, only the computing layer's keys and values are on the weights'
+        device: a context that does not fit on the device runs, at the speed of the connection.
         """
         self._allocation = _Allocation(storage)
         super().__init__(layers=[])
@@ -56,7 +59,8 @@ class BufferedCache(Cache):
         return super().update(key_states, value_states, layer_idx, *args, **kwargs)
 
     def reserve(self, n_tokens: int) -> None:
-        """Set the capacity of buffers that are allocated from now on, so that they need not grow step by step."""
+        """Set the capacity of buffers that are allocated from now on, so that they need not grow
+        step by step."""
         self._allocation.capacity = -(-n_tokens // _STEP) * _STEP
 
     def truncate(self, n_tokens: int) -> None:

@@ -1,4 +1,5 @@
-"""Any transformers model of a known family as a `Model`: conversations that share one encoded prefix."""
+"""Any transformers model of a known family as a `Model`: conversations that share one encoded
+prefix."""
 
 from collections.abc import Sequence
 
@@ -27,8 +28,9 @@ __all__ = ["TransformersModel"]
 class TransformersModel(HfModel):
     """A loaded checkpoint behind the `Model` protocol.
 
-    All conversations of a model share one encoded sequence. A reply reuses what its prompt has in common with the
-    previous prompt, whichever conversation that was of, so conversations over the same frames encode them once.
+    All conversations of a model share one encoded sequence. A reply reuses what its prompt has in
+    common with the previous prompt, whichever conversation that was of, so conversations over the
+    same frames encode them once.
     """
 
     def __init__(self, name: str, loaded: LoadedCheckpoint, options: HfOptions) -> None:
@@ -47,7 +49,8 @@ class TransformersModel(HfModel):
         )
 
     def fix_rope(self, n_positions: int) -> None:
-        """Give all sequences of a training the rotary frequencies of one length, where they depend on the length."""
+        """Give all sequences of a training the rotary frequencies of one length, where they depend
+        on the length."""
         if self._rope is not None:
             self._rope.set(n_positions)
 
@@ -59,7 +62,8 @@ class TransformersModel(HfModel):
         super().close()
 
     def encode(self, pieces: Sequence[Piece]) -> torch.Tensor:
-        """Encode a prompt from scratch, in two parts; return the logits of the next token, (vocabulary,)."""
+        """Encode a prompt from scratch, in two parts; return the logits of the next token,
+        (vocabulary,)."""
         self._prefix.reset()
         self._prefix.rewind_to(pieces)
         self._prefix.feed(pieces[:2])
@@ -125,7 +129,8 @@ class TransformersModel(HfModel):
     def _decode_branches(
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
     ) -> list[int]:
-        """Decode several replies together; return how many tokens of each prompt were in the cache."""
+        """Decode several replies together; return how many tokens of each prompt were in the
+        cache."""
         common = n_common(prompts)
         shared = min(self._prefix.rewind_to(prompts[0]), common)
         # The cached sequence may share more with the first prompt than all prompts share.

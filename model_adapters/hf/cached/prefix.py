@@ -1,8 +1,9 @@
 """The sequence that a model has encoded: its KV cache and the pieces in it.
 
-A new prompt is compared with the encoded pieces, the cache is cut behind the longest common prefix, and only the rest
-is encoded. This is done in chunks, so that the activations of one chunk are the most that a long prompt needs. Chunks
-attend to the cache, so the numbers differ from those of one pass only by rounding.
+A new prompt is compared with the encoded pieces, the cache is cut behind the longest common prefix,
+and only the rest is encoded. This is done in chunks, so that the activations of one chunk are the
+most that a long prompt needs. Chunks attend to the cache, so the numbers differ from those of one
+pass only by rounding.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,11 +25,13 @@ class Prefix:
     """The one encoded sequence of a model.
 
     Args:
-        model: a transformers model that takes `inputs_embeds`, `position_ids` and `past_key_values`.
+        model: a transformers model that takes `inputs_embeds`, `position_ids` and
+            `past_key_values`.
         family: family of the model.
         embed: embeds spans of prompts.
         chunk_tokens: most tokens of one forward pass (a larger frame is a chunk alone).
-        rope: rotary embeddings of the model if their frequencies depend on the prompt's length, else None.
+        rope: rotary embeddings of the model if their frequencies depend on the prompt's length,
+            else None.
         storage: device of keys and values; the device of the weights where None.
     """
 
@@ -77,7 +80,8 @@ class Prefix:
 
     @contextmanager
     def extended(self, continuations: Sequence[Sequence[Piece]], reserve: int) -> Iterator[None]:
-        """Let others append to the cache within the context, what these continuations and some more tokens need."""
+        """Let others append to the cache within the context, what these continuations and some more
+        tokens need."""
         self._cache.reserve(self.n_tokens + sum(map(n_tokens, continuations)) + reserve)
         done = False
         try:
@@ -90,7 +94,8 @@ class Prefix:
                 self.reset()
 
     def rewind_to(self, pieces: Sequence[Piece]) -> int:
-        """Cut the sequence behind its longest common prefix with these pieces, of which at least one is left to feed.
+        """Cut the sequence behind its longest common prefix with these pieces, of which at least
+        one is left to feed.
 
         The last piece is never shared: logits of the next token come only from feeding something.
 
@@ -108,7 +113,8 @@ class Prefix:
         return shared
 
     def _set_rope(self, rope: LengthRope, pieces: Sequence[Piece]) -> None:
-        """Set the rotary frequencies for a prompt; a sequence that was encoded with others is dropped."""
+        """Set the rotary frequencies for a prompt; a sequence that was encoded with others is
+        dropped."""
         ids = torch.tensor(list(token_ids(pieces)))
         shapes = [piece.shape for piece in pieces if not isinstance(piece, int)]
         n_positions = int(self._family.positions(ids, shapes, 0).max()) + 1

@@ -45,7 +45,8 @@ def end_reply(loaded: LoadedCheckpoint, state: ReplyState, n_context: int, n_cac
 def reply_text(loaded: LoadedCheckpoint, ids: Sequence[int], decoding: Decoding) -> str:
     """Return the text of a free reply before its first stop string; the ids have no end token.
 
-    A marker of thoughts that the template wrote before the reply is there, too, as if the model had written it.
+    A marker of thoughts that the template wrote before the reply is there, too, as if the model had
+    written it.
     """
     text = _text(loaded, ids)
     before_stop = cut_at_stop(text, decoding.stop)
@@ -53,7 +54,8 @@ def reply_text(loaded: LoadedCheckpoint, ids: Sequence[int], decoding: Decoding)
 
 
 def stop_ids(tokenizer: Any, decoding: Decoding) -> set[int]:
-    """Return the ids of stop strings that are single tokens; special tokens never appear in the text of a reply."""
+    """Return the ids of stop strings that are single tokens; special tokens never appear in the
+    text of a reply."""
     if not decoding.stop:
         return set()
     added: dict[str, int] = tokenizer.get_added_vocab()
@@ -61,7 +63,8 @@ def stop_ids(tokenizer: Any, decoding: Decoding) -> set[int]:
 
 
 def _text(loaded: LoadedCheckpoint, ids: Sequence[int]) -> str:
-    """Return the text of a reply without special tokens, but for those that mark what the model thinks."""
+    """Return the text of a reply without special tokens, but for those that mark what the model
+    thinks."""
     pieces: list[str] = []
     start = 0
     for at, token in enumerate(ids):

@@ -1,10 +1,11 @@
 """Any model of `AutoModelForImageTextToText` with a chat template, so that new models need no code.
 
-A model of a known family runs as that family. For others, the processor says what a frame's placeholder expands to, and
-the model's `get_image_features` computes what goes into the slots. When such a model is loaded, token ids and logits of
-a sample are compared with those of the processor and the plain model: an architecture that works differently is refused
-instead of giving wrong results. With share_prefix=false it is run by its own processor and `generate`, and the sample
-shows only that processor and model fit each other.
+A model of a known family runs as that family. For others, the processor says what a frame's
+placeholder expands to, and the model's `get_image_features` computes what goes into the slots. When
+such a model is loaded, token ids and logits of a sample are compared with those of the processor
+and the plain model: an architecture that works differently is refused instead of giving wrong
+results. With share_prefix=false it is run by its own processor and `generate`, and the sample shows
+only that processor and model fit each other.
 """
 
 import functools
@@ -72,7 +73,8 @@ class ProcessorFamily(PlainFamily):
         return tuple(expand_image_token(self._processor, Image.new("RGB", size, "gray")))
 
     def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
-        """Return the placeholder, between the config's markers unless the processor adds them itself."""
+        """Return the placeholder, between the config's markers unless the processor adds them
+        itself."""
         markers = _markers(self._model.config)
         if markers is None or markers[0] in self.frame_ids(_BLANK):
             return (placeholder_id,)
@@ -96,7 +98,8 @@ class ProcessorFamily(PlainFamily):
 
 
 def _markers(config: Any) -> tuple[int, int] | None:
-    """Return the tokens that begin and end an image, by the names that configs use for them, or None."""
+    """Return the tokens that begin and end an image, by the names that configs use for them, or
+    None."""
     for kind in ("vision", "image"):
         start, end = (getattr(config, f"{kind}_{side}_token_id", None) for side in ("start", "end"))
         if start is not None and end is not None:
@@ -115,8 +118,8 @@ class HfVlm:
 
         Raises:
             UsageError: no checkpoint is given.
-            ModelError: the checkpoint cannot be loaded, has no vision, its parts do not belong together, or it cannot
-                share prefixes.
+            ModelError: the checkpoint cannot be loaded, has no vision, its parts do not belong
+                together, or it cannot share prefixes.
         """
         located = cls.locate(name, options)
         family = family_of(located.config)
@@ -168,7 +171,8 @@ def family_of(config: Any) -> MakeFamily | None:
 
 
 def load_processor(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the checkpoint's processor of images and text, for architectures without their own family.
+    """Return the checkpoint's processor of images and text, for architectures without their own
+    family.
 
     Raises:
         ModelError: the checkpoint has none, or it cannot be loaded.
@@ -187,7 +191,8 @@ def load_processor(located: LocatedCheckpoint[Any]) -> Any:
 
 
 def require_same_ids(loaded: LoadedCheckpoint, processor: Any, pretrained: str, hint: str) -> None:
-    """Refuse a checkpoint whose processor makes other token ids of a sample than the parts of a conversation have.
+    """Refuse a checkpoint whose processor makes other token ids of a sample than the parts of a
+    conversation have.
 
     Raises:
         ModelError: the ids differ; the message ends in `hint`.
@@ -210,8 +215,12 @@ def _compare_with_plain_model(
     processor: Any,
     pretrained: str,
 ) -> None:
-    """Raise `ModelError` unless a sample has the processor's token ids and the plain model's logits."""
-    hint = f"{loaded.model.config.model_type} cannot be run with shared prefixes; use share_prefix=false"
+    """Raise `ModelError` unless a sample has the processor's token ids and the plain model's
+    logits."""
+    hint = (
+        f"{loaded.model.config.model_type} cannot be run with shared prefixes; use "
+        "share_prefix=false"
+    )
     shared = None
     with tempfile.TemporaryDirectory() as folder, wrap_mismatch_errors(pretrained):
         turns = [Turn("user", _sample(Path(folder)))]

@@ -1,4 +1,5 @@
-"""LLaVA-OneVision: a frame of 300x300 takes 1485 tokens, an overview and the frame with a break after each row.
+"""LLaVA-OneVision: a frame of 300x300 takes 1485 tokens, an overview and the frame with a break
+after each row.
 
 A frame of a video takes 196 tokens (`llava_video`).
 """
@@ -20,8 +21,8 @@ __all__ = ["LlavaOnevision", "LlavaOnevisionFamily"]
 class LlavaOnevisionFamily(PlainFamily):
     """The family of LLaVA-OneVision; each frame is processed as a single image.
 
-    The processor treats a nested list of images as one multi-image sample and halves their tokens (730). Frames are
-    passed as a flat list, as in the published results.
+    The processor treats a nested list of images as one multi-image sample and halves their tokens
+    (730). Frames are passed as a flat list, as in the published results.
     """
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:
@@ -29,7 +30,8 @@ class LlavaOnevisionFamily(PlainFamily):
         self.video = LlavaVideo(model, image_processor)
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the packed features of overview, patches and row breaks for each image, (tokens, hidden)."""
+        """Return the packed features of overview, patches and row breaks for each image, (tokens,
+        hidden)."""
         inputs = self._inputs(images)
         output = self._model.get_image_features(
             inputs["pixel_values"], inputs["image_sizes"], return_dict=True

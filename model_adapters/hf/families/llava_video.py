@@ -1,7 +1,8 @@
 """The video input of LLaVA-OneVision: a frame takes 196 tokens, and a break follows the last one.
 
-The checkpoint's own video processor needs torchvision, so pixels come from its image processor: the overview of an
-image is the whole frame in the size of the vision tower, which is what a frame of a video is scaled to.
+The checkpoint's own video processor needs torchvision, so pixels come from its image processor: the
+overview of an image is the whole frame in the size of the vision tower, which is what a frame of a
+video is scaled to.
 """
 
 import math
@@ -29,7 +30,8 @@ class LlavaVideo:
         self.placeholder_id: int = model.config.video_token_id
 
     def n_tokens(self, shape: ClipShape) -> int:
-        """Return one token for each square of pooled patches, and one for the break after the last frame."""
+        """Return one token for each square of pooled patches, and one for the break after the last
+        frame."""
         vision = self._model.config.vision_config
         side = math.ceil(vision.image_size // vision.patch_size / _POOLED)
         return side**2 + _is_last(shape)
@@ -37,7 +39,8 @@ class LlavaVideo:
     def features(
         self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
     ) -> list[torch.Tensor]:
-        """Return the pooled patches of each frame, (tokens, hidden), with the break after the last frame of a video."""
+        """Return the pooled patches of each frame, (tokens, hidden), with the break after the last
+        frame of a video."""
         frames = [image for _, images in clips for image in images]
         overviews = self._image_processor(images=frames, return_tensors="pt")["pixel_values"][:, 0]
         weight = self._model.get_input_embeddings().weight

@@ -1,4 +1,5 @@
-"""Pixtral 12B: a frame of 300x300 takes 380 tokens, 19 rows of 19 and a token that ends each row."""
+"""Pixtral 12B: a frame of 300x300 takes 380 tokens, 19 rows of 19 and a token that ends each
+row."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -45,8 +46,8 @@ class PixtralFamily(PlainFamily):
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
         """Return the projected patches of each image, (tokens, hidden).
 
-        Frames are processed one by one: the vision tower joins a batch to one sequence with a mask over all pairs of
-        patches, so the cost would be quadratic in the number of frames.
+        Frames are processed one by one: the vision tower joins a batch to one sequence with a mask
+        over all pairs of patches, so the cost would be quadratic in the number of frames.
         """
         features = []
         for image in images:

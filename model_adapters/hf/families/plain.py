@@ -12,10 +12,11 @@ __all__ = ["PlainFamily"]
 
 
 class PlainFamily:
-    """Base of families with consecutive positions, whose frames consist of equal slots, `config.image_token_id`.
+    """Base of families with consecutive positions, whose frames consist of equal slots,
+    `config.image_token_id`.
 
-    Subclasses compute features. The slots of a frame are counted on a blank image of its size, so the count is always
-    that of the model.
+    Subclasses compute features. The slots of a frame are counted on a blank image of its size, so
+    the count is always that of the model.
     """
 
     def __init__(self, model: Any, image_processor: Any, tokenizer: Any) -> None:

@@ -1,4 +1,5 @@
-"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between two markers, with three-axis (multimodal) positions.
+"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between two markers, with three-axis (multimodal)
+positions.
 
 Two frames of a video take 144 tokens together, all of a video between two markers (`qwen_video`).
 """
@@ -36,7 +37,8 @@ class Qwen25VLFamily(PlainFamily):
         )
 
     def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
-        """Return the placeholder between the vision markers, which the processor leaves to the template."""
+        """Return the placeholder between the vision markers, which the processor leaves to the
+        template."""
         config = self._model.config
         return (config.vision_start_token_id, placeholder_id, config.vision_end_token_id)
 
@@ -51,8 +53,9 @@ class Qwen25VLFamily(PlainFamily):
     def positions(self, ids: torch.Tensor, shapes: Sequence[Shape], start: int) -> torch.Tensor:
         """Return temporal, height and width positions, (3, 1, tokens).
 
-        The model's own rule counts from the first token, and all positions shift with it. So a span that cuts no frame
-        is numbered alone and shifted, which makes chunked prefill equal to one pass. Clips are numbered one by one.
+        The model's own rule counts from the first token, and all positions shift with it. So a span
+        that cuts no frame is numbered alone and shifted, which makes chunked prefill equal to one
+        pass. Clips are numbered one by one.
         """
         rows = []
         for run in self._runs(ids, shapes):
@@ -68,7 +71,8 @@ class Qwen25VLFamily(PlainFamily):
     def _runs(
         self, ids: torch.Tensor, shapes: Sequence[Shape]
     ) -> Iterator[ClipShape | tuple[torch.Tensor, list[Size]]]:
-        """Yield each clip of a span, and the ids of what is between clips with the sizes of its frames."""
+        """Yield each clip of a span, and the ids of what is between clips with the sizes of its
+        frames."""
         left = list(shapes)
         for in_video, run in groupby(
             ids.tolist(), lambda token: token == self._clips.placeholder_id
@@ -96,7 +100,8 @@ class Qwen25VLFamily(PlainFamily):
         return positions + start
 
     def _grid(self, size: Size) -> tuple[int, int, int]:
-        """Return the patches of an image of this size along time, height and width, by the image processor."""
+        """Return the patches of an image of this size along time, height and width, by the image
+        processor."""
         if size not in self._grids:
             inputs = self._image_processor(images=[Image.new("RGB", size)], return_tensors="pt")
             time, height, width = inputs["image_grid_thw"][0].tolist()

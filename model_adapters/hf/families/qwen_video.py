@@ -1,7 +1,9 @@
-"""The video input of Qwen2.5-VL: two frames make a temporal patch, of 144 tokens for frames of 300x300.
+"""The video input of Qwen2.5-VL: two frames make a temporal patch, of 144 tokens for frames of
+300x300.
 
-Frames are sized as qwen-vl-utils does it, which the published evaluation used. The checkpoint's own video processor
-needs torchvision, so pixels come from its image processor, which scales each frame by PIL.
+Frames are sized as qwen-vl-utils does it, which the published evaluation used. The checkpoint's own
+video processor needs torchvision, so pixels come from its image processor, which scales each frame
+by PIL.
 """
 
 import math
@@ -41,7 +43,8 @@ class QwenVideo:
     ) -> list[torch.Tensor]:
         """Return the vision tower's merged patches of each clip, (tokens, hidden).
 
-        The tower attends within a temporal patch only, so clips can be encoded one by one as well as together.
+        The tower attends within a temporal patch only, so clips can be encoded one by one as well
+        as together.
         """
         pixels, grids = [], []
         for shape, images in clips:
@@ -61,9 +64,10 @@ class QwenVideo:
     def positions(self, shape: ClipShape, start: int) -> torch.Tensor:
         """Return temporal, height and width positions of a clip's tokens, (3, 1, tokens).
 
-        Rows and columns count from the start of the video. Time does so too, in steps of the video's real time, so that
-        the clips of a slow sampling are farther apart. Whatever follows a video begins behind its largest position on
-        any axis, as the model was trained; get_rope_index of transformers 5 counts rows and columns alone.
+        Rows and columns count from the start of the video. Time does so too, in steps of the
+        video's real time, so that the clips of a slow sampling are farther apart. Whatever follows
+        a video begins behind its largest position on any axis, as the model was trained;
+        get_rope_index of transformers 5 counts rows and columns alone.
 
         Args:
             shape: shape of the clip.
@@ -77,11 +81,13 @@ class QwenVideo:
         return torch.stack([time, rows, columns])[:, None]
 
     def _n_positions(self, shape: ClipShape, number: int) -> int:
-        """Return the number of positions that a video takes up to and with a clip of this number."""
+        """Return the number of positions that a video takes up to and with a clip of this
+        number."""
         return max(self._time(shape, number) + 1, *self._merged_sides(shape))
 
     def _time(self, shape: ClipShape, number: int) -> int:
-        """Return the temporal position of a clip in its video; Qwen2-VL counts clips, Qwen2.5-VL time."""
+        """Return the temporal position of a clip in its video; Qwen2-VL counts clips, Qwen2.5-VL
+        time."""
         per_second = getattr(self._model.config.vision_config, "tokens_per_second", None)
         return number if per_second is None else int(number * per_second * shape.seconds)
 
@@ -99,7 +105,8 @@ class QwenVideo:
         return self._sides[key]
 
     def _limits(self, shape: ClipShape) -> dict[str, int]:
-        """Return the limits of a frame's area: those of qwen-vl-utils, within those of the image processor.
+        """Return the limits of a frame's area: those of qwen-vl-utils, within those of the image
+        processor.
 
         The clips of a long video share the pixels that a video may have.
         """
@@ -110,9 +117,11 @@ class QwenVideo:
         return {"shortest_edge": lower, "longest_edge": int(min(max(upper, least), most))}
 
     def _interleave(self, pixels: torch.Tensor, n_frames: int) -> torch.Tensor:
-        """Return the patches of a clip, (patches, channels x frames x area), from those of its frames.
+        """Return the patches of a clip, (patches, channels x frames x area), from those of its
+        frames.
 
-        The image processor repeats an image along time; of each frame, its own place in time is taken.
+        The image processor repeats an image along time; of each frame, its own place in time is
+        taken.
         """
         area = self._image_processor.patch_size**2
         by_frame = pixels.reshape(

@@ -1,7 +1,7 @@
 """The card of a checkpoint (README.md), as far as it says how the checkpoint was trained.
 
-Our training writes `infthor_words: published` into the card's metadata, the YAML between two lines of dashes at its
-beginning: the words of plans and actions that the checkpoint was trained on.
+Our training writes `infthor_words: published` into the card's metadata, the YAML between two lines
+of dashes at its beginning: the words of plans and actions that the checkpoint was trained on.
 """
 
 from pathlib import Path
@@ -16,7 +16,8 @@ _MOST_BYTES = 1_000_000  # of a card
 
 
 def read_card_words(folder: Path) -> str | None:
-    """Return the words that a checkpoint was trained on; None if it has no card, or the card does not say so."""
+    """Return the words that a checkpoint was trained on; None if it has no card, or the card does
+    not say so."""
     path = folder / "README.md"
     if not path.is_file() or path.stat().st_size > _MOST_BYTES:
         return None

@@ -1,8 +1,9 @@
 """Loading of a checkpoint from the hub or a folder, without torchvision and without remote code.
 
-transformers cannot build the processors of video-capable families without torchvision, so the parts that a conversation
-needs (image processor, tokenizer, chat template) are loaded one by one. Image processors are always those of PIL:
-torchvision's resize gives other pixels, and results must not depend on which packages are installed.
+transformers cannot build the processors of video-capable families without torchvision, so the parts
+that a conversation needs (image processor, tokenizer, chat template) are loaded one by one. Image
+processors are always those of PIL: torchvision's resize gives other pixels, and results must not
+depend on which packages are installed.
 """
 
 import contextlib
@@ -103,7 +104,8 @@ def read_checkpoint(
 ) -> LoadedCheckpoint:
     """Load everything that a conversation needs.
 
-    A context extension is written into the config; `build_model` builds its model, `build_meta_model` without weights.
+    A context extension is written into the config; `build_model` builds its model,
+    `build_meta_model` without weights.
 
     Raises:
         ModelError: the checkpoint is incomplete or damaged.
@@ -132,7 +134,8 @@ def read_checkpoint(
 
 
 def build_meta_model(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the model of a checkpoint on torch's meta device: shapes without weights, which take no memory.
+    """Return the model of a checkpoint on torch's meta device: shapes without weights, which take
+    no memory.
 
     It is enough for counting a frame's tokens, if another engine has the weights.
     """
@@ -155,7 +158,8 @@ def assemble(
     max_tokens: int | None,
     origin: Mapping[str, Any],
 ) -> LoadedCheckpoint:
-    """Combine loaded parts and derive their identity, which begins with `origin`, the source of the weights.
+    """Combine loaded parts and derive their identity, which begins with `origin`, the source of the
+    weights.
 
     Raises:
         ModelError: the generation settings are not supported, or min_pixels exceeds max_pixels.
@@ -193,7 +197,8 @@ def _check_pixels(image_processor: Any) -> None:
 
 
 def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
-    """Return the source of weights, for an identity, and what it was trained on if its card says so.
+    """Return the source of weights, for an identity, and what it was trained on if its card says
+    so.
 
     The commit is None for a folder of the user's.
     """
@@ -263,7 +268,8 @@ def resolve_dtype(options: Placement) -> torch.dtype | str:
     dtype = "auto" if options.dtype == "auto" else getattr(torch, options.dtype, None)
     if not (dtype == "auto" or dtype in _DTYPES):
         raise UsageError(
-            f"dtype={options.dtype} is not a type of weights; use auto, bfloat16, float16 or float32"
+            f"dtype={options.dtype} is not a type of weights; use auto, bfloat16, float16 or "
+            "float32"
         )
     return dtype
 

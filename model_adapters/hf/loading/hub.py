@@ -28,8 +28,9 @@ def fetch(
 ) -> tuple[Path, str | None]:
     """Return the folder of a checkpoint, downloading it unless it is in the hub's cache.
 
-    One request, without retries, asks the hub for the commit. If the hub cannot be reached, the cache is used. So a
-    cached checkpoint needs no network, and a missing one without network fails at once.
+    One request, without retries, asks the hub for the commit. If the hub cannot be reached, the
+    cache is used. So a cached checkpoint needs no network, and a missing one without network fails
+    at once.
 
     Args:
         pretrained: a folder, or a hub id.
@@ -41,7 +42,8 @@ def fetch(
         The folder, and the commit that it holds (None for a folder of the user's).
 
     Raises:
-        ModelError: the checkpoint is neither a folder nor in the hub or its cache; the message says what to do.
+        ModelError: the checkpoint is neither a folder nor in the hub or its cache; the message says
+            what to do.
     """
     path = Path(pretrained).expanduser()
     if path.is_dir():
@@ -60,7 +62,8 @@ def fetch(
         )
     except (HfHubHTTPError, HFValidationError) as error:
         raise ModelError(
-            f"the hub refuses {at} ({_first_line(error)}); check the name, or log in with `hf auth login`"
+            f"the hub refuses {at} ({_first_line(error)}); check the name, or log in with `hf auth "
+            "login`"
         ) from error
     except (HTTPError, OSError) as error:
         folder = _cached_folder(pretrained, revision, at, option, error)
@@ -74,8 +77,9 @@ def _cached_folder(
         return Path(snapshot_download(pretrained, revision=revision, local_files_only=True))
     except LocalEntryNotFoundError as error:
         raise ModelError(
-            f"{at} is not in the local cache and the hub cannot be reached ({_first_line(reason)}); download it where "
-            f"there is network with `hf download {pretrained} --local-dir DIR` and give {option}DIR"
+            f"{at} is not in the local cache and the hub cannot be reached "
+            f"({_first_line(reason)}); download it where there is network with `hf download "
+            f"{pretrained} --local-dir DIR` and give {option}DIR"
         ) from error
 
 

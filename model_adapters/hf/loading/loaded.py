@@ -38,7 +38,8 @@ class LoadedCheckpoint:
 
     @cached_property
     def opening(self) -> str:
-        """Marker that the template writes before every reply, so that the model begins in thought; mostly empty."""
+        """Marker that the template writes before every reply, so that the model begins in thought;
+        mostly empty."""
         if not any(before in self.template for before, _ in MARKERS.values()):
             return ""
         return opening_marker(prompt_end(self.tokenizer, self.template))

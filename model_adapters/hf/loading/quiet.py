@@ -10,7 +10,8 @@ __all__ = ["hide_transformers_output"]
 
 @contextmanager
 def hide_transformers_output() -> Iterator[None]:
-    """Hide progress bars and warnings of transformers within the context; errors are raised as always.
+    """Hide progress bars and warnings of transformers within the context; errors are raised as
+    always.
 
     Both settings are global in transformers, so they are restored afterwards.
     """

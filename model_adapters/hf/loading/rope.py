@@ -1,8 +1,9 @@
 """Longer contexts by scaled rotary positions (RoPE), in the form of transformers 5.
 
-transformers recomputes the frequencies of `dynamic` and `longrope` inside the forward pass, from the largest position
-so far. In a chunked prefill or with a cached prefix, earlier and later tokens would then have different frequencies.
-Here they are set once per request from the prompt's full length, as a single pass over the whole prompt would.
+transformers recomputes the frequencies of `dynamic` and `longrope` inside the forward pass, from
+the largest position so far. In a chunked prefill or with a cached prefix, earlier and later tokens
+would then have different frequencies. Here they are set once per request from the prompt's full
+length, as a single pass over the whole prompt would.
 """
 
 import re
@@ -25,10 +26,11 @@ _PUBLISHED_LONGROPE_FACTOR = 1.0
 def apply_rope(config: Any, rope: str | None) -> int | None:
     """Write a context extension into a model's config.
 
-    The original length is the config's `max_position_embeddings`, as in the published evaluation. `longrope` is the
-    published form: all frequencies are divided by the factor for prompts that are longer than the original length, and
-    shorter ones are as without an extension. `longrope-scaled` is that of LongRoPE's authors: the checkpoint's own
-    factors of frequencies where it has them, and attention scaled at every length.
+    The original length is the config's `max_position_embeddings`, as in the published evaluation.
+    `longrope` is the published form: all frequencies are divided by the factor for prompts that are
+    longer than the original length, and shorter ones are as without an extension. `longrope-scaled`
+    is that of LongRoPE's authors: the checkpoint's own factors of frequencies where it has them,
+    and attention scaled at every length.
 
     Args:
         config: config of the model; its text config is changed.
@@ -90,7 +92,8 @@ class LengthRope:
         modules: rotary embeddings of the model.
         compute: transformers' function for the frequencies.
         original: length up to which the original frequencies apply, in positions.
-        by_length: true if each greater length has its own frequencies (dynamic), false if all share some (longrope).
+        by_length: true if each greater length has its own frequencies (dynamic), false if all share
+            some (longrope).
     """
 
     modules: tuple[Any, ...]
@@ -113,7 +116,8 @@ class LengthRope:
 
 
 def take_length_rope(model: Any) -> LengthRope | None:
-    """Take control of a model's rotary embeddings if their frequencies depend on the length; else return None."""
+    """Take control of a model's rotary embeddings if their frequencies depend on the length; else
+    return None."""
     modules = tuple(
         module
         for module in model.modules()

@@ -1,7 +1,8 @@
 """Names of the weights of vision towers in checkpoints of LLaVA and its kin.
 
-Published checkpoints have a level `vision_model` in a CLIP or SigLIP tower (`vision_tower.vision_model.encoder...`).
-From 5.17 on, transformers saves it without that level, reads both, and vLLM 0.32 reads the published form alone.
+Published checkpoints have a level `vision_model` in a CLIP or SigLIP tower
+(`vision_tower.vision_model.encoder...`). From 5.17 on, transformers saves it without that level,
+reads both, and vLLM 0.32 reads the published form alone.
 """
 
 import re

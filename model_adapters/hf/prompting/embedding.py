@@ -21,7 +21,8 @@ class EmbeddedSpan:
     Attributes:
         embeds: embeddings, (tokens, hidden), on the embedding layer's device.
         positions: position ids, (1, tokens) or (3, 1, tokens), on the same device.
-        starts: position behind everything before each piece, which is that of the first token of a text or a frame.
+        starts: position behind everything before each piece, which is that of the first token of a
+            text or a frame.
         end: position of the token that follows the span.
     """
 
@@ -32,7 +33,8 @@ class EmbeddedSpan:
 
 
 class Embedder:
-    """Embeds spans of prompts for one model of a family, with a cache of the features of frames and clips."""
+    """Embeds spans of prompts for one model of a family, with a cache of the features of frames and
+    clips."""
 
     def __init__(self, model: Any, family: Family, features: FeatureCache) -> None:
         self._family = family
@@ -62,10 +64,12 @@ class Embedder:
                 ]
                 slots.extend(len(flat) + at for at, slot in enumerate(is_slot) if slot)
                 flat.extend(piece.ids)
-        # Features first: reading and scaling of frames on the CPU overlaps with the device's previous chunk.
+        # Features first: reading and scaling of frames on the CPU overlaps with the device's
+        # previous chunk.
         features = self._slot_features(visuals, len(slots)) if visuals else None
         device = self._embeddings.weight.device
-        # Positions are computed on the CPU, because reading them below would otherwise wait for the device.
+        # Positions are computed on the CPU, because reading them below would otherwise wait for the
+        # device.
         ids = torch.tensor(flat)
         positions = self._family.positions(ids, [piece.shape for piece in visuals], start)
         embeds = self._embeddings(ids.to(device))
@@ -93,7 +97,7 @@ class Embedder:
         features = torch.cat(self._features.get(visuals))
         if len(features) != n_slots:
             raise ModelError(
-                f"the processor makes {n_slots} image tokens of {len(visuals)} frames and the model "
-                f"{len(features)} features; they do not belong to one checkpoint"
+                f"the processor makes {n_slots} image tokens of {len(visuals)} frames and the "
+                f"model {len(features)} features; they do not belong to one checkpoint"
             )
         return features

@@ -25,7 +25,8 @@ class FeatureCache:
 
     @torch.inference_mode()
     def get(self, pieces: Sequence[Frame | Clip]) -> list[torch.Tensor]:
-        """Return the features of each piece, (slots, hidden), in order; missing ones are computed in one batch.
+        """Return the features of each piece, (slots, hidden), in order; missing ones are computed
+        in one batch.
 
         Raises:
             DataError: a frame cannot be decoded.
@@ -58,7 +59,8 @@ class FeatureCache:
     def _store(self, features: dict[Frame | Clip, torch.Tensor]) -> None:
         for piece, tensor in features.items():
             if piece not in self._cache:
-                # A slice of a batch would keep the whole batch's memory as long as one of its frames is cached.
+                # A slice of a batch would keep the whole batch's memory as long as one of its
+                # frames is cached.
                 self._cache[piece] = tensor.clone() if self._max_bytes else tensor
                 self._bytes += tensor.nbytes
             self._cache.move_to_end(piece)

@@ -21,10 +21,11 @@ class OutOfMemoryError(Exception):
 
 @contextmanager
 def limit_memory(megabytes: int) -> Iterator[None]:
-    """Refuse allocations beyond the process's current memory plus this limit; no limit if the system has no /proc.
+    """Refuse allocations beyond the process's current memory plus this limit; no limit if the
+    system has no /proc.
 
-    The operating system enforces it, because Python has many ways to build a large text. The limit applies to the whole
-    process, other threads included, and one thread at a time may set it.
+    The operating system enforces it, because Python has many ways to build a large text. The limit
+    applies to the whole process, other threads included, and one thread at a time may set it.
 
     Raises:
         OutOfMemoryError: more memory was needed.

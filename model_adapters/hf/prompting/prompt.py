@@ -1,8 +1,9 @@
 """From the turns of a conversation to the prompt of the model.
 
-The checkpoint's chat template is rendered over the whole conversation, and the result is tokenised as a whole with one
-placeholder per frame or video. Placeholders are expanded afterwards, on token ids. So tokens may span the borders of
-parts, as the checkpoint was trained, and tokenising costs as little as a short text even if frames take 100,000 tokens.
+The checkpoint's chat template is rendered over the whole conversation, and the result is tokenised
+as a whole with one placeholder per frame or video. Placeholders are expanded afterwards, on token
+ids. So tokens may span the borders of parts, as the checkpoint was trained, and tokenising costs as
+little as a short text even if frames take 100,000 tokens.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -68,7 +69,8 @@ def n_tokens(pieces: Sequence[Piece]) -> int:
 
 
 def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
-    """Return the number of pieces that all prompts begin with; at least one piece of each is left over."""
+    """Return the number of pieces that all prompts begin with; at least one piece of each is left
+    over."""
     first = min(prompts, key=len)
     for at, piece in enumerate(first[:-1]):
         if any(prompt[at] is not piece and prompt[at] != piece for prompt in prompts):
@@ -111,7 +113,8 @@ class Prompter:
 
         Raises:
             DataError: a frame cannot be read, or differs in size from the others of its video.
-            ModelError: the template refuses the turns, or does not write one placeholder per frame and video.
+            ModelError: the template refuses the turns, or does not write one placeholder per frame
+                and video.
         """
         parts = [part for turn in turns for part in turn.parts]
         text = render(self._tokenizer, self._template, turns, self._marks)
@@ -157,7 +160,8 @@ class Prompter:
         other = next((ref for ref in refs if ref.size != size), None)
         if other is not None:
             raise DataError(
-                f"{other.path}: has another size than the video's first frame; give frames of one size"
+                f"{other.path}: has another size than the video's first frame; give frames of one "
+                "size"
             )
         refs = (*refs, *refs[-1:] * (-len(refs) % per_clip))
         groups = [refs[at : at + per_clip] for at in range(0, len(refs), per_clip)]
@@ -181,6 +185,7 @@ class Prompter:
         if ids.count(placeholder) != n:
             token = self._tokenizer.convert_ids_to_tokens(placeholder)
             raise ModelError(
-                f"the chat template gives {ids.count(placeholder)} {kind} placeholders for {n} {part}s; a text must "
-                f"not contain the model's {kind} token, and the template must show every {part} by it ({token})"
+                f"the chat template gives {ids.count(placeholder)} {kind} placeholders for {n} "
+                f"{part}s; a text must not contain the model's {kind} token, and the template must "
+                f"show every {part} by it ({token})"
             )

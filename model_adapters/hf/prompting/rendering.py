@@ -16,7 +16,8 @@ from model_adapters.protocols import Part, Turn, Video
 
 __all__ = ["Marks", "prompt_end", "render", "starts_with_bos", "writes_videos"]
 
-# Errors of a template that is broken or does not support the turns: Jinja's, and those of its expressions.
+# Errors of a template that is broken or does not support the turns: Jinja's, and those of its
+# expressions.
 _REFUSALS = (
     TemplateError,
     TypeError,  # a list where the template joins strings
@@ -31,13 +32,15 @@ _PRINTED = "{'type': 'text'"  # appears where a template that expects a string p
 
 @dataclass(frozen=True)
 class Marks:
-    """Tokens that stand for a frame and for a video in the text of a template; `video` is None if there is none."""
+    """Tokens that stand for a frame and for a video in the text of a template; `video` is None if
+    there is none."""
 
     image: str
     video: str | None = None
 
     def of(self, part: Part) -> str:
-        """Return the text that a part has in a template: the token of a frame or a video, a text without its edges."""
+        """Return the text that a part has in a template: the token of a frame or a video, a text
+        without its edges."""
         if isinstance(part, Video):
             return self.video or ""
         return self.image if isinstance(part, FrameRef) else part.strip()
@@ -46,9 +49,10 @@ class Marks:
 def render(tokenizer: Any, template: str, turns: Sequence[Turn], marks: Marks) -> str:
     """Render the chat template over all turns, asking for the reply.
 
-    Some templates (LLaVA's) write all images of a turn before its texts. If that would move frames or videos away from
-    between the texts, the turn is passed as one text that contains their tokens. Some templates (Pixtral's) accept a
-    system turn only as a string instead of a list of texts.
+    Some templates (LLaVA's) write all images of a turn before its texts. If that would move frames
+    or videos away from between the texts, the turn is passed as one text that contains their
+    tokens. Some templates (Pixtral's) accept a system turn only as a string instead of a list of
+    texts.
 
     Raises:
         ModelError: the template refuses the turns, or drops a text.
@@ -70,12 +74,14 @@ def render(tokenizer: Any, template: str, turns: Sequence[Turn], marks: Marks) -
 
 
 def starts_with_bos(tokenizer: Any, text: str) -> bool:
-    """Return whether the template wrote the beginning-of-sequence token; if not, the tokenizer has to add it."""
+    """Return whether the template wrote the beginning-of-sequence token; if not, the tokenizer has
+    to add it."""
     return tokenizer.bos_token is not None and text.startswith(tokenizer.bos_token)
 
 
 def writes_videos(tokenizer: Any, template: str, marks: Marks) -> bool:
-    """Return whether a template writes the token of a video where a turn has one; no video is looked at."""
+    """Return whether a template writes the token of a video where a turn has one; no video is
+    looked at."""
     if marks.video is None:
         return False
     messages = [
@@ -102,7 +108,8 @@ def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
 
 
 def prompt_end(tokenizer: Any, template: str) -> str:
-    """Return what the template writes behind a turn of the user; empty if it refuses one without frames."""
+    """Return what the template writes behind a turn of the user; empty if it refuses one without
+    frames."""
     asked = "?"
     try:
         text = _apply(tokenizer, template, (turn := Turn("user", (asked,)),), [_message(turn)])
@@ -112,7 +119,8 @@ def prompt_end(tokenizer: Any, template: str) -> str:
 
 
 def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:
-    """Return the turn as one text with tokens of frames and videos if the template would change its parts' order."""
+    """Return the turn as one text with tokens of frames and videos if the template would change its
+    parts' order."""
     parts = [marks.of(part) for part in turn.parts]
     tokens = Counter(marks.of(part) for part in turn.parts if not isinstance(part, str))
     if (
@@ -152,7 +160,8 @@ def _apply(
     tokenizer: Any, template: str, turns: Sequence[Turn], messages: Sequence[dict[str, Any]]
 ) -> str:
     problem = f"the chat template refuses {_roles(turns)}"
-    # A template is code that comes with the checkpoint: it must neither run forever nor use up the memory.
+    # A template is code that comes with the checkpoint: it must neither run forever nor use up the
+    # memory.
     with (
         wrap_errors(
             problem, f"fix it; {TEMPLATE_SECONDS.hint}", catch=OutOfTimeError, raise_as=ModelError
@@ -180,7 +189,8 @@ def _check_texts(text: str, turns: Sequence[Turn]) -> None:
     parts = [
         (turn.role, part.strip()) for turn in turns for part in turn.parts if isinstance(part, str)
     ]
-    # Counting scans the whole text for every part, so it is done only if the parts do not appear in order.
+    # Counting scans the whole text for every part, so it is done only if the parts do not appear in
+    # order.
     counts = (
         {} if _in_order(text, (part for _, part in parts)) else Counter(part for _, part in parts)
     )
@@ -188,7 +198,8 @@ def _check_texts(text: str, turns: Sequence[Turn]) -> None:
         if text.count(part) < count:
             roles = " or ".join(sorted({role for role, other in parts if other == part}))
             raise ModelError(
-                f"the chat template drops the text {part[:40]!r} of a turn ({roles}); it cannot be used"
+                f"the chat template drops the text {part[:40]!r} of a turn ({roles}); it cannot be "
+                "used"
             )
     if _PRINTED in text and not any(_PRINTED in part for _, part in parts):
         raise ModelError(

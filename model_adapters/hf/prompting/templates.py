@@ -40,7 +40,8 @@ def chat_template(folder: Path, tokenizer: Any) -> str:
 
 
 def plain_template(tokenizer: Any, family: Family) -> str:
-    """Return a template that concatenates the parts of all turns; the family knows the tokens of frames and videos."""
+    """Return a template that concatenates the parts of all turns; the family knows the tokens of
+    frames and videos."""
     placeholders = {
         "IMAGE": family.placeholder_id,
         "VIDEO": None if family.video is None else family.video.placeholder_id,

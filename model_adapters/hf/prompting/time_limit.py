@@ -17,7 +17,8 @@ class OutOfTimeError(Exception):
 def limit_time(seconds: int) -> Iterator[None]:
     """Stop code that computes for longer; only in the main thread, because signals reach no other.
 
-    The processor time of the process counts, so the limit does not depend on the load of the machine.
+    The processor time of the process counts, so the limit does not depend on the load of the
+    machine.
 
     Raises:
         OutOfTimeError: the time is used up.

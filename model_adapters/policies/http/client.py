@@ -40,7 +40,8 @@ class JsonClient:
         """Return the server's reply to a POST request, as JSON values.
 
         Raises:
-            ModelError: no connection, no reply in time, an error status, or a reply that is not JSON.
+            ModelError: no connection, no reply in time, an error status, or a reply that is not
+                JSON.
         """
         body = json.dumps(content).encode()
         reply = self._send(body)
@@ -48,11 +49,13 @@ class JsonClient:
             return json.loads(reply)
         except (ValueError, RecursionError) as error:
             raise ModelError(
-                f"{self._url} answers with something that is not JSON: {_quote(reply)}; is it a policy's address?"
+                f"{self._url} answers with something that is not JSON: {_quote(reply)}; is it a "
+                "policy's address?"
             ) from error
 
     def _send(self, body: bytes) -> bytes:
-        # Only a failed connection is retried: an error status would come again, and a late reply may still be computed.
+        # Only a failed connection is retried: an error status would come again, and a late reply
+        # may still be computed.
         reason: Exception | None = None
         for attempt in range(self._retries + 1):
             if attempt:
@@ -63,7 +66,8 @@ class JsonClient:
                 reason = error
         cause = in_one_line(getattr(reason, "reason", None) or reason or ConnectionError())
         raise ModelError(
-            f"{self._url} cannot be reached in {self._retries + 1} attempts ({cause}); is the server up?"
+            f"{self._url} cannot be reached in {self._retries + 1} attempts ({cause}); is the "
+            "server up?"
         )
 
     def _send_once(self, body: bytes) -> bytes:
@@ -83,7 +87,8 @@ class JsonClient:
             raise self._timeout_error() from error
 
     def _read(self, reply: http.client.HTTPResponse) -> bytes:
-        """Read the whole reply within the limit; a socket's own timeout restarts with every piece."""
+        """Read the whole reply within the limit; a socket's own timeout restarts with every
+        piece."""
         content, end = b"", time.monotonic() + self._timeout_s
         while piece := reply.read1(_PIECE):
             content += piece
@@ -99,7 +104,8 @@ class JsonClient:
 
     def _timeout_error(self) -> ModelError:
         return ModelError(
-            f"{self._url} does not answer within {self._timeout_s:g} s; raise timeout_s if it is slow"
+            f"{self._url} does not answer within {self._timeout_s:g} s; raise timeout_s if it is "
+            "slow"
         )
 
 

@@ -1,4 +1,5 @@
-"""Arrays in JSON in the form of the package json_numpy, which servers of the `/act` convention expect."""
+"""Arrays in JSON in the form of the package json_numpy, which servers of the `/act` convention
+expect."""
 
 import base64
 import binascii
@@ -25,7 +26,8 @@ def encode_array(array: npt.NDArray[Any]) -> dict[str, Any]:
 
 
 def decode_numbers(value: Any) -> npt.NDArray[np.float64]:
-    """Return the numbers in a reply's JSON: lists, arrays of json_numpy, lists of either, or a text with such JSON.
+    """Return the numbers in a reply's JSON: lists, arrays of json_numpy, lists of either, or a text
+    with such JSON.
 
     Raises:
         ValueError: the value is anything else, or ragged.

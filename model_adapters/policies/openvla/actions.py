@@ -1,4 +1,5 @@
-"""OpenVLA's action tokens: 256 bins between -1 and 1, counted down from the end of the vocabulary."""
+"""OpenVLA's action tokens: 256 bins between -1 and 1, counted down from the end of the
+vocabulary."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +31,8 @@ class ActionBins:
     def decode(self, ids: Sequence[int]) -> Actions:
         """Return one action, (1, numbers), each between -1 and 1.
 
-        256 borders have 255 centres, so the two lowest ids encode the same number, as in the original.
+        256 borders have 255 centres, so the two lowest ids encode the same number, as in the
+        original.
 
         Args:
             ids: ids among `action_ids`.

@@ -43,7 +43,8 @@ class OpenVLADescription:
 
 
 def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> OpenVLADescription:
-    """Read the files beside the weights of an OpenVLA; without an unnorm_key, there must be one dataset only.
+    """Read the files beside the weights of an OpenVLA; without an unnorm_key, there must be one
+    dataset only.
 
     Raises:
         ModelError: the checkpoint is of another family, or damaged.
@@ -90,7 +91,8 @@ def _tokenizer(checkpoint: PolicyCheckpoint) -> Tokenizer:
     # The network inserts the patches after the first token, so this has to be the begin token.
     if tokenizer.encode("In").ids[0] != tokenizer.token_to_id("<s>"):
         raise ModelError(
-            f"{checkpoint.pretrained}: the tokenizer does not begin a text with <s>; restore its file"
+            f"{checkpoint.pretrained}: the tokenizer does not begin a text with <s>; restore its "
+            "file"
         )
     return tokenizer
 

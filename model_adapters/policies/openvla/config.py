@@ -24,8 +24,8 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
         norm_stats: statistics of actions by dataset.
         n_action_bins: number of action ids.
         pad_to_multiple_of: number of ids added at the end of the vocabulary.
-        vision_towers: sizes of the towers if their names do not determine them, as in our tiny twin; published
-            checkpoints do not have this.
+        vision_towers: sizes of the towers if their names do not determine them, as in our tiny
+            twin; published checkpoints do not have this.
     """
 
     text_config: dict[str, Any]
@@ -58,9 +58,12 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
             or len(set(self.image_sizes)) != 1
         ):
             raise ModelError(
-                f"{pretrained} has image_sizes={self.image_sizes}, image_resize_strategy={self.image_resize_strategy}, "
-                f"use_fused_vision_backbone={self.use_fused_vision_backbone}, timm_override_act_layers="
-                f"{self.timm_override_act_layers}; only the preprocessing of openvla/openvla-7b is supported"
+                f"{pretrained} has image_sizes={self.image_sizes}, "
+                f"image_resize_strategy={self.image_resize_strategy}, "
+                f"use_fused_vision_backbone={self.use_fused_vision_backbone}, "
+                "timm_override_act_layers="
+                f"{self.timm_override_act_layers}; only the preprocessing of openvla/openvla-7b is "
+                "supported"
             )
         return self.image_sizes[0]
 
@@ -76,6 +79,7 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
         ]
         if unknown or [shape.kind for shape in shapes] != ["dinov2", "siglip"]:
             raise ModelError(
-                f"{pretrained} has the vision towers {self.timm_model_ids}; only {list(TOWERS)} are supported"
+                f"{pretrained} has the vision towers {self.timm_model_ids}; only {list(TOWERS)} "
+                "are supported"
             )
         return shapes[0], shapes[1]

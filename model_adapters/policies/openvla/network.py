@@ -29,7 +29,8 @@ def prompt(instruction: str) -> str:
 
 
 def prompt_ids(tokenizer: Tokenizer, instruction: str) -> list[int]:
-    """Return the ids of the prompt, from the tokenizer's begin token to the space that precedes actions."""
+    """Return the ids of the prompt, from the tokenizer's begin token to the space that precedes
+    actions."""
     ids: list[int] = tokenizer.encode(prompt(instruction)).ids
     return ids if ids[-1] == _SPACE else [*ids, _SPACE]
 
@@ -41,7 +42,8 @@ class _Vision(nn.Module):
         self.fused_featurizer = Tower(towers[1], image_size)
 
     def forward(self, pixels: torch.Tensor) -> torch.Tensor:
-        """Return features, (batch, patches, widths), of pixels from 0 to 1, (batch, 3, size, size), in float32."""
+        """Return features, (batch, patches, widths), of pixels from 0 to 1, (batch, 3, size, size),
+        in float32."""
         dtype = self.featurizer.pos_embed.dtype
         features = (
             self.featurizer(normalise(pixels, *_DINOV2).to(dtype)),
@@ -62,7 +64,8 @@ class _OpenVLAProjector(nn.Module):
 
 
 class OpenVLAWeights(nn.Module):
-    """All modules with weights, under the names of the published checkpoint; the image size is in pixels."""
+    """All modules with weights, under the names of the published checkpoint; the image size is in
+    pixels."""
 
     def __init__(
         self, towers: tuple[TowerShape, TowerShape], image_size: int, language: LlamaConfig
@@ -76,7 +79,8 @@ class OpenVLAWeights(nn.Module):
 
 
 def weights_layout(weights: OpenVLAWeights, towers: tuple[TowerShape, TowerShape]) -> Layout:
-    """Return the layout of the checkpoint, of modules without memory; the key of every parameter is its name."""
+    """Return the layout of the checkpoint, of modules without memory; the key of every parameter is
+    its name."""
     parts = zip(("featurizer", "fused_featurizer"), towers, strict=True)
     unused = {
         f"vision_backbone.{part}.{key}": shape

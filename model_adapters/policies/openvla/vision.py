@@ -19,7 +19,8 @@ class TowerShape(msgspec.Struct, frozen=True):
     """Sizes of a tower.
 
     Attributes:
-        kind: dinov2 has a class token, four registers and layer scales; siglip has a pooling head instead.
+        kind: dinov2 has a class token, four registers and layer scales; siglip has a pooling head
+            instead.
         width: width of a patch's features.
         depth: blocks in the checkpoint; the last one is not run.
         heads: attention heads.
@@ -118,7 +119,8 @@ class Tower(nn.Module):
         self._has_prefix = shape.kind == "dinov2"
 
     def forward(self, pixels: torch.Tensor) -> torch.Tensor:
-        """Return features of the patches, (batch, patches, width), of normalised pixels, (batch, 3, size, size)."""
+        """Return features of the patches, (batch, patches, width), of normalised pixels, (batch, 3,
+        size, size)."""
         tokens = self.patch_embed(pixels) + self.pos_embed
         n_patches = tokens.shape[1]
         if self._has_prefix:
@@ -130,7 +132,8 @@ class Tower(nn.Module):
 
 
 def unused_keys(shape: TowerShape) -> dict[str, Shape]:
-    """Return a tower's keys that no feature depends on: its last block, its final norm, its pooling head."""
+    """Return a tower's keys that no feature depends on: its last block, its final norm, its pooling
+    head."""
     width = shape.width
     with empty_parameters():
         last = _Block(shape).state_dict()

@@ -1,4 +1,5 @@
-"""SpatialVLA's action tokens: a direction and a length, a rotation, and a gripper, three tokens a step."""
+"""SpatialVLA's action tokens: a direction and a length, a rotation, and a gripper, three tokens a
+step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -75,7 +76,8 @@ class SpatialBins:
 
     Attributes:
         begin: id of the first action token.
-        theta, phi, r: borders of the bins of a translation's polar angle, azimuth (radians) and length.
+        theta, phi, r: borders of the bins of a translation's polar angle, azimuth (radians) and
+            length.
         roll, pitch, yaw: borders of the bins of a rotation.
     """
 
@@ -91,10 +93,12 @@ class SpatialBins:
     def of(
         cls, config: ProcessorConfig, begin: int, n_tokens: int, pretrained: str
     ) -> "SpatialBins":
-        """Return the bins of a checkpoint, by its first action token, their number and the config of its processor.
+        """Return the bins of a checkpoint, by its first action token, their number and the config
+        of its processor.
 
         Raises:
-            ModelError: the numbers of bins and tokens contradict each other, or translations are not spherical.
+            ModelError: the numbers of bins and tokens contradict each other, or translations are
+                not spherical.
         """
         policy, counts = config.bin_policy, config.action_config.num_bins
         axes = {**msgspec.to_builtins(policy.translation), **msgspec.to_builtins(policy.rotation)}
@@ -102,18 +106,21 @@ class SpatialBins:
         wrong = [name for name, borders in axes.items() if len(borders) - 1 != expected.get(name)]
         if wrong or not config.action_config.use_spherical or counts.gripper != _GRIPPER_IDS:
             raise ModelError(
-                f"{pretrained}: bins and num_bins do not fit ({', '.join(wrong) or 'no spherical bins'})"
+                f"{pretrained}: bins and num_bins do not fit "
+                f"({', '.join(wrong) or 'no spherical bins'})"
             )
         bins = cls(begin, *(tuple(axes[name]) for name in axes))
         if bins.action_ids[-1].stop != begin + n_tokens:
             raise ModelError(
-                f"{pretrained} has {n_tokens} action tokens and {bins.action_ids[-1].stop - begin} bins"
+                f"{pretrained} has {n_tokens} action tokens and {bins.action_ids[-1].stop - begin} "
+                "bins"
             )
         return bins
 
     @property
     def action_ids(self) -> tuple[range, range, range]:
-        """Ids of a step's three tokens: translations, then rotations, then gripper closed and open."""
+        """Ids of a step's three tokens: translations, then rotations, then gripper closed and
+        open."""
         rotations = self.begin + _n(self.theta) * _n(self.phi) * _n(self.r)
         grippers = rotations + _n(self.roll) * _n(self.pitch) * _n(self.yaw)
         return (
@@ -125,8 +132,9 @@ class SpatialBins:
     def decode(self, ids: Sequence[int]) -> Actions:
         """Return actions, (steps, 7), each number between -1 and 1, the gripper 0 or 1.
 
-        A translation token is a bin of polar angle, azimuth and length; its centre is converted to x, y, z. The corner
-        bins of large lengths reach beyond the unit cube, so translations are clipped.
+        A translation token is a bin of polar angle, azimuth and length; its centre is converted to
+        x, y, z. The corner bins of large lengths reach beyond the unit cube, so translations are
+        clipped.
 
         Args:
             ids: three ids per step, each among `action_ids` of its place.
@@ -149,7 +157,8 @@ def _n(borders: Sequence[float]) -> int:
 
 
 def _centres(index: np.ndarray, *axes: Sequence[float]) -> list[np.ndarray]:
-    """Return the centres on three axes of bins, (steps,), that are numbered with the last axis fastest."""
+    """Return the centres on three axes of bins, (steps,), that are numbered with the last axis
+    fastest."""
     places = np.unravel_index(index, [_n(axis) for axis in axes])
     return [
         (np.array(axis)[at] + np.array(axis)[at + 1]) / 2

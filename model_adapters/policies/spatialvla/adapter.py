@@ -67,8 +67,8 @@ def _tokenizer(checkpoint: PolicyCheckpoint, config: SpatialVLAConfig) -> Tokeni
     first_id = tokenizer.token_to_id("<ACTION00000>")
     if first_id != config.action_token_begin_idx:
         raise ModelError(
-            f"{checkpoint.pretrained}: actions begin at {config.action_token_begin_idx} in the config and at "
-            f"{first_id} in the tokenizer; restore the checkpoint"
+            f"{checkpoint.pretrained}: actions begin at {config.action_token_begin_idx} in the "
+            f"config and at {first_id} in the tokenizer; restore the checkpoint"
         )
     return tokenizer
 

@@ -15,7 +15,8 @@ __all__ = ["published_intrinsics", "thor_intrinsics"]
 def published_intrinsics(
     cameras: Mapping[str, CameraIntrinsics], unnorm_key: str, image_size: int, pretrained: str
 ) -> torch.Tensor:
-    """Return the intrinsics, (3, 3), in pixels of the squashed image, of the dataset's camera or the default one.
+    """Return the intrinsics, (3, 3), in pixels of the squashed image, of the dataset's camera or
+    the default one.
 
     Args:
         cameras: cameras of the checkpoint by dataset.
@@ -34,7 +35,8 @@ def published_intrinsics(
         or min(camera.width, camera.height) < 1
     ):
         raise ModelError(
-            f"{pretrained} has no intrinsics for {unnorm_key} and no default; give intrinsics=thor:DEGREES"
+            f"{pretrained} has no intrinsics for {unnorm_key} and no default; give "
+            "intrinsics=thor:DEGREES"
         )
     scale = torch.tensor([image_size / camera.width, image_size / camera.height, 1.0])
     return torch.tensor(rows) * scale[:, None]

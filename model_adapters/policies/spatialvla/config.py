@@ -43,17 +43,19 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
         """Check that this variant is supported.
 
         Raises:
-            ModelError: it has no depth or no separate action tokens, or these are not the last of the vocabulary.
+            ModelError: it has no depth or no separate action tokens, or these are not the last of
+                the vocabulary.
         """
         at_end = self.action_token_begin_idx + self.spatial_token_num == self.text().vocab_size
         if not (self.use_spatial_token and self.use_vision_zoe and at_end):
             raise ModelError(
-                f"{pretrained}: only SpatialVLA with use_spatial_token, use_vision_zoe and its action tokens at the "
-                "end of the vocabulary is supported"
+                f"{pretrained}: only SpatialVLA with use_spatial_token, use_vision_zoe and its "
+                "action tokens at the end of the vocabulary is supported"
             )
 
     def sides(self, pretrained: str) -> tuple[int, int, int]:
-        """Return the sides, in pixels, of the image, of its patches, and of the image for depth estimation.
+        """Return the sides, in pixels, of the image, of its patches, and of the image for depth
+        estimation.
 
         Raises:
             ModelError: one of them is not a square.

@@ -1,4 +1,5 @@
-"""SpatialVLA's 3D positions of patches: depth estimation, back-projection, frequency encoding, an MLP."""
+"""SpatialVLA's 3D positions of patches: depth estimation, back-projection, frequency encoding, an
+MLP."""
 
 import torch
 from torch import nn
@@ -37,7 +38,8 @@ class Ego3DEmbedding(nn.Module):
         )
 
     def forward(self, points: torch.Tensor) -> torch.Tensor:
-        """Return features, (batch, patches, width), of points in metres, (batch, patches, 3 * points), in float32."""
+        """Return features, (batch, patches, width), of points in metres, (batch, patches, 3 *
+        points), in float32."""
         dtype = next(self.parameters()).dtype
         centre = points.new_tensor(_CENTRE).repeat(points.shape[-1] // 3)
         near = ((points - centre) / _REACH).to(dtype).unsqueeze(-1)
@@ -57,7 +59,8 @@ def estimate_depth(zoe: nn.Module, pixels: torch.Tensor, zoe_size: int) -> torch
     size = pixels.shape[-1]
     border = int((size / 2) ** 0.5 * 3)  # 31 for 224, as in ZoeDepth's own preprocessing
     framed = pad(pixels, (border,) * 4, mode="reflect")
-    # Normalised after resizing and with 0.5 for all channels, unlike ZoeDepth: SpatialVLA was trained so.
+    # Normalised after resizing and with 0.5 for all channels, unlike ZoeDepth: SpatialVLA was
+    # trained so.
     inputs = normalise(
         interpolate(framed, (zoe_size, zoe_size), mode="bicubic", align_corners=True), _HALF, _HALF
     )
@@ -69,7 +72,8 @@ def estimate_depth(zoe: nn.Module, pixels: torch.Tensor, zoe_size: int) -> torch
 def back_project(
     depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolution: int
 ) -> torch.Tensor:
-    """Return points in front of the camera, (batch, patches, 3 * resolution ** 2), in metres and float32.
+    """Return points in front of the camera, (batch, patches, 3 * resolution ** 2), in metres and
+    float32.
 
     Args:
         depth: depth in metres, (batch, 1, size, size), in the type of the weights.
@@ -80,7 +84,8 @@ def back_project(
     size, cell = depth.shape[-1], patch // resolution
     n_patches, n_cells = size // patch, size // patch * resolution
     middle = torch.arange(0, size, cell, device=depth.device).float() + patch / resolution / 2
-    # The original computes these in the type of its weights, which rounds: in bfloat16, 220.5 becomes 220.
+    # The original computes these in the type of its weights, which rounds: in bfloat16, 220.5
+    # becomes 220.
     middle = middle.to(depth.dtype).float()
     v, u = torch.meshgrid(middle, middle, indexing="ij")
     rays = torch.linalg.inv(intrinsics.float()) @ torch.stack([u, v, torch.ones_like(u)]).reshape(

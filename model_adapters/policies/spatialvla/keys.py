@@ -1,7 +1,9 @@
-"""Names of parameters in transformers 5 and in SpatialVLA's checkpoints, which transformers 4.47 wrote.
+"""Names of parameters in transformers 5 and in SpatialVLA's checkpoints, which transformers 4.47
+wrote.
 
-transformers has these renamings too, but applies them only to whole models that it knows. The parts of SpatialVLA would
-keep their old names, and a loader that is not strict would leave ZoeDepth random without a warning.
+transformers has these renamings too, but applies them only to whole models that it knows. The parts
+of SpatialVLA would keep their old names, and a loader that is not strict would leave ZoeDepth
+random without a warning.
 """
 
 import re

@@ -1,4 +1,5 @@
-"""SpatialVLA's network: patches with 3D positions, followed by a Gemma 2 that predicts action tokens."""
+"""SpatialVLA's network: patches with 3D positions, followed by a Gemma 2 that predicts action
+tokens."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -76,7 +77,8 @@ class SpatialVLAWeights(nn.Module):
 
     @torch.inference_mode()
     def place_action_embeddings(self) -> None:
-        """Copy the embeddings of action tokens, which have their own key, into those of the vocabulary."""
+        """Copy the embeddings of action tokens, which have their own key, into those of the
+        vocabulary."""
         model, spatial = self.language_model, self.spatial_embed_tokens.weight
         model.model.embed_tokens.weight[-len(spatial) :] = spatial
         if self.has_tied_head:
@@ -93,7 +95,8 @@ class View:
         patch: side of a patch in pixels.
         resolution: points along each side of a patch.
         zoe_size: width and height of the images for depth estimation.
-        intrinsics: camera intrinsics of all frames, (3, 3), or None to derive them from the field of view.
+        intrinsics: camera intrinsics of all frames, (3, 3), or None to derive them from the field
+            of view.
         field_of_view: vertical field of view in degrees, or None.
     """
 
@@ -105,7 +108,8 @@ class View:
     field_of_view: float | None
 
     def camera(self, size: tuple[int, int]) -> torch.Tensor:
-        """Return the intrinsics, (3, 3), in pixels of the squashed image, for a frame of this width and height."""
+        """Return the intrinsics, (3, 3), in pixels of the squashed image, for a frame of this width
+        and height."""
         if self.intrinsics is not None:
             return self.intrinsics
         assert self.field_of_view is not None
@@ -167,7 +171,8 @@ class SpatialVLANetwork:
             view.patch,
             view.resolution,
         )
-        # The original divides by the root of the width, because its Gemma scaled all inputs; now it scales tokens only.
+        # The original divides by the root of the width, because its Gemma scaled all inputs; now it
+        # scales tokens only.
         return weights.multi_modal_projector.linear(patches + weights.position_embedding_3d(points))
 
     @torch.inference_mode()
@@ -178,7 +183,8 @@ class SpatialVLANetwork:
 
         def logits(embeds: torch.Tensor) -> torch.Tensor:
             past, new = cache.get_seq_length(), embeds.shape[1]
-            # No position is masked: the prefix attends in both directions (PaliGemma), and actions follow one by one.
+            # No position is masked: the prefix attends in both directions (PaliGemma), and actions
+            # follow one by one.
             mask = embeds.new_zeros(1, 1, new, past + new)
             output = model(
                 inputs_embeds=embeds,

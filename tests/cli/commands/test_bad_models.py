@@ -70,7 +70,8 @@ BROKEN = {
         "qwen",
         lambda folder: _edit(folder, "preprocessor_config.json", merge_size=4),
         {},
-        "the processor makes 25 image tokens of one frame and the model 100 features; they do not belong",
+        "the processor makes 25 image tokens of one frame and the model 100 features; they do not "
+        "belong",
     ),
     "patches": (
         "qwen2.5-vl",
@@ -91,7 +92,8 @@ BROKEN = {
         "llava",
         lambda folder: _edit(folder, "processor_config.json", patch_size=28),
         {"share_prefix": "false"},
-        "the model fails on what the processor makes of a frame (Image features and image tokens do not match",
+        "the model fails on what the processor makes of a frame (Image features and image tokens "
+        "do not match",
     ),
     "image token": (
         "qwen2.5-vl",
@@ -183,7 +185,8 @@ def test_a_question_with_the_models_image_token_fails_alone(
 
 
 class Cramped(Qwen25VLTiny):
-    """A tiny model on a device with memory for so many tokens, registered as another package would."""
+    """A tiny model on a device with memory for so many tokens, registered as another package
+    would."""
 
     ROOM = 500
 

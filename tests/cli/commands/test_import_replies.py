@@ -65,7 +65,8 @@ ROWS = [row(number, reply, float(number != 2)) for number, reply in enumerate(RE
 
 @pytest.fixture
 def import_log(data, tmp_path, run):
-    """Imports rows, texts or bytes as logs; returns exit code, what was said, and the records of the last run."""
+    """Imports rows, texts or bytes as logs; returns exit code, what was said, and the records of
+    the last run."""
 
     def import_log(content, name=LOG, *options):
         path = tmp_path / name

@@ -89,7 +89,8 @@ def test_table4_is_printed_from_the_files_scores(tmp_path, run):
     matches = tuple((f"match{n}", 0.5) for n in range(1, 5))
     for file, name, n_clues in (("single", FILES[0], (1,)), ("multi", FILES[1], (2, 4))):
         questions = [
-            Question(f"{file}{n}", "Was Box open?", tuple(range(n)), ("Yes",), published=PublishedColumns(
+            Question(f"{file}{n}", "Was Box open?", tuple(range(n)), ("Yes",),
+                     published=PublishedColumns(
                 file, f"{file}{n}_q1", 1, (0,), matches))
             for n in n_clues
         ]  # fmt: skip
@@ -130,7 +131,8 @@ def test_who_sees_nothing_scores_this_on_the_published_files(
 
 
 def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_files(tmp_path, run):
-    """One of two files of the published form has a bad row; whatever counts rows counts it, and goes on."""
+    """One of two files of the published form has a bad row; whatever counts rows counts it, and
+    goes on."""
     scores = tuple((f"match{number}", 1.0) for number in (1, 2, 3, 4))
     for name, asked in zip(FILES, ([(1,), (2,), (3,)], [(1, 2), (1, 2, 3)]), strict=True):
         kind = "single" if "single" in name else "multi"

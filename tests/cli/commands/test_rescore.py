@@ -1,4 +1,5 @@
-"""Replies of a run scored again by today's scorers and by one's own; the run needs its journal alone."""
+"""Replies of a run scored again by today's scorers and by one's own; the run needs its journal
+alone."""
 
 import json
 from importlib.metadata import EntryPoint
@@ -184,7 +185,10 @@ def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, re
     folder = source()
     code, said, new = rescore(folder, "--scorer", "own.py:third")
     assert code == 1
-    failure = "third fails: IndexError in own.py:2 (third): list index out of range; traceback in journal/tracebacks.txt"
+    failure = (
+        "third fails: IndexError in own.py:2 (third): list index out of range; traceback in "
+        "journal/tracebacks.txt"
+    )
     assert f"nieh_gt: 6 sample(s) failed, counted as wrong: {failure}" in said
     assert "1 replies scored; 6 failed by the scorer; 1 without a reply stay failed" in said
     assert "reply.split()[2]" in (new / "journal" / "tracebacks.txt").read_text()
@@ -236,7 +240,8 @@ def test_what_is_no_score_is_a_failure(source, rescore, own, body, failure):
         (
             "",
             "measure",
-            "unknown scorer 'measure'; write FILE.py:NAME, or the name of a package's (no package has any)",
+            "unknown scorer 'measure'; write FILE.py:NAME, or the name of a package's (no package "
+            "has any)",
         ),
     ],
 )

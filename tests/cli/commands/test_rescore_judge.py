@@ -83,7 +83,8 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
     judged, strict = scores_in(new, "judged"), scores_in(new, "strict")
     assert {name for name in judged if judged[name] != strict[name]} == {"q1"}
     assert judged["q1"] == 1.0
-    # Two unsure replies; Sofa and Bed are right, Bed for Sofa is wrong. A share of several answers is neither.
+    # Two unsure replies; Sofa and Bed are right, Bed for Sofa is wrong. A share of several answers
+    # is neither.
     assert len(requests()) == 5
     assert report_in(new)["judge"]["unsure"] == {"n": 2, "n_right": 1, "n_partly": 0} | {
         "n_wrong": 1,

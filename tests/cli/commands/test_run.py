@@ -22,8 +22,9 @@ def only(folder, pattern):
     return path
 
 
-# By clues, total, interval, bootstrap, open-ended, absence, samples, skipped, failed. Two trajectories tell little,
-# also where all is right: Wilson's interval on 2 questions. A bootstrap of equal scores tells nothing.
+# By clues, total, interval, bootstrap, open-ended, absence, samples, skipped, failed. Two
+# trajectories tell little, also where all is right: Wilson's interval on 2 questions. A bootstrap
+# of equal scores tells nothing.
 FULL_MARKS = [
     *("100.00", "(3)", "100.00", "(1)", "100.00", "(1)", "100.00", "34.2–100.0", "-"),
     *("100.00", "(2)", "-", "100.0", "5", "0", "0"),

@@ -13,7 +13,8 @@ from tests.faults.told import said_in_one_line
 
 @pytest.fixture
 def ran(make_nieh_set, tmp_path, run):
-    """The folders of runs of the oracle and of the blind on five questions, and what was printed at their end."""
+    """The folders of runs of the oracle and of the blind on five questions, and what was printed at
+    their end."""
     data = make_nieh_set(size=56)
     arguments = [
         "--model",

@@ -3,7 +3,8 @@
 import json
 
 ROW = {
-    "total_count": 4, "success_count": 1, "goto_count": 2, "goto_success": 1, "pick_count": 1, "pick_success": 0,
+    "total_count": 4, "success_count": 1, "goto_count": 2, "goto_success": 1, "pick_count": 1,
+    "pick_success": 0,
     "put_count": 1, "put_success": 0,
 }  # fmt: skip
 LOG = "eval_longhrz_checkpoints_infini-ft_step-20000-hf.log"

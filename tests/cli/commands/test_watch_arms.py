@@ -16,7 +16,8 @@ from ..remarks import remarks
 
 @pytest.fixture(scope="module")
 def arm_run(tmp_path_factory):
-    """Two pick-ups and two puts of one trajectory, by an arm that moves at random: in deltas, as policies do."""
+    """Two pick-ups and two puts of one trajectory, by an arm that moves at random: in deltas, as
+    policies do."""
     output = tmp_path_factory.mktemp("arms")
     words = (
         "--model",
@@ -108,7 +109,10 @@ def test_what_goes_otherwise_than_recorded_is_said_in_a_line(arm_run, episodes, 
     folder = rewritten(arm_run, tmp_path / "run", moved)
     first = episodes[0].index
     code, _, err = run("watch", folder, "--episode", first, "--out", tmp_path / "a.gif")
-    line = f"otherwise than recorded: action {first}, step 1: the hand is 10 cm from where it was in the run"
+    line = (
+        f"otherwise than recorded: action {first}, step 1: the hand is 10 cm from where it was in "
+        "the run"
+    )
     assert (code, remarks(err)) == (0, [line])
 
 

@@ -1,4 +1,5 @@
-"""`--config`: a run by a file, and the file that every run writes; models with their own options."""
+"""`--config`: a run by a file, and the file that every run writes; models with their own
+options."""
 
 import shlex
 from pathlib import Path

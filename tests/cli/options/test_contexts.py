@@ -108,8 +108,8 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
     code, _, err = run(*arguments, "--output", tmp_path / "none")
     assert code == 2
     assert (
-        "can be asked (the trajectory's JSON is not in metadata/; give its folder with --trajectories)"
-        in err
+        "can be asked (the trajectory's JSON is not in metadata/; give its folder with "
+        "--trajectories)" in err
     )
     for tasks, given, said in (
         ("nieh_gt", folder, "--trajectories: no context of nieh_gt tells of the trajectory"),

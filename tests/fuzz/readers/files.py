@@ -79,8 +79,10 @@ def _unpack(folder: Path) -> None:
 def _make_replies(folder: Path) -> Path:
     (one, two, *_) = NiehSet(make_set(folder)).questions
     published = {
-        "qidx": 0, "traj_id": one.traj_id, "question": one.text, "gt_img_idx": list(one.clues), "gt_answer": ["yes"],
-        "llm_response": "yes", "score": 1.0, "ctx_n_tokens": 7, "eval_mode": "full_traj", "ctx_size_k": 1.0,
+        "qidx": 0, "traj_id": one.traj_id, "question": one.text, "gt_img_idx": list(one.clues),
+        "gt_answer": ["yes"],
+        "llm_response": "yes", "score": 1.0, "ctx_n_tokens": 7, "eval_mode": "full_traj",
+        "ctx_size_k": 1.0,
         "n_imgs": 4, "selected_img_indices": [0, 1],
     }  # fmt: skip
     rows = [

@@ -26,9 +26,11 @@ _COMPLETION = {
     "id": "x", "object": "chat.completion", "created": 1, "model": "m",
     "choices": [{
         "index": 0, "finish_reason": "stop",
-        "message": {"role": "assistant", "content": "yes", "refusal": None, "reasoning_content": "so"},
+        "message": {"role": "assistant", "content": "yes", "refusal": None,
+                    "reasoning_content": "so"},
     }],
-    "usage": {"prompt_tokens": 9, "completion_tokens": 2, "prompt_tokens_details": {"cached_tokens": 4}},
+    "usage": {"prompt_tokens": 9, "completion_tokens": 2,
+              "prompt_tokens_details": {"cached_tokens": 4}},
 }  # fmt: skip
 _BOUNDS = {
     "q01": [-1.0] * 7,

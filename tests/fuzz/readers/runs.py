@@ -27,7 +27,8 @@ __all__ = ["READERS"]
 
 @cache
 def _run(model: str, task: str = "nieh_gt") -> Path:
-    """Return the folder of a run of a baseline on the small set, or on its trajectories; made once."""
+    """Return the folder of a run of a baseline on the small set, or on its trajectories; made
+    once."""
     scratch = TemporaryDirectory()
     _kept.append(scratch)
     root = Path(scratch.name)

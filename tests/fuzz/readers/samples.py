@@ -38,7 +38,8 @@ def trajectory_document(traj_id: str, n_actions: int = _N_FRAMES - 1) -> dict[st
 
 
 def make_set(folder: Path, n_frames: int = _N_FRAMES) -> Path:
-    """Write an NIEH set of two trajectories, "bad" and "good", of some frames, with two questions each."""
+    """Write an NIEH set of two trajectories, "bad" and "good", of some frames, with two questions
+    each."""
     for traj_id in ("bad", GOOD):
         place = folder / "metadata" / traj_id
         (place / "img").mkdir(parents=True)

@@ -1,4 +1,5 @@
-"""NIEH sets: their files, by every context that needs no model of its own, and by the rules of questions."""
+"""NIEH sets: their files, by every context that needs no model of its own, and by the rules of
+questions."""
 
 from functools import partial
 from pathlib import Path
@@ -76,7 +77,8 @@ def _questions(folder: Path) -> None:
 def _make_decisions(folder: Path) -> Path:
     path = folder / "inspection.csv"
     path.write_text(
-        "question_id,traj_id,question,clues,answers,replies,decision\na,t,q,[1],['b'],m: x,keep\nb,,,,,,\n"
+        "question_id,traj_id,question,clues,answers,replies,decision\na,t,q,[1],['b'],m: "
+        "x,keep\nb,,,,,,\n"
     )
     return path
 

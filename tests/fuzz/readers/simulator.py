@@ -1,4 +1,5 @@
-"""The simulator: messages of a client, houses, recorded floor plans; and its own replies, as its client reads them."""
+"""The simulator: messages of a client, houses, recorded floor plans; and its own replies, as its
+client reads them."""
 
 import json
 from functools import cache, partial
@@ -36,7 +37,8 @@ def _messages() -> list[dict[str, Any]]:
     return [
         {"action": "MoveAhead", "moveMagnitude": 0.25, "renderDepthImage": True},
         {"action": "RotateRight", "degrees": 90.0},
-        {"action": "TeleportFull", "x": 0.0, "y": 0.9, "z": 0.0, "rotation": {"y": 90.0}, "horizon": 30,
+        {"action": "TeleportFull", "x": 0.0, "y": 0.9, "z": 0.0, "rotation": {"y": 90.0},
+         "horizon": 30,
          "standing": True},
         {"action": "PickupObject", "objectId": mug, "forceAction": True},
         {"action": "PutObject", "objectId": table, "forceAction": True},
@@ -45,10 +47,13 @@ def _messages() -> list[dict[str, Any]]:
         {"action": "SetObjectToggles", "objectToggles": [{"objectType": "Faucet", "isOn": True}]},
         {"action": "SetStateOfAllObjects", "StateChange": "CanBeDirty", "forceAction": True},
         {"action": "GetInteractablePoses", "objectId": fridge, "maxPoses": 2, "horizons": [0.0]},
-        {"action": "AddThirdPartyCamera", "position": {"x": 0, "y": 2, "z": 0}, "rotation": {"x": 90},
+        {"action": "AddThirdPartyCamera", "position": {"x": 0, "y": 2, "z": 0},
+         "rotation": {"x": 90},
          "fieldOfView": 60},
-        {"action": "PlaceObjectAtPoint", "objectId": mug, "position": {"x": 0.0, "y": 1.0, "z": 0.0}},
-        {"action": "InitialRandomSpawn", "randomSeed": 1, "numDuplicatesOfType": [{"objectType": "Mug", "count": 2}]},
+        {"action": "PlaceObjectAtPoint", "objectId": mug,
+         "position": {"x": 0.0, "y": 1.0, "z": 0.0}},
+        {"action": "InitialRandomSpawn", "randomSeed": 1,
+         "numDuplicatesOfType": [{"objectType": "Mug", "count": 2}]},
         {"action": "PushObject", "objectId": mug, "moveMagnitude": 10.0, "pushAngle": "45"},
         {"action": "Initialize", "gridSize": 0.25, "fieldOfView": 60, "visibilityDistance": 1.5},
         {"action": "SaveState", "slot": 0},

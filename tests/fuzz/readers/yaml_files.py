@@ -1,4 +1,5 @@
-"""YAML files: tasks, recipes, panels of figures, published tables, options of a command. JSON is YAML, too."""
+"""YAML files: tasks, recipes, panels of figures, published tables, options of a command. JSON is
+YAML, too."""
 
 import json
 from functools import partial
@@ -21,10 +22,12 @@ from ..reader import Reader
 
 __all__ = ["READERS"]
 
-_TASKS = ("nieh/contexts/nieh_truncate_head_8k", "nieh/nieh_mini_memory", "plans/infthor_plans_mini",
+_TASKS = ("nieh/contexts/nieh_truncate_head_8k", "nieh/nieh_mini_memory",
+          "plans/infthor_plans_mini",
           "plans/infthor_final_mini", "manipulation/manipulathor_put_mini")  # fmt: skip
 _OPTIONS = {
-    "model": "oracle", "tasks": ["nieh_gt"], "limit": 3, "seed": 1, "model_args": {"a": 1, "b": "c"}, "fresh": False,
+    "model": "oracle", "tasks": ["nieh_gt"], "limit": 3, "seed": 1,
+    "model_args": {"a": 1, "b": "c"}, "fresh": False,
     "budget": 100, "repeats": 2, "temperature": 0.5, "workers": 1, "name": "x",
 }  # fmt: skip
 

@@ -15,7 +15,8 @@ def history(start, *events, boxes=None):
 
     Args:
         start: the states at first, by id.
-        events: of each later frame the action, its target, its receptacle, and the states that changed.
+        events: of each later frame the action, its target, its receptacle, and the states that
+            changed.
         boxes: of some frames the boxes of some objects.
     """
     steps, ids = [], list(start)

@@ -1,4 +1,5 @@
-"""Questions in the published words: by hand, as the same questions as in ours, and against the published files."""
+"""Questions in the published words: by hand, as the same questions as in ours, and against the
+published files."""
 
 import csv
 import random

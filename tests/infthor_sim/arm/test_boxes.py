@@ -41,7 +41,8 @@ def test_boxes_that_overlap_are_apart_once_moved_as_far_as_they_do(first, second
         assert not inside(points, second).any()
         return
     away = np.array([
-        separations(Boxes(first.center + direction * (1e-6 - gap), first.axes, first.half), second)[0, 0]
+        separations(Boxes(first.center + direction * (1e-6 - gap), first.axes, first.half),
+                    second)[0, 0]
         for direction in [*directions(first, second), *-directions(first, second)]
     ])  # fmt: skip
     assert away.max() >= 0

@@ -153,9 +153,12 @@ def test_things_fall_into_an_open_cupboard_below_a_sink_and_past_it_into_the_sin
     low, high = basin.bounds()
     middle = (low + high) / 2
     cupboard = next(
-        o for o in world.objects.values()
-        if o.object_type == "Cabinet" and (o.bounds()[0] < middle).all() and (o.bounds()[1] > middle).all()
-    )  # fmt: skip
+        item
+        for item in world.objects.values()
+        if item.object_type == "Cabinet"
+        and (item.bounds()[0] < middle).all()
+        and (item.bounds()[1] > middle).all()
+    )
     bench.ok("OpenObject", objectId=cupboard.object_id, forceAction=True)
     for thing in list(cupboard.contents):
         bench.ok("RemoveFromScene", objectId=thing)
@@ -207,7 +210,8 @@ def test_held_things_collide():
     at = wrist(bench)
     message = bench.refused("MoveArmRelative", offset={"y": -0.2}, returnToStart=False)
     assert "CounterTop" in message
-    # It stops with the plate on the counter, so the wrist is where it was before lifting, give or take a step.
+    # It stops with the plate on the counter, so the wrist is where it was before lifting, give or
+    # take a step.
     assert at[1] - wrist(bench)[1] == pytest.approx(0.1, abs=0.021)
     low = bench.sim.world.objects[plate].bounds()[0][1]
     assert low > bench.sim.world.objects[bench.first("CounterTop")].surface_height() - 0.01

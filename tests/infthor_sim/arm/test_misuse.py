@@ -14,7 +14,8 @@ OWN = [
     "MoveAhead",
     "RotateLeft",
 ]
-USUAL = {"position": {"x": 0, "y": 0, "z": 0.5}, "offset": {"x": 0.05}, "y": 0.5, "distance": 0.05, "degrees": 10,
+USUAL = {"position": {"x": 0, "y": 0, "z": 0.5}, "offset": {"x": 0.05}, "y": 0.5, "distance": 0.05,
+         "degrees": 10,
          "radius": 0.1, "point": {"x": 0}, "ahead": 0.1}  # fmt: skip
 
 

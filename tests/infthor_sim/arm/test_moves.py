@@ -9,7 +9,8 @@ from infthor_sim.arm.boxes import separations
 from ..harness import Bench
 from .harness import arm_bench, own_boxes, wrist, xyz
 
-JOINT = {"name", "position", "rootRelativePosition", "rotation", "rootRelativeRotation", "localRotation",
+JOINT = {"name", "position", "rootRelativePosition", "rotation", "rootRelativeRotation",
+         "localRotation",
          "armBaseHeight", "elbowOrientation"}  # fmt: skip
 
 
@@ -288,7 +289,8 @@ def test_the_arm_is_in_the_picture_and_hides_nothing(camera):
 
 
 def test_the_arm_is_put_into_a_pose_at_once(bench):
-    bench.ok("TeleportArm", position={"x": 0.1, "y": 0.1, "z": 0.5}, rotation={"x": 0, "y": 2, "z": 0, "w": 90},
+    bench.ok("TeleportArm", position={"x": 0.1, "y": 0.1, "z": 0.5},
+             rotation={"x": 0, "y": 2, "z": 0, "w": 90},
              armHeight=0.5, elbowOrientation=-10)  # fmt: skip
     joints = arm(bench)["joints"]
     assert relative(bench) == pytest.approx([0.1, 0.1, 0.5], abs=1e-5)

@@ -39,7 +39,8 @@ def held(x, y, z, size=(0.1, 0.1, 0.1)):
 
 def thing(name, x, y, z, size=(0.1, 0.1, 0.1), **more):
     return ThorObject(
-        name, name.split("|")[0], name, Vector(x, y, z), axis_aligned_bounding_box=Box(Vector(x, y, z), Vector(*size)),
+        name, name.split("|")[0], name, Vector(x, y, z),
+        axis_aligned_bounding_box=Box(Vector(x, y, z), Vector(*size)),
         **{"pickupable": True, **more},
     )  # fmt: skip
 

@@ -63,7 +63,8 @@ LEFT, RIGHT = (
 
 
 @pytest.mark.parametrize(("kind", "origin", "door"), [
-    ("Fridge", 0.0, RIGHT), ("Microwave", 0.0, LEFT), ("Cabinet", -0.2, LEFT), ("Cabinet", 0.2, RIGHT),
+    ("Fridge", 0.0, RIGHT), ("Microwave", 0.0, LEFT), ("Cabinet", -0.2, LEFT),
+    ("Cabinet", 0.2, RIGHT),
 ])  # fmt: skip
 def test_a_door_hangs_where_the_origin_is_or_where_such_doors_do(linkage, kind, origin, door):
     around = surroundings(linkage, cupboard(kind, origin))

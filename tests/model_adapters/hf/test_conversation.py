@@ -22,7 +22,8 @@ NEW = 6
 
 
 def _inputs(model: Any, parts: Sequence[Part]) -> dict[str, torch.Tensor]:
-    """What transformers' processor makes of it: placeholders expanded in the text, then tokenised as a whole."""
+    """What transformers' processor makes of it: placeholders expanded in the text, then tokenised
+    as a whole."""
     loaded = model._loaded
     content = [
         {"type": "text", "text": p} if isinstance(p, str) else {"type": "image"} for p in parts

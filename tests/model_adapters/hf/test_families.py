@@ -1,4 +1,5 @@
-"""Every family by the same measure: the published tokens per frame, the contract, precision, refusals."""
+"""Every family by the same measure: the published tokens per frame, the contract, precision,
+refusals."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path

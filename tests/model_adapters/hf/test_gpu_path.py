@@ -1,4 +1,5 @@
-"""What can be known of a GPU without one: half precision, another device, what is waited for, memory that runs out."""
+"""What can be known of a GPU without one: half precision, another device, what is waited for,
+memory that runs out."""
 
 import ast
 import weakref
@@ -88,7 +89,8 @@ def test_a_model_on_another_device_leaves_nothing_on_the_cpu(
 def _step(
     model: Any, seen: Seen, frames: Sequence[FrameRef], **decoding: Any
 ) -> tuple[float, float, float]:
-    """Of one decoded token on top of what is encoded: reads, tensors brought to the device, bytes allocated there."""
+    """Of one decoded token on top of what is encoded: reads, tensors brought to the device, bytes
+    allocated there."""
     few, more = 2, 8
     counts = []
     with elsewhere(seen):
@@ -143,7 +145,8 @@ def test_a_batch_copies_no_keys(frames: list[FrameRef]) -> None:
     model, seen = _talkative("qwen2.5-vl", {"batch_size": "3"})
     small, large = (_step(model, seen, some)[2] for some in (frames[:2], frames))
     n_more = (model.tokens_per_frame(frames[0]) + 2) * (len(frames) - 2)
-    # Keys and values would be 512 for each reply; what is left is a mask over the context, a number for each.
+    # Keys and values would be 512 for each reply; what is left is a mask over the context, a number
+    # for each.
     assert (large - small) / n_more < 3 * 5
 
 

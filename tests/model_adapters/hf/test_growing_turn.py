@@ -1,4 +1,5 @@
-"""One user turn that grows by actions and frames, as agents are asked: nothing in it is encoded twice."""
+"""One user turn that grows by actions and frames, as agents are asked: nothing in it is encoded
+twice."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -27,7 +28,8 @@ STEPS = 60
 EVERY = (
     15  # steps, of which the last is also asked of a model that encodes all of them for its reply
 )
-TAIL = 24  # tokens that a chat template writes behind the user's words, and those at the joint of two texts
+# tokens that a chat template writes behind the user's words, and those at the joint of two texts
+TAIL = 24
 CASES = {"greedy": up_to(10, stop=STOP), "drawn": up_to(10, stop=STOP, temperature=1.0, seed=5)}
 
 
@@ -61,7 +63,8 @@ def _small(family: str) -> Twin:
 
 
 def _add_tokens(folder: Path) -> None:
-    """Add the tokens of plans as a fine-tuning does, and make the model say the one that ends an action often."""
+    """Add the tokens of plans as a fine-tuning does, and make the model say the one that ends an
+    action often."""
     tokenizer: Any = AutoTokenizer.from_pretrained(folder)
     model: Any = AutoModelForImageTextToText.from_pretrained(folder)
     assert tokenizer.add_special_tokens({"additional_special_tokens": list(TOKENS)}) == len(TOKENS)
@@ -75,7 +78,8 @@ def _add_tokens(folder: Path) -> None:
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], Path]:
-    """Checkpoints of two families, with the usual tokenizer and with one that has the tokens of plans."""
+    """Checkpoints of two families, with the usual tokenizer and with one that has the tokens of
+    plans."""
     root = tmp_path_factory.mktemp("growing")
     by_family = {}
     for family in ("qwen2.5-vl", "llava-onevision"):

@@ -1,4 +1,5 @@
-"""hf-vlm on checkpoints that transformers' own `save_pretrained` wrote, of families this project has no code for."""
+"""hf-vlm on checkpoints that transformers' own `save_pretrained` wrote, of families this project
+has no code for."""
 
 import json
 import shutil

@@ -1,4 +1,5 @@
-"""The requests of every context, by every family and in every mode: replies are those of encoding everything alone."""
+"""The requests of every context, by every family and in every mode: replies are those of encoding
+everything alone."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -38,7 +39,8 @@ class Shape:
 
 @pytest.fixture(scope="module")
 def shapes(make_frames: Callable[..., list[FrameRef]]) -> dict[str, list[Shape]]:
-    """In the order in which a run comes to them: each is left for the next with its prefix still encoded."""
+    """In the order in which a run comes to them: each is left for the next with its prefix still
+    encoded."""
     frames = make_frames(7, seed=3)
     steps = [part for frame in frames[:3] for part in (frame, "<|act|>MoveAhead<|act|>")]
     asked = (
@@ -162,7 +164,8 @@ def test_ids_and_replies_are_those_of_transformers_own_processor_and_generate(
 
 
 def _received(model: Any, talk: Conversation) -> tuple[int, int, int]:
-    """Of one reply: the tokens that had been encoded before, and the tokens and positions that reach the text model."""
+    """Of one reply: the tokens that had been encoded before, and the tokens and positions that
+    reach the text model."""
     fed: list[dict[str, Any]] = []
     text_model = model._loaded.model.get_decoder()
     hook = text_model.register_forward_pre_hook(

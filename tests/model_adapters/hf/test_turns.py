@@ -1,4 +1,5 @@
-"""Conversations of several turns, against transformers' own chat template, processor and generate."""
+"""Conversations of several turns, against transformers' own chat template, processor and
+generate."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -83,7 +84,8 @@ def test_every_round_encodes_what_is_new_in_it_only(family: str, frames: list[Fr
             each.append("Goal: wash. ", frame, "\nWhat next?")
         reply = talk.reply(up_to(NEW))
         assert reply.token_ids == other.reply(up_to(NEW)).token_ids
-        # All of the last prompt is there, but for what tokens its last text makes with the first of what was answered.
+        # All of the last prompt is there, but for what tokens its last text makes with the first of
+        # what was answered.
         assert reply.n_cached_tokens >= n_context - 2
         n_context = reply.n_context_tokens
         cached.append(reply.n_cached_tokens)

@@ -1,4 +1,5 @@
-"""Videos: their tokens against the published counts, and replies against transformers' own processor and `generate`."""
+"""Videos: their tokens against the published counts, and replies against transformers' own
+processor and `generate`."""
 
 import gzip
 import json
@@ -97,8 +98,8 @@ def test_replies_are_those_of_the_whole_processor_and_generate(
 ) -> None:
     """Frames have the size that they are scaled to, as PIL and torchvision scale differently.
 
-    Eight frames a second, so that no time of Qwen2.5-VL's clips is beyond their rows, where transformers 5 numbers the
-    text behind the video in its own way.
+    Eight frames a second, so that no time of Qwen2.5-VL's clips is beyond their rows, where
+    transformers 5 numbers the text behind the video in its own way.
     """
     new, asked = 6, {}
     for family, side in (("qwen2.5-vl", 336), ("llava-onevision", 384)):
@@ -166,7 +167,8 @@ def test_two_equal_frames_have_the_features_of_their_image(tiny: Any, published:
 
 
 def test_positions_count_the_time_of_a_video_and_go_on_behind_it(tiny: Any) -> None:
-    """By hand: two rows and columns, four positions a second, clips two seconds apart, text before and behind."""
+    """By hand: two rows and columns, four positions a second, clips two seconds apart, text before
+    and behind."""
     family = tiny._loaded.family
     shapes = [ClipShape((56, 56), number, 3, 2.0) for number in range(3)]
     n = family.video.n_tokens(shapes[0])
@@ -222,7 +224,8 @@ def test_frames_of_a_video_have_one_size(
 
 
 def test_the_pixels_of_long_videos_are_shared_by_their_frames(tiny: Any) -> None:
-    """By hand from qwen-vl-utils: of 768 frames, each has 128000 * 28 * 28 * 0.9 * 2 / 768 pixels: 300 tokens."""
+    """By hand from qwen-vl-utils: of 768 frames, each has 128000 * 28 * 28 * 0.9 * 2 / 768 pixels:
+    300 tokens."""
     large = (1400, 1400)
     tokens = [tiny._loaded.family.video.n_tokens(ClipShape(large, 0, n, 1.0)) for n in (2, 384)]
     assert tokens == [

@@ -1,4 +1,5 @@
-"""A person's sessions, from the command to the journal: a browser answers by the page's own controls."""
+"""A person's sessions, from the command to the journal: a browser answers by the page's own
+controls."""
 
 import json
 import re

@@ -1,4 +1,5 @@
-"""No key of the machine's user in these tests, no waiting between attempts, and no test without the client."""
+"""No key of the machine's user in these tests, no waiting between attempts, and no test without the
+client."""
 
 import pytest
 

@@ -1,4 +1,5 @@
-"""A server of chat completions for tests: it says what follows from what it was shown, or what it is told to."""
+"""A server of chat completions for tests: it says what follows from what it was shown, or what it
+is told to."""
 
 import base64
 import hashlib
@@ -88,7 +89,8 @@ def images_in(request: dict[str, Any]) -> list[Image.Image]:
 
 
 def kept(asked: list[dict[str, Any]], answer: Callable[..., Any] = talkative) -> Answer:
-    """Answers likewise, and keeps what was asked, with its head under "headers" (names in lower case)."""
+    """Answers likewise, and keeps what was asked, with its head under "headers" (names in lower
+    case)."""
 
     def keep(request: dict[str, Any], handler: BaseHTTPRequestHandler) -> Any:
         asked.append(

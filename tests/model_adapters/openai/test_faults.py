@@ -1,4 +1,5 @@
-"""Servers that fail in every way: each ends in one line, in bounded time and memory, and what passes is survived."""
+"""Servers that fail in every way: each ends in one line, in bounded time and memory, and what
+passes is survived."""
 
 import json
 import socket

@@ -187,9 +187,7 @@ def test_a_server_that_does_not_hold_to_choices_is_found_out() -> None:
         _ask(model, "What?", decoding=up_to(5, choices=("yes", "no")))
 
 
-def test_as_many_requests_are_in_flight_as_there_are_threads_and_conversations_are_independent() -> (
-    None
-):
+def test_there_is_a_request_in_flight_per_thread_and_conversations_are_independent() -> None:
     together, most, lock = 0, 0, threading.Lock()
     all_there = threading.Barrier(4, timeout=600)
 
@@ -290,7 +288,8 @@ def test_the_identity_is_whom_is_asked_and_how() -> None:
 
 def test_listing_and_checking_options_does_not_import_the_client() -> None:
     code = (
-        "import sys, model_adapters as m; m.options('openai'); m.check_options('openai', {'model': 'm'});"
+        "import sys, model_adapters as m; m.options('openai'); m.check_options('openai', {'model': "
+        "'m'});"
         "sys.exit(bool({'openai', 'httpx2'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

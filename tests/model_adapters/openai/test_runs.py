@@ -69,8 +69,8 @@ def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(
         "cost": pytest.approx(5 * each),
     }
     assert (
-        f"m: 5 requests, 5,000 tokens read (1,000 of them cached, 20.0 %), 50 written, {5 * each:.4f} US dollars"
-        in out
+        "m: 5 requests, 5,000 tokens read (1,000 of them cached, 20.0 %), 50 written, "
+        f"{5 * each:.4f} US dollars" in out
     )
 
 
@@ -80,8 +80,8 @@ def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path
         code, _, err = ask(url, "--max-tokens-total", 250)
         assert code == 1
         assert (
-            "2 sample(s) failed, counted as wrong: not asked: 300 tokens reach max_tokens_total=250; raise"
-            in err
+            "2 sample(s) failed, counted as wrong: not asked: 300 tokens reach "
+            "max_tokens_total=250; raise" in err
         )
         assert len(asked) == 3
         code, _, err = ask(url, "--max-tokens-total", 10_000, max_in_flight=1, timeout_s=90)
@@ -183,7 +183,8 @@ def test_a_survived_fault_stands_in_the_record(ask: Any, tmp_path: Path) -> None
 
 
 def _echoes(request: Any, handler: Any) -> Any:
-    """Says the key wherever it can: in a reply, in errors, in heads, as what a request failed for."""
+    """Says the key wherever it can: in a reply, in errors, in heads, as what a request failed
+    for."""
     key = handler.headers["Authorization"]
     text = request["messages"][0]["content"][-1]["text"]
     if "fridge" in text:

@@ -1,4 +1,5 @@
-"""The adapter against a server that nobody here wrote: transformers' own, with a tiny checkpoint on the CPU."""
+"""The adapter against a server that nobody here wrote: transformers' own, with a tiny checkpoint on
+the CPU."""
 
 import json
 import os

@@ -18,7 +18,8 @@ from model_adapters import Policy
 
 __all__ = ["Answer", "asked_image", "policy_answers", "send", "serving"]
 
-# Gets the request and its handler; gives what is sent as JSON, or None where it has answered by itself.
+# Gets the request and its handler; gives what is sent as JSON, or None where it has answered by
+# itself.
 Answer = Callable[[dict[str, Any], BaseHTTPRequestHandler], Any]
 
 

@@ -1,4 +1,5 @@
-"""The adapters of published checkpoints and their tiny twins: what they do, and what they refuse to load."""
+"""The adapters of published checkpoints and their tiny twins: what they do, and what they refuse to
+load."""
 
 import json
 from collections.abc import Callable

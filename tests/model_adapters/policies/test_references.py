@@ -1,7 +1,8 @@
-"""Numbers that the libraries gave which the policies were published with: timm 0.9.16 and transformers 4.47.0.
+"""Numbers that the libraries gave which the policies were published with: timm 0.9.16 and
+transformers 4.47.0.
 
-They are those of the tiny checkpoints of seed 0, computed by `benchmarks/reference_policies.py`, which shares no line
-with the code here.
+They are those of the tiny checkpoints of seed 0, computed by `benchmarks/reference_policies.py`,
+which shares no line with the code here.
 """
 
 from pathlib import Path
@@ -17,7 +18,8 @@ from model_adapters import load
 from model_adapters.policies.policy import VlaPolicy
 from model_adapters.policies.preprocessing import resize
 
-# A patch's features, of every 16th number: OpenVLA's as its towers give them, SpatialVLA's as Gemma sees them.
+# A patch's features, of every 16th number: OpenVLA's as its towers give them, SpatialVLA's as Gemma
+# sees them.
 FEATURES = {
     "openvla": [3.8063, 4.3223, 2.4657, -9.9152, 1.4795],
     "spatialvla": [0.3502, 0.1778, 0.865, 0.7166],

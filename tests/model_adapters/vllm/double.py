@@ -1,8 +1,10 @@
-"""A stand-in for vLLM: it takes the arguments that vLLM 0.33.0 takes and no other, and answers by transformers.
+"""A stand-in for vLLM: it takes the arguments that vLLM 0.33.0 takes and no other, and answers by
+transformers.
 
-What it reads it expands and computes with the checkpoint's whole weights, by `generate`, with nothing of the adapters
-in between; so equal replies say that prompts, frames and sampling arrive as they are meant. Its prefix cache is a
-count: blocks of 16 tokens that an earlier call (not an earlier request of the same call) has read.
+What it reads it expands and computes with the checkpoint's whole weights, by `generate`, with
+nothing of the adapters in between; so equal replies say that prompts, frames and sampling arrive as
+they are meant. Its prefix cache is a count: blocks of 16 tokens that an earlier call (not an
+earlier request of the same call) has read.
 """
 
 import functools
@@ -64,7 +66,8 @@ class SamplingParams:
 
 @dataclass
 class _Read:
-    """A prompt as the model reads it: its ids, each with the name of the frame that it belongs to."""
+    """A prompt as the model reads it: its ids, each with the name of the frame that it belongs
+    to."""
 
     ids: list[int]
     keys: list[tuple[int, str]]
@@ -179,7 +182,8 @@ def _held(
 
 
 class _OpenVLA:
-    """A policy: patches go in behind the first token, and everything is computed anew for every token."""
+    """A policy: patches go in behind the first token, and everything is computed anew for every
+    token."""
 
     limit = 2048
     cut = None  # it says nothing
@@ -342,7 +346,8 @@ class _LLM:
 
 
 def _as_read(name: str, value: Any) -> Any:
-    """What vLLM makes of an override: for positions on three axes it multiplies YaRN's original length by four."""
+    """What vLLM makes of an override: for positions on three axes it multiplies YaRN's original
+    length by four."""
     if name != "rope_parameters" or "mrope_section" not in value:
         return value
     return value | {

@@ -1,4 +1,5 @@
-"""Makes signatures.json out of vLLM's wheel: the names of parameters and fields, by its syntax tree, and no code.
+"""Makes signatures.json out of vLLM's wheel: the names of parameters and fields, by its syntax
+tree, and no code.
 
 pip download vllm==0.33.0 --no-deps --only-binary :all: -d FOLDER
 python tests/model_adapters/vllm/read_signatures.py FOLDER/vllm-*.whl
@@ -11,7 +12,8 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
-# What the adapters use, by the file that has it: functions give their parameters, classes their fields.
+# What the adapters use, by the file that has it: functions give their parameters, classes their
+# fields.
 _WANTED = {
     "vllm/entrypoints/llm.py": {
         "LLM": "LLM.__init__",

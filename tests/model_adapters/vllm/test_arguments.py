@@ -86,52 +86,50 @@ def test_every_option_arrives_under_vllms_name() -> None:
         frame_size=640,
         rope="yarn:4",
     )
-    assert (
-        model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12)
-        == {
-            "model": "checkpoint",
-            "dtype": "bfloat16",
-            "seed": 7,
-            "tensor_parallel_size": 2,
-            "pipeline_parallel_size": 3,
-            "data_parallel_size": 4,
-            "distributed_executor_backend": "external_launcher",
-            "gpu_memory_utilization": 0.5,
-            "enforce_eager": True,
-            "quantization": "fp8",
-            "enable_prefix_caching": False,
-            "mm_processor_cache_gb": 0.0,
-            "max_num_seqs": 3,
-            "max_num_batched_tokens": 4_096,
-            "enable_chunked_prefill": False,
-            "block_size": 32,
-            "kv_cache_dtype": "fp8",
-            "kv_offloading_size": 1.5,
-            "decode_context_parallel_size": 2,
-            "prefill_context_parallel_size": 4,
-            "mm_encoder_tp_mode": "data",
-            "mm_encoder_attn_backend": "TORCH_SDPA",
-            "max_model_len": 9_999,
-            "trust_remote_code": True,
-            "limit_mm_per_prompt": {
-                "image": {"count": 12, "width": 640, "height": 640},
-                "video": 0,
-            },
-            "mm_processor_kwargs": {"use_fast": False},
-            "hf_overrides": {
-                "text_config": {
-                    "rope_parameters": {
-                        "rope_type": "yarn",
-                        "rope_theta": 1e6,
-                        "factor": 4.0,
-                        "original_max_position_embeddings": 32_000,  # vLLM makes four times as many of it
-                        "mrope_section": [16, 24, 24],
-                    },
-                    "max_position_embeddings": 512_000,
-                }
-            },
-        }
-    )
+    assert model_arguments(FOLDER, _qwen("yarn:4"), typed, max_tokens=9_999, max_frames=12) == {
+        "model": "checkpoint",
+        "dtype": "bfloat16",
+        "seed": 7,
+        "tensor_parallel_size": 2,
+        "pipeline_parallel_size": 3,
+        "data_parallel_size": 4,
+        "distributed_executor_backend": "external_launcher",
+        "gpu_memory_utilization": 0.5,
+        "enforce_eager": True,
+        "quantization": "fp8",
+        "enable_prefix_caching": False,
+        "mm_processor_cache_gb": 0.0,
+        "max_num_seqs": 3,
+        "max_num_batched_tokens": 4_096,
+        "enable_chunked_prefill": False,
+        "block_size": 32,
+        "kv_cache_dtype": "fp8",
+        "kv_offloading_size": 1.5,
+        "decode_context_parallel_size": 2,
+        "prefill_context_parallel_size": 4,
+        "mm_encoder_tp_mode": "data",
+        "mm_encoder_attn_backend": "TORCH_SDPA",
+        "max_model_len": 9_999,
+        "trust_remote_code": True,
+        "limit_mm_per_prompt": {
+            "image": {"count": 12, "width": 640, "height": 640},
+            "video": 0,
+        },
+        "mm_processor_kwargs": {"use_fast": False},
+        "hf_overrides": {
+            "text_config": {
+                "rope_parameters": {
+                    "rope_type": "yarn",
+                    "rope_theta": 1e6,
+                    "factor": 4.0,
+                    # vLLM makes four times as many of it
+                    "original_max_position_embeddings": 32_000,
+                    "mrope_section": [16, 24, 24],
+                },
+                "max_position_embeddings": 512_000,
+            }
+        },
+    }
 
 
 def test_limits_of_a_frames_area_are_the_processors() -> None:

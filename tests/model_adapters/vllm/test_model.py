@@ -1,4 +1,5 @@
-"""A model on the double: the same words, the same counts as in transformers, and what its cache finds."""
+"""A model on the double: the same words, the same counts as in transformers, and what its cache
+finds."""
 
 import json
 import os

@@ -68,7 +68,8 @@ def test_both_engines_give_the_same_replies_and_tokens_and_the_hit_rate_is_told(
     assert facts[0] == facts[1]
     assert results["usage"] == others["usage"]
     assert results["config"]["model"]["name"] == "qwen2.5-vl@vllm"
-    # Three questions on one trajectory, two on the other: all but the first of each find its frames.
+    # Three questions on one trajectory, two on the other: all but the first of each find its
+    # frames.
     warm = [record.tokens.cached > record.tokens.context / 2 for record in ours]
     assert warm == [False, True, True, False, True]
     cached = sum(record.tokens.cached for record in ours)

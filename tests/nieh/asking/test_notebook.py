@@ -1,4 +1,5 @@
-"""Notes that the model takes itself: once per trajectory, kept by the journal, shown to every question."""
+"""Notes that the model takes itself: once per trajectory, kept by the journal, shown to every
+question."""
 
 import msgspec
 import pytest
@@ -18,7 +19,8 @@ TASK = "nieh_memory_notes"
 
 @pytest.fixture(autouse=True)
 def small_windows(task_files):
-    """Two frames a note and six tokens each, so that the six frames of a trajectory make three short notes."""
+    """Two frames a note and six tokens each, so that the six frames of a trajectory make three
+    short notes."""
     file = task_files / "nieh" / "contexts" / f"{TASK}.yaml"
     text = file.read_text().replace("{window: 20, tokens: 64}", "{window: 2, tokens: 6}")
     file.write_text(text)

@@ -126,7 +126,8 @@ def test_several_clues_are_drawn_from_the_seed_at_each_depth_anew():
     assert draw(1) != draw(2)
 
 
-# Windows of clues in a row, by the published function: frames, clues, frames of a window, the window at each depth.
+# Windows of clues in a row, by the published function: frames, clues, frames of a window, the
+# window at each depth.
 IN_A_ROW = [
     (100, (95, 96, 97), 30, [range(71, 100)] * 5),  # ends one frame past the trajectory: 29 frames
     (100, (94, 95, 96), 30, [range(70, 100)] * 5),

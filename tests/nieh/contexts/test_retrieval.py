@@ -62,7 +62,8 @@ def recalled(root, k, clip, question=QUESTIONS[0], memory="clip-view"):
 
 @torch.inference_mode()
 def similarities(clip, root):
-    """Cosines of (texts, frames) and (frames, frames), by transformers alone, all frames in one batch."""
+    """Cosines of (texts, frames) and (frames, frames), by transformers alone, all frames in one
+    batch."""
     model = CLIPModel.from_pretrained(clip)
     images = [
         Image.open(path).convert("RGB")

@@ -1,4 +1,5 @@
-"""A set in every layout that a published loader implies gives the same requests in every context."""
+"""A set in every layout that a published loader implies gives the same requests in every
+context."""
 
 import json
 import shutil

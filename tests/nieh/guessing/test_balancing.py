@@ -22,7 +22,8 @@ def presence(traj, thing, answer, clues=(1,)):
 
 
 def fair(n_trajectories=4, things=OBJECTS):
-    """Each question has either answer on half of the trajectories, so from the others the wrong one is likelier."""
+    """Each question has either answer on half of the trajectories, so from the others the wrong one
+    is likelier."""
     return [
         presence(traj, thing, ANSWERS[(traj + place) % 2])
         for traj in range(n_trajectories)
@@ -117,7 +118,8 @@ def test_files_are_counted_apart_but_balanced_together():
 @settings(max_examples=50)
 @given(st.lists(st.integers(1, 9), min_size=1, max_size=4))
 def test_the_commonest_answers_are_cut_so_that_most_is_kept(sizes):
-    """Against all ways to keep some of the commonest answers, each up to some number of questions."""
+    """Against all ways to keep some of the commonest answers, each up to some number of
+    questions."""
     questions = [
         presence(0, f"{answer}{number}", f"answer {answer}")
         for answer, size in enumerate(sizes)

@@ -58,8 +58,8 @@ def chain_of(*contexts):
 def test_a_context_counts_less_the_more_different_answers_it_has(n_y, guess):
     """Witten and Bell's interpolation by hand.
 
-    Of 20 answers 18 are x. After the word "a" there are 1 x and 2 y, two different answers: x has (1 + 2 * 18 / 20) /
-    (3 + 2) = 0.56. With a third y it has (1 + 2 * 18 / 21) / (4 + 2) = 0.45.
+    Of 20 answers 18 are x. After the word "a" there are 1 x and 2 y, two different answers: x has
+    (1 + 2 * 18 / 20) / (3 + 2) = 0.56. With a third y it has (1 + 2 * 18 / 21) / (4 + 2) = 0.45.
     """
     key = [("a", "x"), *[("a", "y")] * n_y, *[("c", "x")] * 17]
     samples = on_clues(
@@ -75,7 +75,8 @@ def test_a_context_counts_less_the_more_different_answers_it_has(n_y, guess):
 
 
 def test_own_answers_are_taken_away_before_counting():
-    """On trajectory t the answer after "a" is always x; the others give y after it, and x elsewhere."""
+    """On trajectory t the answer after "a" is always x; the others give y after it, and x
+    elsewhere."""
     key = [("t", "a", "x")] * 5 + [("u", "a", "y"), ("u", "b", "x"), ("v", "b", "x")]
     samples = [
         Sample(asked(traj, text, answer, (number,)), (1,))

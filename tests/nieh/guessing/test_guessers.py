@@ -72,7 +72,8 @@ def named(name):
 
 
 def test_the_constant_of_a_file_is_the_commonest_answer_elsewhere():
-    # t0 sees 1 yes and 2 no elsewhere; the others 3 yes, and 1 or 2 no; equals are taken by the alphabet.
+    # t0 sees 1 yes and 2 no elsewhere; the others 3 yes, and 1 or 2 no; equals are taken by the
+    # alphabet.
     key = [("t0", "yes"), ("t0", "yes"), ("t1", "yes"), ("t1", "no"), ("t2", "no")]
     samples = on_clues(
         *(asked(traj, f"{traj} {i}?", answer) for i, (traj, answer) in enumerate(key))

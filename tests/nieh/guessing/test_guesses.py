@@ -47,7 +47,8 @@ def test_on_the_clue_frames_their_number_is_told_and_elsewhere_the_words_alone()
 
 
 def test_a_form_has_the_score_of_its_best_guesser(make_set):
-    # Held out, the majority of four yes and a no is always yes; "no" is right for a single other question alone.
+    # Held out, the majority of four yes and a no is always yes; "no" is right for a single other
+    # question alone.
     data = make_set(
         test=[*constant(PRESENCE, ("yes",) * 4 + ("no",)), *constant(OPEN, ("yes", "yes"))]
     )

@@ -17,7 +17,8 @@ def right(samples, **knowledge):
 
 
 def of_both(clues, answers=("yes", "no")):
-    """Two questions in the same words on each of six trajectories, which differ in their clues and answers."""
+    """Two questions in the same words on each of six trajectories, which differ in their clues and
+    answers."""
     each = zip(clues, answers, strict=True)
     pairs = list(each)
     return on_clues(

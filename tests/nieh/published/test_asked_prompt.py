@@ -24,7 +24,8 @@ REPLIES = Path(__file__).parents[3] / "../shared/data/published_sets/replies"
 
 
 def vocabulary() -> Path:
-    """Qwen's vocabulary: the file that QWEN_VOCABULARY names, or that of the package `dashscope`, if there is one."""
+    """Qwen's vocabulary: the file that QWEN_VOCABULARY names, or that of the package `dashscope`,
+    if there is one."""
     package = importlib.util.find_spec("dashscope")
     folder = (
         Path(package.origin).parent
@@ -45,7 +46,8 @@ VIEWS, FILM = CONTEXTS["trajectory"].intro, CONTEXTS["video"].intro
 
 # Qwen2's split of a text into pieces that are merged apart.
 PIECES = regex.compile(
-    r"(?i:'s|'t|'re|'ve|'m|'ll|'d)|[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}| ?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"
+    r"(?i:'s|'t|'re|'ve|'m|'ll|'d)|[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}| "
+    r"?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"
 )
 TEMPLATE = (
     "system\nYou are a helpful assistant.",
@@ -113,7 +115,8 @@ def test_the_logs_prompt_has_the_logged_number_of_tokens_in_every_row():
         n_text = row["ctx_n_tokens"] - 123 * row["n_imgs"]
         for prompt in n:
             n[prompt] += n_tokens(question_text(VIEWS, asked(row["question"]), prompt)) == n_text
-    # All fourteen logs, by hand: 6,133 of 6,133 rows on images; 2,606 of 2,606 on videos are main's prompt of films.
+    # All fourteen logs, by hand: 6,133 of 6,133 rows on images; 2,606 of 2,606 on videos are main's
+    # prompt of films.
     assert (n_rows, n) == (3909, {PUBLISHED_LOGS: 3909, PUBLISHED_MAIN: 0})
 
 
@@ -149,8 +152,8 @@ def reply(n_context_tokens, n_frames=10, mode="full_traj"):
     )
 
 
-# The first row of the published logs on images and on videos (1 and 2 frames per second): 886 frames, "Where is Statue
-# now?"; by hand, 57 tokens for main's prompt.
+# The first row of the published logs on images and on videos (1 and 2 frames per second): 886
+# frames, "Where is Statue now?"; by hand, 57 tokens for main's prompt.
 @pytest.mark.parametrize(
     ("replies", "prompt"),
     [

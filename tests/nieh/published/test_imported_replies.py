@@ -1,4 +1,5 @@
-"""What imported logs say of the evidence: shown clue frames, lengths of trajectories, and the mode of videos."""
+"""What imported logs say of the evidence: shown clue frames, lengths of trajectories, and the mode
+of videos."""
 
 import json
 from pathlib import Path
@@ -36,7 +37,8 @@ def no_guesses(monkeypatch):
 
 @pytest.fixture
 def imported(tmp_path):
-    """Imports logs of rows, each a reply to the question of its number, by the end of their names."""
+    """Imports logs of rows, each a reply to the question of its number, by the end of their
+    names."""
     write_questions(tmp_path / f"{SINGLE}.csv", QUESTIONS)
 
     def imported(**logs):
@@ -143,7 +145,8 @@ def test_the_name_of_a_log_of_videos_tells_their_rate(imported, name, task, sett
     assert (run.task, run.settings) == (task, {**settings, "prompt": None})
 
 
-# 123 tokens a frame, 144 a pair of frames of a film; the prompt's own words, and a word of the question each.
+# 123 tokens a frame, 144 a pair of frames of a film; the prompt's own words, and a word of the
+# question each.
 WORDS = {"published-logs": 60 + 5, "published-main": 52 + 5}
 FILM = 54 + 5
 END = {"eval_mode": "truncate_head", "ctx_size_k": 32, "n_imgs": 270}

@@ -41,7 +41,8 @@ def test_every_published_row_of_whole_questions_has_a_task_in_its_context():
     assert set(rows) == published
 
 
-# Frames of a window as the README and the logs have them: 32K and 64K of 1,024 tokens each, 121 and 1,485 a frame.
+# Frames of a window as the README and the logs have them: 32K and 64K of 1,024 tokens each, 121 and
+# 1,485 a frame.
 @pytest.mark.parametrize(
     ("task", "tokens_per_frame", "n"),
     [

@@ -1,4 +1,5 @@
-"""Requests of stored runs, made again: what comes out is what was sent, or an error says that it is not known."""
+"""Requests of stored runs, made again: what comes out is what was sent, or an error says that it is
+not known."""
 
 import msgspec
 import pytest

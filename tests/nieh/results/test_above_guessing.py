@@ -66,7 +66,8 @@ def test_the_guesser_itself_gets_nothing_and_all_right_is_all(forms):
 
 
 def test_by_hand():
-    # Form a: 3 of 4 right where the guess is 1 of 2; (0.75 - 0.5) / 0.5 = 0.5. Form b: 0 of 1, guess 0.2; -0.25.
+    # Form a: 3 of 4 right where the guess is 1 of 2; (0.75 - 0.5) / 0.5 = 0.5. Form b: 0 of 1,
+    # guess 0.2; -0.25.
     records = [
         record(i, "?", scores={"strict": float(i > 0)}, guess=guess(i % 2, 0.5)) for i in range(4)
     ]

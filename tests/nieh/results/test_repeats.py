@@ -1,4 +1,5 @@
-"""Questions that are asked several times: the seeds, the journal, the figures, and what one repeat leaves alone."""
+"""Questions that are asked several times: the seeds, the journal, the figures, and what one repeat
+leaves alone."""
 
 import json
 import math

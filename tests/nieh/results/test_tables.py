@@ -187,7 +187,8 @@ def test_a_run_is_set_against_the_same_models_run_on_blank_frames():
         run_of(identity(frames="blank"), right_but_every(2, 40)),
     )
     (table,) = gains(seeing, blank)
-    # Two or three more of the ten questions of each of four trajectories are right: spread 0.0289, and t(3) is 3.182.
+    # Two or three more of the ten questions of each of four trajectories are right: spread 0.0289,
+    # and t(3) is 3.182.
     interval = "[+15.81, +34.19]"
     assert [row.cells for row in table.rows] == [
         ("a run", "nieh_gt", metric, "+25.00", "-", "-", "+25.00", interval, "+25.00", "-")

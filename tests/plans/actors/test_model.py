@@ -55,7 +55,8 @@ def acting(prepared, monkeypatch):
 
 
 def as_expert(folder):
-    """Says what the expert did for the plan, by the words of goal and plan and the actions up to now."""
+    """Says what the expert did for the plan, by the words of goal and plan and the actions up to
+    now."""
     known = {}
     for trajectory in iter_trajectories(folder):
         tasks = tasks_of(trajectory)
@@ -231,7 +232,8 @@ def test_plans_and_actions_are_in_the_words_that_are_asked_for(acting, data, wor
 
 def test_a_preamble_is_told_before_everything_else(acting, task_files, data):
     (task_files / "plans" / "infthor_plans.yaml").write_text(
-        "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {preamble: 'You are a robot. '}\n"
+        "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {preamble: 'You are a robot. "
+        "'}\n"
     )
     _, model = acting(lambda *_: "")
     assert all(
@@ -328,15 +330,24 @@ def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(acting, d
 
 
 HISTORIES = {
-    "last:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
-    "last:": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
-    "last:-5": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
-    "last:many": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
-    "last:²": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
-    "frames:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
-    "all": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
-    "full:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
-    "text:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans",
+    "last:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
+    "and plans",
+    "last:": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
+    "and plans",
+    "last:-5": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
+    "and plans",
+    "last:many": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "
+    "goals and plans",
+    "last:²": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
+    "and plans",
+    "frames:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "
+    "goals and plans",
+    "all": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and "
+    "plans",
+    "full:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
+    "and plans",
+    "text:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
+    "and plans",
 }
 
 

@@ -1,4 +1,5 @@
-"""The expert's own actions carry every plan of a bundled trajectory out, and earn the most that there is."""
+"""The expert's own actions carry every plan of a bundled trajectory out, and earn the most that
+there is."""
 
 import pytest
 
@@ -35,7 +36,8 @@ def recorded_goal(plan, grid):
     return PlanTarget(plan.kind, goal_stand=stand, goal_horizon=float(horizon))
 
 
-# The kitchen has all kinds but switching a lamp on; the bedroom has that, stacks, and two of a thing.
+# The kitchen has all kinds but switching a lamp on; the bedroom has that, stacks, and two of a
+# thing.
 @pytest.mark.parametrize("name", ["kitchen-1-seed5", "bedroom-2-seed7"])
 def test_every_plan_is_carried_out(simulator, name):
     trajectory = next(iter_trajectories(SET / "metadata" / name / "traj_data.json"))

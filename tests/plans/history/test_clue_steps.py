@@ -1,4 +1,5 @@
-"""Where the objects of final tasks were last in view, in the bundled trajectories, looked up by hand in their logs."""
+"""Where the objects of final tasks were last in view, in the bundled trajectories, looked up by
+hand in their logs."""
 
 import gzip
 

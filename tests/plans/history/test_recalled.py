@@ -44,7 +44,8 @@ def frame(name):
 
 
 def past(n_plans, episode="a"):
-    """The history before a plan: every plan before has two steps, and every second one begins a task."""
+    """The history before a plan: every plan before has two steps, and every second one begins a
+    task."""
     segments = []
     for plan in range(n_plans + 1):
         before = frame(f"{episode}{2 * plan}")

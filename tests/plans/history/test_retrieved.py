@@ -49,7 +49,8 @@ def test_names_are_looked_up_in_images_with_the_suffix_of_either_format(trajecto
     [
         (
             None,
-            'retrieved_image["3"]["top20"] is not in the file (nothing was retrieved before this action); take',
+            'retrieved_image["3"]["top20"] is not in the file (nothing was retrieved before this '
+            "action); take",
         ),
         (
             {"2": {"top20": []}},

@@ -170,7 +170,8 @@ def test_files_that_name_no_frames_are_refused_before_the_work(acting):
     [
         (
             {"history": "last:100"},
-            "--protocol published has the histories full, text, retrieved:K and frames:K, not last:100",
+            "--protocol published has the histories full, text, retrieved:K and frames:K, not "
+            "last:100",
         ),
         (
             {"tasks": ("infthor_plans",)},

@@ -14,7 +14,8 @@ COLUMNS = ("Go to", "Pick up", "Put", "total")
 
 
 def log(name, *rows, digest="a"):
-    """A log; a row is the done plans of goto, pick and put, of 2, 1 and 1, or None where the set-up failed."""
+    """A log; a row is the done plans of goto, pick and put, of 2, 1 and 1, or None where the set-up
+    failed."""
     plans = []
     for line, done in enumerate(rows, 1):
         sizes = (0, 0, 0) if done is None else (2, 1, 1)
@@ -52,7 +53,8 @@ def test_a_row_stands_above_the_printed_one_and_what_does_not_follow_is_marked(p
     assert rest == ("another", "printed", "1.0", "2.0", "3.0", "4.0")
     assert table.notes[:2] == (
         "3 of 4 printed cells follow from these logs.",
-        "*: theirs, Pick up: printed 30.0, in the log 0.0 (0 of 2). No counts of this log give 30.0.",
+        "*: theirs, Pick up: printed 30.0, in the log 0.0 (0 of 2). No counts of this log give "
+        "30.0.",
     )
     assert "as it is" in table.notes
 
@@ -63,7 +65,8 @@ def test_counts_that_give_a_cell_in_another_way_are_named(printed):
     assert table.notes[0] == "1 of 4 printed cells follow from these logs."
     (goto,) = [note for note in table.notes if note.startswith("*: theirs, Go to")]
     assert goto == (
-        "*: theirs, Go to: printed 25.0, in the log 16.7 (1 of 6). 25.0 is 3 of 12: total done, of the plans of total."
+        "*: theirs, Go to: printed 25.0, in the log 16.7 (1 of 6). 25.0 is 3 of 12: total done, of "
+        "the plans of total."
     )
 
 

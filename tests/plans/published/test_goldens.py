@@ -156,7 +156,8 @@ def frame(number: int) -> FrameRef:
 
 
 class _Loop:
-    """Goes through a golden run of the published loop: the agent says what the line has, the expert repeats."""
+    """Goes through a golden run of the published loop: the agent says what the line has, the expert
+    repeats."""
 
     def __init__(self, line: dict[str, Any]) -> None:
         self.line, self.trajectory = line, read(line["trajectory"])
@@ -261,7 +262,8 @@ def _rounded(row: list[Any]) -> list[Any]:
 
 
 def by_hand(document: dict[str, Any]) -> list[tuple[str, list[int]]]:
-    """Before each plan of a published file: the loop's text, and how many actions were done before each frame."""
+    """Before each plan of a published file: the loop's text, and how many actions were done before
+    each frame."""
 
     def name(object_id: str) -> str:
         return object_id[: object_id.index("|")]

@@ -18,7 +18,8 @@ PUBLISHED = sorted(
 
 
 def row(traj_id, goto=(0, 0), pick=(0, 0), put=(0, 0), more=0):
-    """A row as the published scripts write it; each count is (done, plans), `more` plans are of other kinds."""
+    """A row as the published scripts write it; each count is (done, plans), `more` plans are of
+    other kinds."""
     kinds = {"goto": goto, "pick": pick, "put": put}
     metric = {"total_count": sum(n for _, n in kinds.values()) + more, "agent_reward": 0}
     metric["success_count"] = sum(done for done, _ in kinds.values())
@@ -62,7 +63,8 @@ def test_a_log_becomes_a_run_of_its_plans(import_log, run, name):
         ("t2/0002", "PutObject", "not done"),
     ]
     (task,) = json.loads((folder / "results.json").read_text())["summary"]["tasks"].values()
-    assert {name: (round(rate["mean"], 4), rate["n"]) for name, rate in task["success"].items()} == {
+    assert {name: (round(rate["mean"], 4), rate["n"]) for name,
+            rate in task["success"].items()} == {
         "Go to": (0.3333, 3), "Pick up": (0.5, 2), "Put": (0.0, 2), "total": (0.2857, 7),
     }  # fmt: skip
     assert task["skipped"] == {"its set-up failed: the log counts no plan of it": 1}
@@ -104,7 +106,8 @@ def test_what_needs_steps_says_that_there_are_none(import_log, run, words):
     code, out, err = run(words[0], folder, *words[1:])
     assert (code, out) == (2, "")
     assert err.splitlines() == [
-        "infthor-eval: some-model-hf_yarn_4.0: imported counts have no steps and no rewards; give runs made here"
+        "infthor-eval: some-model-hf_yarn_4.0: imported counts have no steps and no rewards; give "
+        "runs made here"
     ]
 
 

@@ -47,7 +47,8 @@ def test_the_mean_over_trajectories_of_different_lengths_keeps_the_shorter_ones_
     assert curve.places == (0, 10, 20, 30)
     assert means(curve) == [0, 0.5, 1.5, 3.5]
     reaches = [estimate.high - estimate.mean for estimate in curve.means]
-    # Half the difference of the two values is the standard error; also of values between 0 and 1, which are no shares.
+    # Half the difference of the two values is the standard error; also of values between 0 and 1,
+    # which are no shares.
     assert reaches == pytest.approx([0, 0.5 * T, 1.5 * T, 0.5 * T], rel=1e-4)
     assert curve.end.mean - curve.end.low == pytest.approx(0.5 * T, rel=1e-4)
 

@@ -1,4 +1,5 @@
-"""The page on a run, in a browser: it grows with the run, says what became of it, and shows text as text."""
+"""The page on a run, in a browser: it grows with the run, says what became of it, and shows text as
+text."""
 
 import signal
 import subprocess
@@ -72,8 +73,10 @@ def test_a_killed_run_is_said_to_be_none_that_goes_on(tab: Any, tmp_path: Path) 
     if not Path("/proc/locks").is_file():
         pytest.skip("this system has no list of locks")
     program = (
-        "import sys, time\nfrom pathlib import Path\nfrom infthor_eval.nieh.records import RECORDS\n"
-        "from infthor_eval.runs.journals.journal import Journal\nfrom tests.nieh.made import record\n"
+        "import sys, time\nfrom pathlib import Path\nfrom infthor_eval.nieh.records import "
+        "RECORDS\n"
+        "from infthor_eval.runs.journals.journal import Journal\nfrom tests.nieh.made import "
+        "record\n"
         "from tests.report.live.conftest import header_of\n"
         "with Journal(Path(sys.argv[1]), header_of(), RECORDS) as journal:\n"
         "    journal.append(record(0, 'Sofa', ('Sofa',)))\n    time.sleep(600)\n"

@@ -1,4 +1,5 @@
-"""What is shown of a run as it goes is what its journal holds by then, and the run does not notice."""
+"""What is shown of a run as it goes is what its journal holds by then, and the run does not
+notice."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""The page in a real browser, from its file: it opens, filters work, pictures load, hostile text stays text."""
+"""The page in a real browser, from its file: it opens, filters work, pictures load, hostile text
+stays text."""
 
 from urllib.parse import parse_qs, quote
 

@@ -1,4 +1,5 @@
-"""The page of a suite that has no presenter: its tables, its primary metric, and its records as samples."""
+"""The page of a suite that has no presenter: its tables, its primary metric, and its records as
+samples."""
 
 from pathlib import Path
 

@@ -45,8 +45,8 @@ def test_every_run_leaves_it_and_equal_runs_leave_the_same(tmp_path: Path) -> No
         "output": str(tmp_path),
     }
     assert (
-        found.line
-        == f"infthor-eval run --model adder --tasks sums --seed 0 --output {shlex.quote(str(tmp_path))}"
+        found.line == "infthor-eval run --model adder --tasks sums --seed 0 --output "
+        f"{shlex.quote(str(tmp_path))}"
     )
     assert found.data is None
 

@@ -196,7 +196,8 @@ def test_a_record_that_cannot_be_written_fails_alone(tmp_path):
 def test_what_is_no_fault_of_the_suite_ends_the_run_and_keeps_what_is_done(tmp_path, error):
     with pytest.raises(error):
         run(request(tmp_path), broken_by(error()))
-    # Who stops it has the results of what is there; a machine without memory is asked for nothing more.
+    # Who stops it has the results of what is there; a machine without memory is asked for nothing
+    # more.
     (folder,) = (tmp_path / "adder").iterdir()
     results = folder / "results.json"
     assert (json.loads(results.read_text())["n_missing"] if results.exists() else None) == (
@@ -247,7 +248,8 @@ def test_two_workers_have_the_results_of_one_process(tmp_path):
     shards = {
         path.stem: path.read_bytes() for path in (shared.folder / "journal").glob("worker-*.jsonl")
     }
-    # One worker may be so quick that there is nothing left for the other; the driver (0) does no unit itself.
+    # One worker may be so quick that there is nothing left for the other; the driver (0) does no
+    # unit itself.
     assert {"worker-0"} < shards.keys() <= {"worker-0", "worker-1", "worker-2"}
     assert b'"type":"unit"' not in shards["worker-0"]
 

@@ -1,4 +1,5 @@
-"""What a run is taken to take: by hand for groups of known cost, and on a suite that costs what it says."""
+"""What a run is taken to take: by hand for groups of known cost, and on a suite that costs what it
+says."""
 
 import time
 from dataclasses import astuple

@@ -1,4 +1,5 @@
-"""Runs by several workers: the records of one process, whoever is killed, and results of what a stopped run had."""
+"""Runs by several workers: the records of one process, whoever is killed, and results of what a
+stopped run had."""
 
 import json
 import os
@@ -46,7 +47,8 @@ class Watching:
 
 @dataclass
 class Deadly(Sums):
-    """Sums in six groups; some units kill their worker, the first so many times that they are begun.
+    """Sums in six groups; some units kill their worker, the first so many times that they are
+    begun.
 
     Attributes:
         folder: where it is counted.
@@ -217,7 +219,8 @@ def test_a_cluster_that_loses_a_node_finds_what_one_process_finds(tmp_path):
         alone.folder / "results.json"
     ).read_bytes()
     assert len(watching.seen) == 24
-    # Of the node's worker, and of the one that a unit killed; on a busy machine they are the same one.
+    # Of the node's worker, and of the one that a unit killed; on a busy machine they are the same
+    # one.
     assert watching.notes
 
 

@@ -1,4 +1,5 @@
-"""Context extension: what lands in the config, and that chunks and cached prefixes see the frequencies of one pass."""
+"""Context extension: what lands in the config, and that chunks and cached prefixes see the
+frequencies of one pass."""
 
 import math
 from collections.abc import Sequence

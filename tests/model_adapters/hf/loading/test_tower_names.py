@@ -1,4 +1,5 @@
-"""Checkpoints are saved by their published names, and transformers loads the same weights from them."""
+"""Checkpoints are saved by their published names, and transformers loads the same weights from
+them."""
 
 from pathlib import Path
 

@@ -13,8 +13,10 @@ from model_adapters.tiny.tokenizer import train_tokenizer
 
 from ...asking import user
 
-BODY = """\
-{%- for part in message.content -%}{{- '<image>' if part.type == 'image' else part.text -}}{%- endfor -%}"""
+BODY = (
+    "{%- for part in message.content -%}"
+    "{{- '<image>' if part.type == 'image' else part.text -}}{%- endfor -%}"
+)
 EACH = "{%- for message in messages -%}<{{ message.role }}>HERE{%- endfor -%}"
 PLAIN = EACH.replace("HERE", BODY)
 IMAGES_FIRST = EACH.replace(
@@ -29,8 +31,8 @@ NO_SYSTEM = (
 ONLY_USERS = PLAIN.replace("messages -%}", "messages if message.role == 'user' -%}")
 # As Pixtral's: the system's words are joined to a string.
 JOINED = (
-    "{%- set rules = messages[0].content if messages[0].role == 'system' else '' -%}[{{- rules + '\\n' -}}]"
-    + ONLY_USERS.replace("message.role == 'user'", "message.role != 'system'")
+    "{%- set rules = messages[0].content if messages[0].role == 'system' else '' -%}[{{- rules + "
+    "'\\n' -}}]" + ONLY_USERS.replace("message.role == 'user'", "message.role != 'system'")
 )
 PRINTED = EACH.replace("HERE", "{{- message.content -}}")
 

@@ -1,4 +1,5 @@
-"""How conversations are written: by a checkpoint's own template, or plainly, as transformers' processors take them."""
+"""How conversations are written: by a checkpoint's own template, or plainly, as transformers'
+processors take them."""
 
 import shutil
 from collections.abc import Callable

@@ -1,7 +1,8 @@
 """The keys of openvla/openvla-7b, written from its architecture.
 
 Names and shapes of the towers are those of timm 0.9.16's vit_large_patch14_reg4_dinov2 and
-vit_so400m_patch14_siglip_224 with `gamma` called `scale_factor`; those of the language model are transformers'.
+vit_so400m_patch14_siglip_224 with `gamma` called `scale_factor`; those of the language model are
+transformers'.
 """
 
 import re
@@ -67,7 +68,8 @@ def test_names_and_shapes(layout: Layout) -> None:
 def test_how_many_there_are_of_each_part(layout: Layout) -> None:
     expected = layout.all_shapes()
     parts = Counter(".".join(key.split(".")[:2]) for key in expected)
-    # 14 a block and 7 beside them; 12 a block and 18 beside them; 9 a layer and embeddings, norm and head
+    # 14 a block and 7 beside them; 12 a block and 18 beside them; 9 a layer and embeddings, norm
+    # and head
     assert parts[DINO] == 24 * 14 + 7
     assert parts[SIGLIP] == 27 * 12 + 18
     assert sum(key.startswith("language_model.") for key in expected) == 32 * 9 + 3

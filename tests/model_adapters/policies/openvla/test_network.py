@@ -66,7 +66,8 @@ def test_a_tower_gives_features_of_patches_alone_in_reading_order(kind: Any) -> 
 def test_actions_with_a_cache_are_those_of_reading_all_anew(
     network: OpenVLANetwork, plain_frames: tuple[FrameRef, FrameRef]
 ) -> None:
-    """The patches go in behind the begin token; every token is chosen from the whole sequence so far."""
+    """The patches go in behind the begin token; every token is chosen from the whole sequence so
+    far."""
     weights, model = network.weights, network.weights.language_model
     image = plain_frames[1].load()
     patches = weights.projector(weights.vision_backbone(resize(image, 56)[None]))

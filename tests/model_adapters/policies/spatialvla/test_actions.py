@@ -65,7 +65,8 @@ def test_the_outer_bins_of_each_spherical_axis(
 
 @pytest.mark.parametrize("axis", ["theta", "phi", "r"])
 def test_every_bin_lies_between_its_borders(bins: SpatialBins, axis: str) -> None:
-    """Direction and length of each decoded translation fall into the very bin that the token counts."""
+    """Direction and length of each decoded translation fall into the very bin that the token
+    counts."""
     step = {"theta": 32 * 8, "phi": 8, "r": 1}[axis]
     # Beside the first bins, whose lengths and angles are clear of the clip at one and of the poles.
     base = {"theta": 16 * 8 + 2, "phi": 5 * 32 * 8 + 2, "r": 5 * 32 * 8 + 12 * 8}[axis]
@@ -83,7 +84,8 @@ def test_every_bin_lies_between_its_borders(bins: SpatialBins, axis: str) -> Non
 
 
 def test_a_translation_beyond_one_is_clipped(bins: SpatialBins) -> None:
-    # theta in bin 0 (0.35335), the longest r: (1.1393 + 1.7321) / 2 = 1.4357; its z is 1.4357 cos 0.35335 = 1.3470
+    # theta in bin 0 (0.35335), the longest r: (1.1393 + 1.7321) / 2 = 1.4357; its z is 1.4357 cos
+    # 0.35335 = 1.3470
     assert 1.4357 * math.cos(0.35335) > 1
     assert bins.decode([BEGIN + 7, *STILL])[0, 2] == 1.0
 

@@ -33,7 +33,8 @@ def test_thor_s_camera_of_a_square_frame() -> None:
 
 
 def test_the_field_of_view_is_vertical() -> None:
-    # f = 100 / tan 30 = 173.205 pixels of a frame of 400 x 200; squashed to 224: 96.9948 across, 193.9897 down.
+    # f = 100 / tan 30 = 173.205 pixels of a frame of 400 x 200; squashed to 224: 96.9948 across,
+    # 193.9897 down.
     intrinsics = thor_intrinsics(60, (400, 200), 224)
     focal = 100 / math.tan(math.pi / 6)
     assert [intrinsics[0, 0], intrinsics[1, 1]] == pytest.approx(

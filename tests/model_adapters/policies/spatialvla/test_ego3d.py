@@ -17,7 +17,8 @@ def test_points_of_a_wall_lie_on_the_rays_through_the_middles_of_cells() -> None
     depth = torch.full((1, 1, 28, 28), 2.0)
     points = back_project(depth, INTRINSICS, patch=14, resolution=2)
     assert points.shape == (1, 4, 12)
-    # Middles of cells of 7 pixels: 3.5, 10.5, 17.5, 24.5; x = 2 (u - 14) / 10, y = 2 (v - 14) / 20, z = 2.
+    # Middles of cells of 7 pixels: 3.5, 10.5, 17.5, 24.5, so that
+    # x = 2 (u - 14) / 10, y = 2 (v - 14) / 20, z = 2.
     x, y = (
         [2 * (u - 14) / 10 for u in (3.5, 10.5, 17.5, 24.5)],
         [2 * (v - 14) / 20 for v in (3.5, 10.5, 17.5, 24.5)],
@@ -76,7 +77,8 @@ def test_depth_is_estimated_on_a_mirrored_border_that_is_cut_off_again() -> None
     assert zoe.shown.shape == (1, 3, 384, 384)
     assert zoe.shown[0, :, 200, 200].tolist() == pytest.approx([1.0, -1.0, -1.0], abs=1e-5)
     assert depth.shape == (1, 1, 224, 224)
-    # 31 of 286 pixels on each side are border: with aligned corners, pixel 31 of 0..285 lies at 31/285 of the ramp.
+    # 31 of 286 pixels on each side are border: with aligned corners, pixel 31 of 0..285 lies at
+    # 31/285 of the ramp.
     assert depth[0, 0, 0, 0] == pytest.approx(31 / 285, abs=1e-3)
     assert depth[0, 0, 0, -1] == pytest.approx(254 / 285, abs=1e-3)
 

@@ -1,4 +1,5 @@
-"""The keys of IPEC-COMMUNITY/spatialvla-4b-224-pt, written from its architecture as transformers 4.47 has it."""
+"""The keys of IPEC-COMMUNITY/spatialvla-4b-224-pt, written from its architecture as transformers
+4.47 has it."""
 
 import math
 from collections import Counter

@@ -1,4 +1,5 @@
-"""SpatialVLA's network: what it is asked, where its embeddings are, and that its cache changes nothing."""
+"""SpatialVLA's network: what it is asked, where its embeddings are, and that its cache changes
+nothing."""
 
 from pathlib import Path
 
@@ -64,7 +65,8 @@ def test_action_tokens_have_the_embeddings_kept_apart_and_all_are_scaled(
 def test_actions_with_a_cache_are_those_of_reading_all_anew(
     network: SpatialVLANetwork, plain_frames: tuple[FrameRef, FrameRef]
 ) -> None:
-    """Positions count from 1, the prefix is read in both directions, and what follows by what came before."""
+    """Positions count from 1, the prefix is read in both directions, and what follows by what came
+    before."""
     model, image = network.weights.language_model, plain_frames[1].load()
     ids = network.prompt_ids("pick up the mug")
     written: list[int] = []

@@ -1,4 +1,5 @@
-"""Whole runs in real vLLM, as their user types them, on the small trained model: equal to those in transformers."""
+"""Whole runs in real vLLM, as their user types them, on the small trained model: equal to those in
+transformers."""
 
 import os
 import random

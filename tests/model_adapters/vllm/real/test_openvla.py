@@ -1,4 +1,5 @@
-"""OpenVLA in real vLLM: the actions of the native port, with the published towers and a tiny language model."""
+"""OpenVLA in real vLLM: the actions of the native port, with the published towers and a tiny
+language model."""
 
 import copy
 from collections.abc import Callable

@@ -1,4 +1,5 @@
-"""Replies of real vLLM: token for token those of transformers, in float32 and greedy, for all families."""
+"""Replies of real vLLM: token for token those of transformers, in float32 and greedy, for all
+families."""
 
 from collections.abc import Callable
 from typing import Any
@@ -87,7 +88,8 @@ def test_a_stop_string_ends_and_cuts_the_reply_where_transformers_does(
     start: Start, in_process: Start, frames: list[FrameRef]
 ) -> None:
     ours, theirs, turns = start(), in_process("qwen2.5-vl"), user(frames[0], "Where?")
-    # An untrained model writes halves of characters, too, which vLLM holds back and transformers decodes.
+    # An untrained model writes halves of characters, too, which vLLM holds back and transformers
+    # decodes.
     plain = [letter for letter in theirs.answer(turns, up_to(12)).text if letter.isascii()]
     for stop in (plain[2], plain[-1], "never"):
         replies = [
