@@ -26,11 +26,10 @@ __all__ = [
 ]
 
 _LONGEST = 200  # characters of another library's message
-_LONGEST_MESSAGE, _HEAD, _TAIL = (
-    1000,
-    650,
-    300,
-)  # characters of a message of ours, and of its ends if it is longer
+# characters of a message of ours, and of its ends if it is longer
+_LONGEST_MESSAGE = 1000
+_HEAD = 650
+_TAIL = 300
 _LINE_BREAKS = {
     ord(letter): repr(letter)[1:-1] for letter in "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
 }

@@ -86,7 +86,8 @@ def mean_over_clusters(values: Sequence[float]) -> MeanEstimate:
 
 
 def _with_t_interval(totals: np.ndarray, sizes: np.ndarray) -> MeanEstimate:
-    n, n_clusters = int(sizes.sum()), len(sizes)
+    n = int(sizes.sum())
+    n_clusters = len(sizes)
     mean = float(totals.sum() / n)
     if n_clusters < 2:
         return MeanEstimate(mean, None, None, None, n, n_clusters)
@@ -118,7 +119,8 @@ def _effective_size(estimate: MeanEstimate) -> float:
     """
     # If each cluster is right or wrong as a whole, a cluster counts as one question.
     worst = estimate.n / estimate.n_clusters
-    variance, stderr = estimate.mean * (1 - estimate.mean), estimate.stderr or 0.0
+    variance = estimate.mean * (1 - estimate.mean)
+    stderr = estimate.stderr or 0.0
     # At least 1: clusters that happen to be more alike than chance are no evidence for more than
     # `n` questions.
     measured = max(1.0, stderr**2 * estimate.n / variance) if variance > 0 else worst

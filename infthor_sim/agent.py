@@ -10,7 +10,9 @@ __all__ = ["AGENT_HEIGHT", "CAMERA_HEIGHT", "CROUCH", "MAX_DOWN", "MAX_UP", "Age
 
 AGENT_HEIGHT = 0.9009992  # agent.y of AI2-THOR's default agent on a floor at 0
 CAMERA_HEIGHT = 0.675  # camera above agent.y, fitted to the boxes recorded in ALFRED
-MAX_DOWN, MAX_UP = 60.0, 30.0  # degrees that the camera tilts below and above the horizon
+# degrees that the camera tilts below and above the horizon
+MAX_DOWN = 60.0
+MAX_UP = 30.0
 CROUCH = 0.35  # metres that crouching lowers the camera
 
 

@@ -17,18 +17,21 @@ def slice_object(world: World, target: SimObject) -> list[SimObject]:
 
     Their ids are the old one's and `|AppleSliced_1` and so on, as in AI2-THOR.
     """
-    name, count = target.type.slice_type, target.type.slices
+    name = target.type.slice_type
+    count = target.type.slices
     owner = None if target.parent is None else world.objects[target.parent]
     axis = _slicing_axis(world, target)
     length = float(target.box_size[axis])
     size = target.box_size.copy()
     size[axis] = length / count
-    middle, matrix = target.center, yaw_matrix(float(target.rotation[1]))
+    middle = target.center
+    matrix = yaw_matrix(float(target.rotation[1]))
     world.remove(target)
     pieces = []
     for number in range(1, count + 1):
         piece = target.duplicate(f"{target.object_id}|{name}_{number}")
-        piece.type, piece.name = type_named(name), f"{target.name}_{name}_{number}"
+        piece.type = type_named(name)
+        piece.name = f"{target.name}_{name}_{number}"
         piece.box_size, piece.box_center, piece.asset_id = size.copy(), np.zeros(3), ""
         offset = np.zeros(3)
         offset[axis] = (number - 0.5) * length / count - length / 2
@@ -90,7 +93,8 @@ def apply_sources(world: World) -> None:
 def _pour(world: World, source: SimObject) -> None:
     for item in world.children(source):
         if item.type.fillable and item.state.fill_liquid is None:
-            item.state.fill_liquid, item.state.temperature = source.type.pours, "Hot"
+            item.state.fill_liquid = source.type.pours
+            item.state.temperature = "Hot"
             world.mark_changed(item)
 
 

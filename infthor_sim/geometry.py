@@ -37,14 +37,12 @@ def euler_matrix(rotation: Sequence[float] | Array) -> Array:
     """Return the rotation matrix (3, 3) of Unity's Euler angles (x, y, z) in degrees: first z, then
     x, then y."""
     x, y, z = (math.radians(float(a)) for a in rotation)
-    cx, sx, cy, sy, cz, sz = (
-        math.cos(x),
-        math.sin(x),
-        math.cos(y),
-        math.sin(y),
-        math.cos(z),
-        math.sin(z),
-    )
+    cx = math.cos(x)
+    sx = math.sin(x)
+    cy = math.cos(y)
+    sy = math.sin(y)
+    cz = math.cos(z)
+    sz = math.sin(z)
     return np.array(
         [
             [cy * cz + sy * sx * sz, -cy * sz + sy * sx * cz, sy * cx],
@@ -65,9 +63,11 @@ def matrix_euler(matrix: Array) -> Array:
     or down, z is 0."""
     x = math.asin(min(max(-float(matrix[1, 2]), -1.0), 1.0))  # clamped, as rounding may exceed 1
     if abs(math.cos(x)) < _VERTICAL:
-        y, z = math.atan2(-matrix[2, 0], matrix[0, 0]), 0.0
+        y = math.atan2(-matrix[2, 0], matrix[0, 0])
+        z = 0.0
     else:
-        y, z = math.atan2(matrix[0, 2], matrix[2, 2]), math.atan2(matrix[1, 0], matrix[1, 1])
+        y = math.atan2(matrix[0, 2], matrix[2, 2])
+        z = math.atan2(matrix[1, 0], matrix[1, 1])
     angles: Array = np.round(np.degrees(np.array([x, y, z])), 6) % 360.0
     return angles
 
@@ -87,7 +87,8 @@ def corners(center: Array, size: Array, rotation: Array | None = None) -> Array:
 def cross(first: Array, second: Array) -> Array:
     """Return cross products (n, 3) of vectors (n, 3); for few of them much faster than numpy's
     own."""
-    (ax, ay, az), (bx, by, bz) = first.T, second.T
+    (ax, ay, az) = first.T
+    (bx, by, bz) = second.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 

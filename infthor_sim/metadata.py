@@ -37,7 +37,10 @@ class Outcome:
     """
 
     def __init__(self, action: str, error: str = "", code: str = "", value: Any = None) -> None:
-        self.action, self.error, self.code, self.value = action, error, code, value
+        self.action = action
+        self.error = error
+        self.code = code
+        self.value = value
 
     def fields(self) -> dict[str, Any]:
         """Return the metadata's fields about the last action."""
@@ -53,7 +56,8 @@ class Outcome:
 def object_metadata(item: SimObject) -> dict[str, Any]:
     """Return all fields of one object but those that depend on the agent: `visible`,
     `isInteractable`, `distance`."""
-    abilities, state = item.type, item.state
+    abilities = item.type
+    state = item.state
     movable = abilities.pickupable or abilities.moveable
     return {
         "name": item.name,
@@ -106,7 +110,8 @@ def object_metadata(item: SimObject) -> dict[str, Any]:
 def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
     """Return the fields of the agent, of the scene and of the last action: all but `objects` and
     `colors`."""
-    world, agent = sim.world, sim.world.agent
+    world = sim.world
+    agent = sim.world.agent
     held = None if world.held is None else world.objects[world.held]
     low, high = world.scene_bounds()
     pose = _hand_pose(world)
@@ -168,7 +173,8 @@ def _hand_pose(world: World) -> dict[str, Any]:
         return dict.fromkeys(
             ("position", "rotation", "localPosition", "localRotation"), round_xyz(np.zeros(3))
         )
-    agent, hand = world.agent, world.hand
+    agent = world.agent
+    hand = world.hand
     camera = agent.camera_matrix()
     return {
         "position": round_xyz(agent.camera_position() + camera @ hand.offset),

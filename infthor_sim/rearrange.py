@@ -135,9 +135,11 @@ class _Templates:
 
 def _unused_id(world: World, object_type: str, position: Array) -> str:
     base = object_id(object_type, position)
-    number, unused = 1, base
+    number = 1
+    unused = base
     while unused in world.objects:
-        unused, number = f"{base}|{number}", number + 1
+        unused = f"{base}|{number}"
+        number = number + 1
     return unused
 
 

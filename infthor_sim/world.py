@@ -202,7 +202,8 @@ class World:
                 usual place.
         """
         if not keep_grip:
-            self.grip, self.hand = None, _HAND
+            self.grip = None
+            self.hand = _HAND
         if self.held is not None:
             self.set_pose(self.objects[self.held], *self._held_pose(self.objects[self.held]))
         if self.arm is not None:
@@ -253,7 +254,8 @@ class World:
         """Move the hand to a pose in the camera's frame; what it holds moves and turns as it
         does."""
         assert self.held is not None
-        item, camera = self.objects[self.held], self.agent.camera_matrix()
+        item = self.objects[self.held]
+        camera = self.agent.camera_matrix()
         offset = (
             camera.T @ (item.position - self.agent.camera_position())
             + hand.offset

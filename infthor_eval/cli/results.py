@@ -54,7 +54,8 @@ def read_run_results(folder: Path) -> RunResults:
     """
     header = read_header(folder)
     suite = find_suite(header.suite)
-    log, results = read_shards(folder, suite.records.decoder()), read_results(folder)
+    log = read_shards(folder, suite.records.decoder())
+    results = read_results(folder)
     summary = RunSummary(header, suite.summarise(header, log.records))
     return RunResults(folder, suite, summary, log.usage, results.n_missing if results else None)
 

@@ -77,7 +77,8 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
             UsageError: a task has no trajectories or no episodes, or an option does not fit.
             DataError: a task file is malformed, or none of its trajectories can be used.
         """
-        self.seed, self.options = request.seed, request.options
+        self.seed = request.seed
+        self.options = request.options
         self.tasks: Mapping[str, K] = {
             file.name: read_task(file, request) for file in request.tasks
         }

@@ -6,7 +6,9 @@ import msgspec
 
 __all__ = ["DONE", "NOT_ATTEMPTED", "EpisodeRecord", "P"]
 
-DONE, NOT_ATTEMPTED = "done", "not attempted"  # two of the ways in which an episode ends
+# two of the ways in which an episode ends
+DONE = "done"
+NOT_ATTEMPTED = "not attempted"
 
 
 class EpisodeRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -92,7 +92,8 @@ def restore_trajectory(
     """
     task = recorded.records[0].task
     config = recorded.run.config.tasks[task]
-    digest, bundled = config.trajectories.get(recorded.trajectory), config.settings.get("bundled")
+    digest = config.trajectories.get(recorded.trajectory)
+    bundled = config.settings.get("bundled")
     available, trajectory = find_recorded_trajectory(
         task, recorded.trajectory, digest, data, bundled, read
     )
@@ -159,7 +160,8 @@ class EpisodeReplay(ABC, Generic[P, F]):
     def _replay(self, record: UnitRecord[P]) -> Iterator[F]:
         episode = self._begin(record)
         yield self._frame(record, 0, episode.observe(), "")
-        steps, differs = record.payload.steps, False
+        steps = record.payload.steps
+        differs = False
         for number, step in enumerate(steps, 1):
             difference = episode.repeat(step, is_last=number == len(steps))
             # Once the worlds differ all later steps may differ too, so the first difference alone

@@ -46,7 +46,8 @@ class EpisodeRunner(Generic[E, P]):
     def __init__(self, simulator: Simulator, build: Callable[[], E]) -> None:
         """Take the trajectory's simulator, and what builds the environment, which restores the
         scene."""
-        self._simulator, self._build = simulator, build
+        self._simulator = simulator
+        self._build = build
         self._environment: E | None = None
 
     @property
@@ -66,7 +67,8 @@ class EpisodeRunner(Generic[E, P]):
     ) -> UnitRecord[P]:
         """Run an episode and return its record, also of an error; `run` is repeated if the
         simulator fails for good."""
-        self.begun, self.usage = None, NOTHING
+        self.begun = None
+        self.usage = NOTHING
         start = time.perf_counter()
         try:
             result, faults = with_retries(self._simulator, run, self._drop_environment)

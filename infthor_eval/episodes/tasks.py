@@ -37,7 +37,9 @@ class EpisodeTask(ABC, Generic[S, T]):
             UsageError: there are no trajectories.
             DataError: none of them can be used.
         """
-        self.file, self.name, self.settings = file, file.name, settings
+        self.file = file
+        self.name = file.name
+        self.settings = settings
         self.trajectories: TrajectorySet[T] = find_trajectories(
             request.data, settings.bundled, read
         )

@@ -86,7 +86,8 @@ def _check_members(
     tar: tarfile.TarFile, archive: Path, top: str, max_bytes: int
 ) -> list[tarfile.TarInfo]:
     """Return the members of an archive, all of which are safe to unpack."""
-    members, total = [], 0
+    members = []
+    total = 0
     seen: set[PurePosixPath] = set()
     for member in tar:
         path = PurePosixPath(member.name)

@@ -56,7 +56,8 @@ def read_rows(
         for cells in reader:
             if not cells:
                 continue
-            row, problem = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False)), None
+            row = dict.fromkeys(header, "") | dict(zip(header, cells, strict=False))
+            problem = None
             broken = next(
                 (name for name, cell in row.items() if "\n" in cell or "\r" in cell), None
             )

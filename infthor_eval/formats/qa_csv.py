@@ -59,7 +59,8 @@ def write_questions(path: Path, questions: Iterable[Question]) -> None:
 
 def encode_questions(questions: Iterable[Question]) -> bytes:
     """Return the content of a question file."""
-    questions, text = list(questions), io.StringIO(newline="")
+    questions = list(questions)
+    text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     are_published = any(item.published for item in questions)
     writer.writerow([*_COLUMNS, _TYPE, _ABSENCE, *(_PUBLISHED if are_published else ())])
@@ -79,7 +80,8 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
 
 def _question_or_reason(row: CsvRow, path: Path, file: str | None) -> Question | SkippedQuestion:
     # The file's name alone, without its folder: reasons are in a run's identity.
-    place, cells = f"{path.name}, line {row.line}", row.cells
+    place = f"{path.name}, line {row.line}"
+    cells = row.cells
     try:
         if row.problem is not None:
             raise DataError(row.problem)

@@ -129,7 +129,8 @@ def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
         with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
             left = FILE_MB.value * _MB
             while line := file.readline(LINE_MB.value * _MB + 1):
-                number, left = number + 1, left - len(line)
+                number = number + 1
+                left = left - len(line)
                 if len(line) > LINE_MB.value * _MB:
                     raise DataError(
                         f"{path}, line {number}: is longer than {LINE_MB.value} MiB; {LINE_MB.hint}"

@@ -38,14 +38,16 @@ def claim_for_simulator(root: Path, simulator: str) -> None:
         DataError: another simulator, or another version of this package, has rendered the existing
             frames.
     """
-    path, version = root / _FILE, infthor_eval.__version__
+    path = root / _FILE
+    version = infthor_eval.__version__
     if not path.exists():
         info = {"format": FORMAT, "simulator": simulator, "infthor_eval": version}
         with wrap_errors(f"{path}: cannot be written", "make room, or give another folder"):
             path.write_text(json.dumps(info) + "\n", encoding="utf-8")
         return
     info = _read(path)
-    theirs, wrote = info.get("simulator"), info.get("infthor_eval")
+    theirs = info.get("simulator")
+    wrote = info.get("infthor_eval")
     if theirs != simulator:
         raise DataError(
             f"{root}: its frames are of the {theirs} simulator; give another folder for the "

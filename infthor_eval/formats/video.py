@@ -145,7 +145,8 @@ def _header(path: Path) -> tuple[float, int]:
 
     film = cv2.VideoCapture(str(path))
     try:
-        film_fps, promised = film.get(cv2.CAP_PROP_FPS), int(film.get(cv2.CAP_PROP_FRAME_COUNT))
+        film_fps = film.get(cv2.CAP_PROP_FPS)
+        promised = int(film.get(cv2.CAP_PROP_FRAME_COUNT))
         if not film.isOpened() or not film_fps > 0:
             raise DataError(f"{path}: not a video that OpenCV can decode; {_HINT}")
     finally:
@@ -157,7 +158,9 @@ def _store(path: Path, positions: Collection[int], folder: Path) -> int:
     """Store the frames at these positions; return the number of frames of the film."""
     import cv2
 
-    film, wanted, n_frames = cv2.VideoCapture(str(path)), set(positions), 0
+    film = cv2.VideoCapture(str(path))
+    wanted = set(positions)
+    n_frames = 0
     try:
         while film.grab():
             if n_frames in wanted:

@@ -127,7 +127,8 @@ class _Factory:
     # -- the whole trajectory
 
     def long_enough(self) -> bool:
-        draft, settings = self._draft, self._settings
+        draft = self._draft
+        settings = self._settings
         return draft.length.low >= settings.min_steps and draft.n_subgoals >= settings.min_subgoals
 
     def result(self) -> GeneratedTrajectory:
@@ -245,7 +246,8 @@ class _Factory:
                 self._no_further_task("choose another scene or seed or a higher --max-fail")
             )
         self._note_longest()
-        before, n_before = self._draft.length, self._draft.n_subgoals
+        before = self._draft.length
+        n_before = self._draft.n_subgoals
         n_to_drop = min(2**self._n_roll_backs, max(1, n_before - 1))
         while self._draft.n_tasks and n_before - self._draft.n_subgoals < n_to_drop:
             self._draft.drop_last_task()
@@ -294,7 +296,8 @@ class _Factory:
         objection = self._objection(task, operators)
         if objection is not None:
             return self._failed(task, _Outcome(objection, executed=False))
-        mark, start = self._simulator.mark(), self._draft.length
+        mark = self._simulator.mark()
+        start = self._draft.length
         outcome = self._execute(operators)
         if outcome.failure is None:
             outcome = _Outcome(_unmet_goal(task, self._simulator), outcome.executed)

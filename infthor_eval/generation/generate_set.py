@@ -90,7 +90,8 @@ class GeneratedSet:
     def summary(self) -> GenerationSummary:
         """Return the numbers of the set."""
         statistics = self.statistics
-        tried, accepted = statistics.tried, statistics.accepted
+        tried = statistics.tried
+        accepted = statistics.accepted
         return GenerationSummary(
             trajectories=len(self.paths),
             resumed=self.resumed,

@@ -34,7 +34,8 @@ def intermediate_views(
 
 def _interpolate(start: AgentPose, end: AgentPose, share: float) -> AgentPose:
     turn = (end.rotation - start.rotation + 180.0) % 360.0 - 180.0  # the shorter way round
-    one, other = start.position, end.position
+    one = start.position
+    other = end.position
     return AgentPose(
         Vector(
             one.x + share * (other.x - one.x),

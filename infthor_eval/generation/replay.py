@@ -137,7 +137,8 @@ class _Run:
         self._grounding = Grounding(simulator.view)
 
     def act(self, index: int, low: LowAction) -> None:
-        before, api = self._simulator.view, low.api_action
+        before = self._simulator.view
+        api = low.api_action
         text = str(text_of(api.action, api.object_id, api.receptacle_id))
         target, error = self._call(index, low, before)
         if error is None:
@@ -158,7 +159,8 @@ class _Run:
             receptacle=target if putting else None,
         )
         # Set here, as an action that could not be called at all has no reply of the simulator.
-        step.success, step.error = error is None, error
+        step.success = error is None
+        step.error = error
 
     def _call(
         self, index: int, low: LowAction, before: SimulatorView

@@ -70,7 +70,8 @@ class Rollout:
         self._inside(holder, lambda: self._interact(operator.name, item))
 
     def _put(self, operator: Operator) -> None:
-        item, receptacle = self._resolve(operator.item), self._resolve(operator.receptacle or "")
+        item = self._resolve(operator.item)
+        receptacle = self._resolve(operator.receptacle or "")
         outer = self._closed_around(receptacle)  # as a drawer with the pan
         self._walker.go([outer or receptacle], inside=receptacle if outer else None)
         self._begin("PutObject", item, receptacle)
@@ -83,7 +84,8 @@ class Rollout:
         self._interact("ToggleObjectOn", operator.item)
 
     def _clean(self, operator: Operator) -> None:
-        item, basin = self._resolve(operator.item), operator.receptacle or ""
+        item = self._resolve(operator.item)
+        basin = operator.receptacle or ""
         faucet = self._nearest("Faucet", basin)
         self._walker.go([basin, faucet])
         self._begin("CleanObject", item, basin)
@@ -93,7 +95,8 @@ class Rollout:
         self._interact("PickupObject", item)
 
     def _heat_or_cool(self, operator: Operator) -> None:
-        item, appliance = self._resolve(operator.item), operator.receptacle or ""
+        item = self._resolve(operator.item)
+        appliance = operator.receptacle or ""
         self._walker.go([appliance])
         self._begin(operator.name, item, appliance)
         self._inside(appliance, lambda: self._interact("PutObject", item, appliance))

@@ -9,7 +9,10 @@ from infthor_eval.household.tasks import SAMPLED, TaskType
 
 __all__ = ["MAX_FAIL", "MIN_STEPS", "MIN_SUBGOALS", "TrajectorySettings"]
 
-MIN_STEPS, MIN_SUBGOALS, MAX_FAIL = 300, 10, 20  # values of the paper's Algorithm 1
+# values of the paper's Algorithm 1
+MIN_STEPS = 300
+MIN_SUBGOALS = 10
+MAX_FAIL = 20
 
 
 @dataclass(frozen=True)

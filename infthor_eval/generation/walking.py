@@ -41,7 +41,8 @@ class Walker:
         viewpoint = self._viewpoint(shown, inside)
         if self._moves(viewpoint) == []:
             return
-        (x, z), facing = viewpoint.pose.cell, viewpoint.pose.facing
+        (x, z) = viewpoint.pose.cell
+        facing = viewpoint.pose.facing
         location = f"loc|{x}|{z}|{facing // _TURN}|{viewpoint.horizon}"
         action = PlannerAction("GotoLocation", location=location, object_id=target.object_id)
         self._trace.begin([compact_name(target.object_type)], action)

@@ -55,7 +55,8 @@ def dataset(**config: Any) -> dict[str, Any]:
     """
     from datasets import Dataset
 
-    task_samples, pixels = find_samples(config), not model_takes_references()
+    task_samples = find_samples(config)
+    pixels = not model_takes_references()
     if not task_samples.samples:
         counts = Counter(item.reason for item in task_samples.skipped).most_common(3)
         reasons = "; ".join(f"{reason} ({n})" for reason, n in counts) or "its files are empty"

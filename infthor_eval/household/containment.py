@@ -30,7 +30,8 @@ def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
     An object in a bowl is not directly in the cabinet around the bowl. If furniture is nested (a
     drawer in a dresser), every piece that the simulator reports counts.
     """
-    item, holder = view.objects.get(object_id), view.objects.get(receptacle_id)
+    item = view.objects.get(object_id)
+    holder = view.objects.get(receptacle_id)
     if item is None or holder is None:
         return False
     parents = set(item.parent_receptacles or ())
@@ -86,5 +87,6 @@ def _volume(item: ThorObject) -> float:
 def _within(world: Mapping[str, ObjectState], inner: str, outer: str) -> bool:
     if outer in world[inner].parents:
         return True
-    one, other = world[inner].type, world[outer].type
+    one = world[inner].type
+    other = world[outer].type
     return canonical_type(one) == canonical_type(other) and one.endswith("Basin")

@@ -123,7 +123,8 @@ def _n_placed(task: Task, room: SymbolicRoom, state: State) -> int:
     """
     where = dict(state.where)
     treated = _treated_items(task, state)
-    targets, count = task.targets, Counter[str]()
+    targets = task.targets
+    count = Counter[str]()
     for item, parent in state.where:
         if room.types[item] not in targets or (treated is not None and item not in treated):
             continue

@@ -140,7 +140,8 @@ class _Problem:
             yield Operator("ToggleObject", state.at), replace(state, lit=state.lit | {state.at})
 
     def _relevant_places(self, items: set[str], where: dict[str, str]) -> list[str]:
-        room, task = self._room, self._task
+        room = self._room
+        task = self._task
         types = {task.receptacle, task.light, APPLIANCE.get(task.task_type)}
         needed = {place for place in room.places if room.types[place] in types}
         needed |= {

@@ -34,7 +34,9 @@ _MAX_TRIALS = 30
 _EXTRA_TRIALS = (
     4  # trials after the first success, for a viewpoint with the object well inside the frame
 )
-_MARGIN, _SIDE = 15, 300  # margin and width of the frame, pixels
+# margin and width of the frame, pixels
+_MARGIN = 15
+_SIDE = 300
 _NO_IMAGE: dict[str, Any] = {
     "renderImage": False
 }  # the instance image is enough to tell what is in the frame
@@ -74,7 +76,8 @@ def find_viewpoint(
     start = simulator.view
     focus = start.objects[inside or shown[0]]
     distances = grid.distances(grid_pose_of(start.agent, grid))
-    best, trials_left = None, _EXTRA_TRIALS
+    best = None
+    trials_left = _EXTRA_TRIALS
     for viewpoint in list(_candidates(start, grid, focus, distances))[:_MAX_TRIALS]:
         view = _teleport(simulator, grid, start, viewpoint)
         qualifies = view.success and _shows(view, shown, min_pixels)

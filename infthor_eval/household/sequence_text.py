@@ -27,7 +27,9 @@ __all__ = [
 ]
 
 _Item = TypeVar("_Item")
-ACT, _PLAN, _GOAL = "<|act|>", "<|plan|>", "<|goal|>"
+ACT = "<|act|>"
+_PLAN = "<|plan|>"
+_GOAL = "<|goal|>"
 MARKS = (ACT, _PLAN, _GOAL)  # special tokens of models that are trained on sequences
 
 # In the order in which the published script looks for them in a sub-goal's name.
@@ -80,7 +82,8 @@ def _natural_plan(high: HighAction) -> str:
 
 
 def _published_plan(high: HighAction) -> str:
-    kind, args = high.discrete_action.action, high.discrete_action.args
+    kind = high.discrete_action.action
+    args = high.discrete_action.args
     template = next((text for name, text in _PLANS.items() if name in kind), None)
     names = _published_names(high)
     if template is None or template == _PLANS["End"]:
@@ -101,7 +104,8 @@ def _published_plan(high: HighAction) -> str:
 def _published_names(high: HighAction) -> list[str | None]:
     """Return the names of object and receptacle; PutObject without an object takes both from its
     arguments."""
-    action, planner = high.discrete_action, high.planner_action
+    action = high.discrete_action
+    planner = high.planner_action
     names: list[str | None] = [None, None]
     if planner.object_id is None and action.action == "PutObject":
         args = action.args if isinstance(action.args, list) else []

@@ -110,7 +110,8 @@ def task_of(recorded: SubTask) -> Task:
         DataError: the goal is missing or of an unknown type, or an object type that it needs is
             missing.
     """
-    info, params = recorded.task_info, recorded.pddl_params
+    info = recorded.task_info
+    params = recorded.pddl_params
     task_type = _task_type(info.goal)
     if task_type == TaskType.PUT_AWAY:
         # Its parameters are those of the task before it; the object is the movable one, and none is
@@ -121,7 +122,8 @@ def task_of(recorded: SubTask) -> Task:
                 "types"
             )
         return Task(task_type, modern_type(info.movable), modern_type(info.receptacle))
-    examines, stacks = task_type == TaskType.EXAMINE, task_type == TaskType.STACK
+    examines = task_type == TaskType.EXAMINE
+    stacks = task_type == TaskType.STACK
     pickup = _object_type(task_type, params, "object_target", info.pickup)
     whole = pickup.removesuffix("Sliced")
     return Task(

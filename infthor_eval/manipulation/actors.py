@@ -63,7 +63,8 @@ class PolicyActor:
 
     def __init__(self, policy: Policy, *, blank: bool) -> None:
         """Take a policy; `blank` shows it grey frames instead of the actual ones."""
-        self._policy, self._blank = policy, blank
+        self._policy = policy
+        self._blank = blank
 
     def begin(self, situation: ArmSituation) -> None:
         """See `ArmActor`."""
@@ -123,7 +124,8 @@ class _StillActor:
 
 class _RandomArmActor:
     def begin(self, situation: ArmSituation) -> None:
-        self._random, self._max_step = random.Random(situation.seed), situation.max_step
+        self._random = random.Random(situation.seed)
+        self._max_step = situation.max_step
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
         x, y, z = (self._random.uniform(-self._max_step, self._max_step) for _ in range(3))

@@ -127,8 +127,11 @@ class ArmEnvironment:
                 the hand.
             SimulatorError: the simulator fails.
         """
-        self.episode, self.start = episode, start
-        self._conversion, self._grasp, self._frames = conversion, grasp, frames
+        self.episode = episode
+        self.start = start
+        self._conversion = conversion
+        self._grasp = grasp
+        self._frames = frames
         view = self._simulator.rewind(self._initial, exactly=True)
         missing = {start.object_id, start.receptacle_id} & set(
             transfer(self._simulator, start.view)
@@ -172,7 +175,8 @@ class ArmEnvironment:
         if isinstance(action, ArmDelta):
             # After the movement, as the sphere holds other objects then.
             gripper_calls, gripper_refusals = self._run(self._gripper(action))
-            calls, refusals = [*calls, *gripper_calls], [*refusals, *gripper_refusals]
+            calls = [*calls, *gripper_calls]
+            refusals = [*refusals, *gripper_refusals]
         released = any(call["action"] == "ReleaseObject" for call in calls)
         ended = self._ending(released)
         self._is_over = ended is not None
@@ -198,7 +202,8 @@ class ArmEnvironment:
         return answer.result if answer.success else None
 
     def _run(self, calls: Iterable[Call]) -> tuple[list[Call], list[str]]:
-        done, refusals = [], []
+        done = []
+        refusals = []
         for call in calls:
             view = self._simulator.step(**call)
             done.append(call)
@@ -301,7 +306,8 @@ def arm_of(view: SimulatorView) -> ArmState:
 def _teleport_to_hand(item: ThorObject, arm: ArmState, share: float) -> Call:
     """Return the call that brings an object, turned as it is, before the palm (0) or to the
     sphere's centre (1)."""
-    wrist, center = point_of(arm.wrist), point_of(arm.sphere_center)
+    wrist = point_of(arm.wrist)
+    center = point_of(arm.sphere_center)
     length = math.dist(wrist, center) or 1.0
     ahead = offset(wrist, center)
     # Half the extent of the object's box along the hand's direction.

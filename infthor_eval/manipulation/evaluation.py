@@ -64,7 +64,9 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
     ) -> None:
         """Take the work, what creates the actor of a trajectory, and whether actors look at
         frames."""
-        self._tasks, self._create_actor, self._sees = evaluation.tasks, create_actor, sees
+        self._tasks = evaluation.tasks
+        self._create_actor = create_actor
+        self._sees = sees
         self._experts = evaluation.simulators(image=False, instances=False)
         by_camera = {
             task.settings.camera: task.settings.camera_options for task in self._tasks.values()
@@ -125,7 +127,8 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
 
     def to_sample(self, record: UnitRecord[ArmRecord]) -> UnitSample:
         """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
-        payload, settings = record.payload, self._tasks[record.task].settings
+        payload = record.payload
+        settings = self._tasks[record.task].settings
         return UnitSample(
             number=self._numbers[record.key],
             doc={"traj_id": record.cluster, "action": payload.index, "kind": payload.kind},

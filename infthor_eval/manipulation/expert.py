@@ -68,10 +68,12 @@ def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
     restore(simulator, trajectory.scene)
     grounding = Grounding(simulator.view)
     starts: dict[int, EpisodeStart] = {}
-    walked_from, walks = simulator.view.agent, False
+    walked_from = simulator.view.agent
+    walks = False
     for number, low in enumerate(trajectory.plan.low_actions):
         before = simulator.view
-        walked, walks = walks, low.api_action.action in _WALKING
+        walked = walks
+        walks = low.api_action.action in _WALKING
         if walks and not walked:
             walked_from = before.agent
         try:

@@ -50,7 +50,9 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         """Take a trajectory, the true states that its episodes begin in, and a simulator of an
         agent with an arm."""
         super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator))
-        self._states, self._actor, self._sees = states, actor, sees
+        self._states = states
+        self._actor = actor
+        self._sees = sees
         self._seed = f"{seed}/{trajectory.traj_id}"
 
     def run(self, task: ManipulationTask, episode: ArmEpisode) -> EpisodeResult[ArmRecord]:

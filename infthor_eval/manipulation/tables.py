@@ -53,7 +53,8 @@ def result_tables(runs: Sequence[RunSummary]) -> list[Table]:
 
 def _success_table(runs: Sequence[RunSummary]) -> Table:
     """Return the success by kind, with a row for each radius of a run's tasks."""
-    rows, notes = [], [*result_notes(runs)]
+    rows = []
+    notes = [*result_notes(runs)]
     for run in runs:
         named = list(run.summary.tasks.items())
         by_kind = [[item for item in named if item[1].kind == kind] for kind in ManipulationKind]

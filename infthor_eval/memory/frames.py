@@ -37,7 +37,8 @@ class FrameMemory(ABC):
 
     def begin(self, facts: TrajectoryFacts) -> None:
         """See `Memory`."""
-        self.facts, self.past = facts, []
+        self.facts = facts
+        self.past = []
 
     def observe(self, observation: Observation) -> None:
         """See `Memory`."""

@@ -32,7 +32,8 @@ class _Texts:
 
     def begin(self, facts: TrajectoryFacts) -> None:
         """See `Memory`."""
-        self.facts, self.past = facts, []
+        self.facts = facts
+        self.past = []
 
     def observe(self, observation: Observation) -> None:
         """See `Memory`."""
@@ -71,7 +72,8 @@ class Notes(_Texts):
         super().__init__()
         if window < 1 or tokens < 1:
             raise ValueError("window and tokens are whole numbers from 1")
-        self._window, self._tokens = window, tokens
+        self._window = window
+        self._tokens = tokens
 
     def recall(self, query: Query, budget: int | None) -> Recalled:
         """See `Memory`; one text, a line for each window."""
@@ -121,7 +123,8 @@ def _last_that_fit(lines: Sequence[str], budget: int | None) -> Sequence[str]:
 
 def _lines(steps: Sequence[Observation]) -> Iterator[str]:
     """Yield a line for each step that tells anything new."""
-    goal, before = None, ObjectLog()
+    goal = None
+    before = ObjectLog()
     for step in steps:
         said = [f"goal: {step.goal}"] if step.goal != goal and step.goal else []
         said += [step.action] if step.action else []
@@ -129,7 +132,8 @@ def _lines(steps: Sequence[Observation]) -> Iterator[str]:
         said += _news(before, log)
         if said:
             yield f"Step {step.number}: {'; '.join(said)}.\n"
-        goal, before = step.goal, log
+        goal = step.goal
+        before = log
 
 
 def _news(before: ObjectLog, now: ObjectLog) -> list[str]:

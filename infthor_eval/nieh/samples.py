@@ -140,11 +140,9 @@ def find_samples(config: Mapping[str, Any], limit: int | None = None) -> TaskSam
             words, or the set does not allow the ablation.
         DataError: the set cannot be read.
     """
-    context, settings, data = (
-        context_named(config["context"]),
-        ContextSettings.read(config),
-        find_set(**config),
-    )
+    context = context_named(config["context"])
+    settings = ContextSettings.read(config)
+    data = find_set(**config)
     check_prompt(config["context"], settings.prompt)
     frame_ablation = FrameAblation(settings.frames, settings.seed)
     frame_ablation.check(data)

@@ -138,7 +138,8 @@ def _largest_matching(
 
 
 def _matches_reference(response: str, gold: Answer) -> bool:
-    said, wanted = _normalise(response), _normalise(gold)
+    said = _normalise(response)
+    wanted = _normalise(gold)
     if _near(said, wanted) or _synonymous(said, wanted):
         return True
     if wanted == "yes" and "yes" in said[:4]:
@@ -155,7 +156,8 @@ def _matches_strict(response: str, gold: Answer) -> bool:
     if _is_number(wanted):
         said = _normalise(response)
         return _is_number(said) and float(said) == float(wanted)
-    said, wanted = _without_slice(plain_form(response.lower().strip())), _without_slice(wanted)
+    said = _without_slice(plain_form(response.lower().strip()))
+    wanted = _without_slice(wanted)
     return _near(said, wanted) or _synonymous(said, wanted)
 
 

@@ -10,7 +10,8 @@ __all__ = ["shown_clues"]
 def shown_clues(task_samples: TaskSamples, sample: Sample) -> ShownClues | None:
     """Return the clue frames that a sample shows; None for absences, and in a set without
     frames."""
-    data, question = task_samples.data, sample.question
+    data = task_samples.data
+    question = sample.question
     if question.absence or not data.has_frames:
         return None
     clues = clue_positions(data, question)

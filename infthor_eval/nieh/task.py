@@ -135,7 +135,8 @@ class NiehTask:
             video_input: True if the model is given films as videos, False if as images; None if it
                 sees nothing.
         """
-        samples, names = prepared.task_samples, prepared.metrics.names
+        samples = prepared.task_samples
+        names = prepared.metrics.names
         skipped = [
             {"question_id": i.question.id, "variant": i.variant, "reason": i.reason}
             for i in samples.skipped

@@ -36,7 +36,8 @@ class NiehUnit(Unit[NiehAnswer]):
         cls, task: str, task_samples: TaskSamples, sample: Sample, repeat: int = 1
     ) -> "NiehUnit":
         """Return the unit of a task's sample, with how much of its evidence is shown."""
-        question, knowledge = sample.question, visible_knowledge(task_samples.context_name)
+        question = sample.question
+        knowledge = visible_knowledge(task_samples.context_name)
         return cls(
             UnitKey(task, question.id, sample.variant, repeat),
             question.traj_id,

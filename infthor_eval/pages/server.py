@@ -93,14 +93,16 @@ def require_page_extra() -> None:
     Raises:
         UsageError: the extra `page` is not installed.
     """
-    problem, hint = "a page needs Starlette and uvicorn", "pip install 'infthor-eval[page]'"
+    problem = "a page needs Starlette and uvicorn"
+    hint = "pip install 'infthor-eval[page]'"
     with wrap_errors(problem, hint, catch=ImportError, raise_as=UsageError):
         import starlette  # noqa: F401
         import uvicorn  # noqa: F401
 
 
 def _listen(port: int) -> socket.socket:
-    problem, hint = f"--port {port}: cannot be had", "give another, or none for a free one"
+    problem = f"--port {port}: cannot be had"
+    hint = "give another, or none for a free one"
     with wrap_errors(problem, hint, catch=(OSError, OverflowError), raise_as=UsageError):
         return socket.create_server((_HOST, port))
 

@@ -124,7 +124,8 @@ def _check_reset(environment: Environment, plan: int) -> None:
 def _check_expert(environment: Environment, plan: int) -> None:
     """Check that the expert's actions complete a plan, and earn its highest possible reward."""
     _, info = environment.reset(plan)
-    earned, over = 0.0, False
+    earned = 0.0
+    over = False
     for action in environment.expert_actions(plan):
         outcome = environment.step(action.call)
         _check_outcome(outcome)
@@ -226,7 +227,8 @@ def _check_observation(observation: Observation) -> None:
     for key in view.inventory:
         _require(key in view.objects, f"{key}, which is held, is not among the objects")
     if view.frame is not None:
-        shape, kind = view.frame.shape, view.frame.dtype
+        shape = view.frame.shape
+        kind = view.frame.dtype
         _require(kind == np.uint8, f"a frame is of {kind}, not of bytes")
         _require(
             len(shape) == 3 and shape[2] == 3,

@@ -137,7 +137,8 @@ class PlanEnvironment:
         self.plans: Sequence[Plan] = plans_of(trajectory, words)
         self.tasks = tasks_of(trajectory)
         self._simulator = simulator
-        self._rules, self._words = rules or reward_rules("default"), words
+        self._rules = rules or reward_rules("default")
+        self._words = words
         self._max_steps = max_steps
         self._frames = frames or NoFrames()
         self.look_degrees = _look_degrees(trajectory)
@@ -181,7 +182,9 @@ class PlanEnvironment:
         expert_actions = self._expert.actions(plan)
         start, end = self._expert.start(plan), self._expert.start(plan + 1)
         view = self._simulator.rewind(start.mark, exactly=True)
-        self._plan, self._n_steps, self._treatments = present, 0, start.treatments
+        self._plan = present
+        self._n_steps = 0
+        self._treatments = start.treatments
         info: dict[str, Any] = {"n_expert": len(expert_actions), "expert_reward": None}
         if self._script is not None:
             scripted = self._script.plan(plan)
@@ -205,8 +208,10 @@ class PlanEnvironment:
                 it.
             SimulatorError: the simulator fails.
         """
-        present, view = self.plans[plan], self._simulator.view
-        self._plan, self._n_steps = present, 0
+        present = self.plans[plan]
+        view = self._simulator.view
+        self._plan = present
+        self._n_steps = 0
         info: dict[str, Any] = {"n_expert": len(self._expert.actions(plan)), "expert_reward": None}
         if self._script is not None:
             scripted = self._script.plan(plan)
@@ -223,7 +228,8 @@ class PlanEnvironment:
         self, plan: Plan, view: SimulatorView, treatments: Treatments, end: AgentPose
     ) -> float:
         """Begin a plan under the default rules, and return its highest possible reward."""
-        task, actions = self.tasks[plan.task].task, self._expert.actions(plan.index)
+        task = self.tasks[plan.task].task
+        actions = self._expert.actions(plan.index)
         grid = self._grid(plan, actions, view)
         target = self._target(plan, view, end, grid)
         self._preferred = _preferred_objects(target, view)
@@ -272,7 +278,8 @@ class PlanEnvironment:
         Raises:
             ExpertRefusedError: as `reset`.
         """
-        present, view = self.plans[plan], self._expert.start(plan).mark.view
+        present = self.plans[plan]
+        view = self._expert.start(plan).mark.view
         grounding = deepcopy(
             self._expert.grounding
         )  # it remembers its choices, and a picture must not decide any

@@ -51,7 +51,8 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
 
     def __init__(self, evaluation: PlansEvaluation, factory: ActorFactory) -> None:
         """Take the work, and what creates the subject's actors."""
-        self._tasks, self._factory = evaluation.tasks, factory
+        self._tasks = evaluation.tasks
+        self._factory = factory
         # Nothing is rendered that nobody looks at, and instance masks are needed for the state in
         # words alone.
         in_words = factory.sees and any(task.history.needs_state for task in self._tasks.values())
@@ -75,7 +76,8 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         if all(record is not None for record in known.values()):
             yield from (record for record in known.values() if record is not None)
             return
-        task, trajectory = self._tasks[group.units[0].key.task], group.units[0].trajectory
+        task = self._tasks[group.units[0].key.task]
+        trajectory = group.units[0].trajectory
         with self._simulators.one() as simulator, ScratchFolder() as folder:
             runner = PlanRunner(task, trajectory, self._factory, simulator, folder, self.seed)
             if task.final_form is not None:
@@ -103,7 +105,8 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         """Run the plans of a final task as the published scripts do, all of them even if some have
         records."""
         fingerprints, known = self._find_records(group, session)
-        tried, goes_on = 0, True
+        tried = 0
+        goes_on = True
         for unit in group.units:
             if not tried:
                 run: Callable[[], EpisodeResult[PlanRecord]] = partial(
@@ -128,7 +131,8 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
 
     def to_sample(self, record: UnitRecord[PlanRecord]) -> UnitSample:
         """See `infthor_eval.runs.BoundEvaluation.to_sample`."""
-        payload, task = record.payload, self._tasks[record.task]
+        payload = record.payload
+        task = self._tasks[record.task]
         return UnitSample(
             number=self._numbers[record.key],
             doc={

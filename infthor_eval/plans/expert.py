@@ -88,9 +88,13 @@ class Expert:
 
         `words` are those of actions; with `in_words` the past is also described in words.
         """
-        self._trajectory, self._plans, self._tasks, self._words = trajectory, plans, tasks, words
+        self._trajectory = trajectory
+        self._plans = plans
+        self._tasks = tasks
+        self._words = words
         self._watch: Callable[[Plan, Sequence[Replayed]], None] = lambda _, __: None
-        self._simulator, self._frames = simulator, frames
+        self._simulator = simulator
+        self._frames = frames
         restore(simulator, trajectory.scene)
         self.grounding = Grounding(simulator.view)
         self._starts = [PlanStart(simulator.mark(), frames.keep(simulator.view), Treatments())]
@@ -130,7 +134,8 @@ class Expert:
     def past(self, plan: int) -> Past:
         """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as
         `start` does."""
-        segment, present = self._open_segment(plan), self._plans[plan]
+        segment = self._open_segment(plan)
+        present = self._plans[plan]
         first = present.low[0]
         return Past(
             self._segments[:plan],
@@ -160,7 +165,8 @@ class Expert:
         """Replay the next plan; nothing of it is kept unless all its actions succeed."""
         start = self._starts[-1]
         steps = list(self._steps(plan, start))
-        mark, last = self._simulator.mark(), steps[-1]
+        mark = self._simulator.mark()
+        last = steps[-1]
         if self._log is not None:
             for number, step in zip(range(*plan.low), steps, strict=True):
                 self._log.record(step.view, step=number, action=step.action.text)
@@ -179,7 +185,8 @@ class Expert:
         )
 
     def _steps(self, plan: Plan, start: PlanStart) -> Iterator[Replayed]:
-        view, treatments = self._simulator.rewind(start.mark, exactly=True), start.treatments
+        view = self._simulator.rewind(start.mark, exactly=True)
+        treatments = start.treatments
         task = self._tasks[plan.task].task
         task_open = not goal_holds(task, view, treatments)
         for number in range(*plan.low):

@@ -142,7 +142,9 @@ def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
 def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
     """Return a task for each part of the trajectory; some files have the final task apart from the
     others."""
-    tasks, parts, final = trajectory.sub_tasks, trajectory.sub_trajs, trajectory.long_horizon_task
+    tasks = trajectory.sub_tasks
+    parts = trajectory.sub_trajs
+    final = trajectory.long_horizon_task
     if len(parts) == len(tasks) + 1 and final is not None:
         return [*tasks, final]
     if len(parts) != len(tasks):

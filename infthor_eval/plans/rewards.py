@@ -71,7 +71,10 @@ class PlanReward:
             ValueError: GotoLocation without a grid.
         """
         _require_feasible(target, start)
-        self._rules, self._target, self._task, self._start = rules, target, task, start
+        self._rules = rules
+        self._target = target
+        self._task = task
+        self._start = start
         self.treatments = treatments
         # The plan's own treatments are apart: an object that was washed before is to be washed
         # again by this plan.
@@ -90,8 +93,10 @@ class PlanReward:
         plan is over."""
         if self._is_over:
             raise ValueError("the plan is over; begin the next one")
-        action, object_id = call["action"], call.get("objectId")
-        rules, kind = self._rules, self._target.kind
+        action = call["action"]
+        object_id = call.get("objectId")
+        rules = self._rules
+        kind = self._target.kind
         # Before validity is looked at: an action that is not valid can treat an object
         # nevertheless.
         self.treatments = self.treatments.after(action, object_id, after)
@@ -110,7 +115,8 @@ class PlanReward:
         """Add the task's reward if its goal holds for the first time."""
         if not self._task_open or not goal_holds(self._task, after, self.treatments):
             return step
-        self._task_open, self.goal_reached = False, True
+        self._task_open = False
+        self.goal_reached = True
         return StepReward(step.reward + self._rules.task_done, step.done, step.failed)
 
     # -- the kinds; where they depart from the published functions is said in docs/plan-rewards.md
@@ -239,7 +245,8 @@ def max_reward(
         completes: the task if its goal can be reached in the plan; None if it cannot, or holds
             already.
     """
-    kind, per_success = target.kind, rules.rewards[target.kind]
+    kind = target.kind
+    per_success = rules.rewards[target.kind]
     most = per_success
     if kind == PlanKind.GOTO:
         most = _max_path_reward(rules, target, start, grid)
@@ -290,7 +297,9 @@ class _PathsToGoal:
     """The shortest paths to a pose."""
 
     def __init__(self, goal: GridPose, horizon: float, grid: Grid, look_degrees: float) -> None:
-        self._grid, self._horizon, self._look_degrees = grid, horizon, look_degrees
+        self._grid = grid
+        self._horizon = horizon
+        self._look_degrees = look_degrees
         self._distances = grid.distances_to(goal)
 
     def remaining(self, pose: AgentPose) -> float:

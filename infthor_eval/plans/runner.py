@@ -164,7 +164,8 @@ def _completed_record(begun: PlanRecord, acts: Sequence[tuple[Act, StepOutcome]]
 
 
 def _step_record(act: Act, outcome: StepOutcome) -> StepRecord:
-    info, reply = outcome.info, act.reply
+    info = outcome.info
+    reply = act.reply
     return StepRecord(
         reply=None if reply is None else reply.text,
         action=info.action,

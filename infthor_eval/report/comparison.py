@@ -186,7 +186,8 @@ def comparison_table(comparisons: Sequence[Comparison], first: str, second: str)
 
 def _row(comparison: Comparison, *, repeated: bool) -> Row:
     unit, factor = ("%", 100.0) if comparison.is_share else ("points", 1.0)
-    estimate, p = comparison.difference.estimate, comparison.difference.p
+    estimate = comparison.difference.estimate
+    p = comparison.difference.p
     low, high = (None if end is None else factor * end for end in (estimate.low, estimate.high))
     numbers = (
         f"{factor * comparison.first:.2f}",

@@ -85,7 +85,8 @@ class ReportRun:
 
     def main_score(self, record: UnitRecord[Any]) -> float:
         """Return the score that decides whether a unit is right, 1 being right."""
-        scores, main = self.suite.scores(record), self.presenter.main_metric
+        scores = self.suite.scores(record)
+        main = self.presenter.main_metric
         if main is None:
             return next(iter(scores.values()), 0.0)
         return scores.get(main, max(scores.values(), default=0.0))
@@ -127,7 +128,8 @@ def _read(
     folder: Path, header: RunHeader, name: str, suite: Suite, presenter: "Presenter"
 ) -> ReportRun:
     log = read_shards(folder, suite.records.decoder())
-    results, command = read_results(folder), read_stored_command(folder)
+    results = read_results(folder)
+    command = read_stored_command(folder)
     return ReportRun(
         folder=folder,
         label=_with_frames(name, header),

@@ -82,7 +82,8 @@ def _table_of(run: ReportRun) -> Table:
         float: pyarrow.float64(),
         bool: pyarrow.bool_(),
     }
-    name, suite = run.label, run.suite.name
+    name = run.label
+    suite = run.suite.name
     run_columns = (
         SampleColumn("run", str, lambda _: name),
         SampleColumn("suite", str, lambda _: suite),

@@ -37,10 +37,8 @@ def print_table(table: Table, on: Console) -> None:
             overflow="fold",
         )
     for row in table.rows:
-        cells, style = (
-            (Text(printable(cell)) for cell in row.cells),
-            "dim" if row.is_published else "",
-        )
+        cells = (Text(printable(cell)) for cell in row.cells)
+        style = "dim" if row.is_published else ""
         rich_table.add_row(*cells, style=style, end_section=row.ends_section)
     if table.notes:
         rich_table.caption = Text(

@@ -18,9 +18,7 @@ def check_config(header: RunHeader, form: type[msgspec.Struct]) -> None:
     Raises:
         DataError: names the run, and the place in its config.
     """
-    problem, hint = (
-        f"{header.name}: not the config of a run of {header.suite}",
-        "run the evaluation again",
-    )
+    problem = f"{header.name}: not the config of a run of {header.suite}"
+    hint = "run the evaluation again"
     with wrap_errors(problem, hint, catch=msgspec.ValidationError):
         msgspec.convert(header.config, form)

@@ -44,10 +44,8 @@ def decoding_of(given: Mapping[str, Any], seed: int, place: str) -> Decoding:
         raise UsageError(
             f"{place}: generation_kwargs: max_gen_toks is {limit!r}; it is a whole number of tokens"
         )
-    temperature, top_p = (
-        _temperature(given, place),
-        _number(given.get("top_p", 1.0), "top_p", place),
-    )
+    temperature = _temperature(given, place)
+    top_p = _number(given.get("top_p", 1.0), "top_p", place)
     asked = given.get("repetition_penalty")
     penalty = None if asked is None else _number(asked, "repetition_penalty", place)
     stop, choices = (_texts(given.get(name, ()), name, place) for name in ("until", "choices"))

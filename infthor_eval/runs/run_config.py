@@ -15,7 +15,8 @@ __all__ = ["as_json_values", "header_of", "run_config"]
 
 def header_of(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -> RunHeader:
     """Return the header of a run's journal."""
-    request, suite = run.request, run.suite
+    request = run.request
+    suite = run.suite
     code = {} if request.model in suite.baselines else adapter_identity(request.model)
     tasks = request.tasks
     ours = {"suite_code": dict(request.suite_code)} if request.suite_code else {}

@@ -183,7 +183,8 @@ def _choose_object(
     text: ActionText, meant: Sequence[ThorObject], preferred: Container[str]
 ) -> ThorObject:
     """Return the object of a text among those that its last name can mean."""
-    name, applies = text.names[-1], _APPLIES[text.action]
+    name = text.names[-1]
+    applies = _APPLIES[text.action]
     visible = [item for item in meant if item.visible]
     possible = [item for item in visible if applies(item)]
     if not visible:

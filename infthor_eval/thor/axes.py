@@ -40,9 +40,11 @@ def _matrix(rotation: Mapping[str, float]) -> NDArray[np.float64]:
 def _angles(matrix: NDArray[np.float64]) -> dict[str, float]:
     x = math.asin(max(-1.0, min(1.0, -matrix[1, 2])))
     if abs(matrix[1, 2]) > 1 - 1e-9:  # gimbal lock: y and z turn about the same axis, so z can be 0
-        y, z = math.atan2(-matrix[2, 0], matrix[0, 0]), 0.0
+        y = math.atan2(-matrix[2, 0], matrix[0, 0])
+        z = 0.0
     else:
-        y, z = math.atan2(matrix[0, 2], matrix[2, 2]), math.atan2(matrix[1, 0], matrix[1, 1])
+        y = math.atan2(matrix[0, 2], matrix[2, 2])
+        z = math.atan2(matrix[1, 0], matrix[1, 1])
     return {
         axis: round(math.degrees(angle) % 360, 6)
         for axis, angle in zip("xyz", (x, y, z), strict=True)

@@ -47,7 +47,8 @@ class Grounding:
         if chosen in view.objects:
             return chosen
         if object_id in view.objects:
-            self._chosen[object_id], self.distances[object_id] = object_id, 0.0
+            self._chosen[object_id] = object_id
+            self.distances[object_id] = 0.0
             return object_id
         object_type = modern_type(object_type_of(object_id))
         taken = set(self._chosen.values())

@@ -29,7 +29,8 @@ _WITHOUT_OBJECT = {
     *("MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight"),
     *("LookUp", "LookDown", "Crouch", "Stand", "Pass", "NoOp", "Done"),
 }
-_PUT, _TOGGLE = "PutObject", "ToggleObject"
+_PUT = "PutObject"
+_TOGGLE = "ToggleObject"
 
 
 def ground_published(text: str, objects: Iterable[ThorObject]) -> tuple[str | None, str | None]:

@@ -80,7 +80,8 @@ def _poses(
     for item in sorted(view.objects.values(), key=lambda item: item.name):
         spare[item.object_type].append(item.name)
     renamed: dict[str, str] = {}
-    poses, dropped = [], []
+    poses = []
+    dropped = []
     for pose in recorded:
         name = pose.name.removesuffix("(Clone)")
         if name not in known and name not in renamed:

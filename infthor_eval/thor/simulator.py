@@ -142,7 +142,9 @@ class Simulator:
             SceneError: the simulator refuses the scene.
             SimulatorError: the simulator cannot be started.
         """
-        self._scene, self._episode, self._failures = scene or self._scene, [], 0
+        self._scene = scene or self._scene
+        self._episode = []
+        self._failures = 0
         self._copies = {}
         while True:
             try:
@@ -175,7 +177,8 @@ class Simulator:
     def query(self, action: str, **arguments: Any) -> SimulatorView:
         """Run an action without lasting effect (`GetReachablePositions`) outside the episode;
         raises as `step` does."""
-        view, length = self._view, len(self._episode)
+        view = self._view
+        length = len(self._episode)
         reply = self.step(action, **arguments)
         del self._episode[length:]
         self._view = view

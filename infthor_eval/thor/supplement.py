@@ -68,7 +68,9 @@ def agent_path(trajectory: Trajectory) -> list[tuple[float, float]]:
     """Return the (x, z) positions, metres, of the agent if all actions succeed, including the
     first."""
     start = trajectory.scene.init_action
-    x, z, yaw = start.x, start.z, start.yaw
+    x = start.x
+    z = start.z
+    yaw = start.yaw
     path = [(_round(x), _round(z))]
     for low in trajectory.plan.low_actions:
         name = low.api_action.action

@@ -36,7 +36,8 @@ def recorded_segments(
         DataError: a task has no goal, a plan is of an unknown kind or cannot be said in these
             words, or an action has no frame.
     """
-    plans, tasks = plans_of(trajectory, words), tasks_of(trajectory)
+    plans = plans_of(trajectory, words)
+    tasks = tasks_of(trajectory)
     before: FrameRef | None = None
     after: dict[int, FrameRef] = {}
     for step, frame in zip(steps, frames, strict=True):
@@ -57,10 +58,8 @@ def recorded_segments(
             )
         begins = not segments or plans[plan.index - 1].task != plan.task
         goal = tasks[plan.task].text if begins else None
-        texts, shown = (
-            expert_texts(trajectory, plan, words),
-            [after[number] for number in range(*plan.low)],
-        )
+        texts = expert_texts(trajectory, plan, words)
+        shown = [after[number] for number in range(*plan.low)]
         segments.append(
             PlanSegment(
                 plan.text, goal, before, tuple(zip(texts, shown, strict=True)), plan.in_task
@@ -126,9 +125,11 @@ def _window_end(encoder: Encoder, segments: Sequence[PlanSegment], first: int, l
     def fits(end: int) -> bool:
         return n_tokens(encoder.pieces(segment_parts(restart_at(segments, first, end)))) <= limit
 
-    fitting, stride = first, 1
+    fitting = first
+    stride = 1
     while fitting + stride <= len(segments) and fits(fitting + stride):
-        fitting, stride = fitting + stride, 2 * stride
+        fitting = fitting + stride
+        stride = 2 * stride
     while stride:
         if fitting + stride <= len(segments) and fits(fitting + stride):
             fitting += stride

@@ -15,7 +15,9 @@ from infthor_eval.storage.files import prepare_folder, write_atomically
 
 __all__ = ["Checkpoints"]
 
-_WEIGHTS, _OPTIMIZER, _STATE = "model.safetensors", "optimizer.pt", "state.json"
+_WEIGHTS = "model.safetensors"
+_OPTIMIZER = "optimizer.pt"
+_STATE = "state.json"
 _HINT = "restore it, or remove the folder to restart"
 
 
@@ -70,7 +72,8 @@ class Checkpoints:
         last = places[-1]
         with wrap_errors(f"{last}: cannot be read", _HINT, catch=Exception):
             state = json.loads((last / _STATE).read_text(encoding="utf-8"))
-            step, about = int(state["step"]), dict(state["about"])
+            step = int(state["step"])
+            about = dict(state["about"])
         self._require_same(last, about)
         with wrap_errors(f"{last}: cannot be read", _HINT, catch=Exception):
             load_model(model, last / _WEIGHTS)

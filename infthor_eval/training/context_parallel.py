@@ -248,7 +248,8 @@ def _flash_attention(
 def _masked_attention(
     query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None
 ) -> Tensor:
-    n_rows, n_columns = query.shape[-2], key.shape[-2]
+    n_rows = query.shape[-2]
+    n_columns = key.shape[-2]
     mask = torch.ones(n_rows, n_columns, dtype=torch.bool, device=query.device).tril(
         n_columns - n_rows
     )

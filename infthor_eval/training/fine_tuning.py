@@ -31,7 +31,9 @@ from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 __all__ = ["StepCallback", "TrainingRun", "fine_tune", "prepare_run"]
 
-_DESCRIPTION, _STATES, _CHECKPOINT = "training.json", "states", "checkpoint"
+_DESCRIPTION = "training.json"
+_STATES = "states"
+_CHECKPOINT = "checkpoint"
 StepCallback = Callable[[Progress], None]
 
 
@@ -124,7 +126,9 @@ def fine_tune(run: TrainingRun, out: Path, on_step: StepCallback) -> Path:
 
 
 def _train(run: TrainingRun, network: SequenceModel, states: Path, on_step: StepCallback) -> None:
-    recipe, sequences, pad_id = run.recipe, run.data.sequences, run.loaded.tokenizer.pad_token_id
+    recipe = run.recipe
+    sequences = run.data.sequences
+    pad_id = run.loaded.tokenizer.pad_token_id
     if recipe.parallel.context == 1:
         to_batch = partial(collate, family=run.loaded.family, pad_id=pad_id)
         train_with_trainer(

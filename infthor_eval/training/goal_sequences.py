@@ -77,7 +77,9 @@ def goals_of_actions(
         raise DataError(
             f"max_tokens is {limit}, too few for one action and its frame ({1 + frame_tokens})"
         )
-    window, goal, last = _Window(), "", segments[0].before
+    window = _Window()
+    goal = ""
+    last = segments[0].before
     for segment in segments:
         if segment.goal is not None:
             goal = task_goal_part(segment.goal)

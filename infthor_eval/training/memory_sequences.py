@@ -104,7 +104,8 @@ class _Retrieved:
     and last of each."""
 
     def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
-        place, hint = f"trajectory {trajectory.traj_id}", "restore the file"
+        place = f"trajectory {trajectory.traj_id}"
+        hint = "restore the file"
         if not trajectory.retrieved_image:
             raise DataError(
                 "the trajectory has no retrieved_image, which actions of the form frames need"

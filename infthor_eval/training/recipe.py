@@ -226,7 +226,8 @@ def read_recipe(name: str, changes: Mapping[str, Any] | None = None) -> Recipe |
             f"{path}: not a recipe (no mapping of settings); see infthor_eval/training/recipes for "
             "examples"
         )
-    wrong, settings = (msgspec.ValidationError, TypeError), changes or {}
+    wrong = (msgspec.ValidationError, TypeError)
+    settings = changes or {}
     with wrap_errors(f"{path}: not a recipe", "fix the setting", catch=wrong, raise_as=UsageError):
         if settings.get("model", document.get("model")) != document.get("model"):
             document.pop("model_args", None)

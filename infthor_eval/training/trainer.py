@@ -120,10 +120,8 @@ def train_with_trainer(
     )
     trainer.remove_callback(transformers.trainer_callback.PrinterCallback)
     last = _last_complete_checkpoint(out)
-    problem, hint = (
-        f"{last}: the checkpoint cannot be read",
-        "remove it to resume from the one before",
-    )
+    problem = f"{last}: the checkpoint cannot be read"
+    hint = "remove it to resume from the one before"
     with wrap_errors(problem, hint, catch=(OSError, ValueError, KeyError)):
         trainer.train(resume_from_checkpoint=last)
 
@@ -147,7 +145,8 @@ def _last_complete_checkpoint(out: Path) -> str | None:
 
 
 def _arguments(recipe: Recipe, out: Path, network: SequenceModel) -> transformers.TrainingArguments:
-    optimizer, model_type = recipe.optimizer, recipe.model_args.get("dtype", "float32")
+    optimizer = recipe.optimizer
+    model_type = recipe.model_args.get("dtype", "float32")
     arguments = transformers.TrainingArguments(
         output_dir=str(out),
         per_device_train_batch_size=1,

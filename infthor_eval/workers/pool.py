@@ -171,7 +171,8 @@ class Pool:
         self._n_results.clear()
         for job in range(n_jobs):
             self._jobs.add(job, lambda job=job: create(job))  # type: ignore[misc]
-        n_left, stopped = n_jobs, False
+        n_left = n_jobs
+        stopped = False
         while n_left:
             if not stopped and should_stop():
                 stopped = True

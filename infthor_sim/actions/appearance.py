@@ -15,7 +15,9 @@ from infthor_sim.render.finishes import RANDOM_PATTERNS
 from infthor_sim.render.shell import SHELL_NAMES
 from infthor_sim.simulation import Simulation
 
-_DARKEST, _BRIGHTEST = 0.45, 1.55  # factors of a surface's colour
+# factors of a surface's colour
+_DARKEST = 0.45
+_BRIGHTEST = 1.55
 _ITHOR = re.compile(r"FloorPlan\d*(\d\d)|FloorPlan(\d)")
 _ROOMS = {
     "0": "Kitchen",

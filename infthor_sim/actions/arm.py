@@ -18,8 +18,12 @@ from infthor_sim.settings import ARM_MODES
 from infthor_sim.simulation import Simulation
 
 _KINOVA = ("arm",)
-_SMALLEST, _LARGEST = 0.04, 0.5  # radii of the hand's sphere, metres
-_TURN_STEP, _ELBOW_STEP = 3.0, 2.0  # degrees between two collision checks
+# radii of the hand's sphere, metres
+_SMALLEST = 0.04
+_LARGEST = 0.5
+# degrees between two collision checks
+_TURN_STEP = 3.0
+_ELBOW_STEP = 2.0
 
 
 @action("MoveArm", modes=ARM_MODES)
@@ -33,7 +37,8 @@ def move_arm(
     disableRendering: bool = True,
 ) -> None:
     """Bring the wrist to a position, or as near as the arm reaches."""
-    agent, arm = sim.world.agent, agent_arm(sim)
+    agent = sim.world.agent
+    arm = agent_arm(sim)
     point = to_array(position)
     if coordinateSpace == "armBase":
         point = arm.base(agent).point(point)
@@ -55,7 +60,8 @@ def move_arm_relative(
     disableRendering: bool = True,
 ) -> None:
     """Move the wrist by an offset along the axes of a space."""
-    agent, arm = sim.world.agent, agent_arm(sim)
+    agent = sim.world.agent
+    arm = agent_arm(sim)
     turns = {"armBase": arm.base(agent).turn, "wrist": arm.wrist(agent).turn, "world": np.eye(3)}
     if coordinateSpace not in turns:
         raise ActionError(f"Invalid coordinateSpace: {coordinateSpace}")

@@ -33,14 +33,16 @@ def teleport_arm(
         worldRelative: position and rotation are in the world.
         forceAction: allow a pose in which the arm is in something.
     """
-    arm, rest = agent_arm(sim), agent_arm(sim).rig.rest()
+    arm = agent_arm(sim)
+    rest = agent_arm(sim).rig.rest()
     height = rest.base if armHeight is None else armHeight
     pose = replace(rest, base=float(height), elbow=float(elbowOrientation or 0.0) % 360.0)
     base = replace(arm, pose=pose).base(sim.world.agent)
     target = rest.wrist if position is None else to_array(position)
     turn = rest.turn if rotation is None else _rotation_matrix(rotation)
     if worldRelative:
-        target, turn = base.local(target), base.turn.T @ turn
+        target = base.local(target)
+        turn = base.turn.T @ turn
     (pose,) = arm.rig.reach([replace(pose, turn=turn)], target[None])
     now = stance(sim.world, arm)
     there = Stance(now.position, now.yaw, pose)

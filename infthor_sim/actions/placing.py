@@ -38,7 +38,8 @@ def teleport_object(
     With `forceAction` it goes where there is no room too, with `forceKinematic` it stays in the
     air.
     """
-    world, item = sim.world, sim.world.get(objectId)
+    world = sim.world
+    item = sim.world.get(objectId)
     if item.object_id in world.held_ids() and not allowTeleportOutOfHand:
         raise ActionError("Cannot teleport object in hand.")
     if position is None:
@@ -60,7 +61,8 @@ def place_object_at_point(
     forceKinematic: bool = False,
 ) -> None:
     """Stand an object on a point, in its own rotation or the given one, if there is room."""
-    world, item = sim.world, sim.world.get(objectId)
+    world = sim.world
+    item = sim.world.get(objectId)
     if not (item.type.pickupable or item.type.moveable):
         raise ActionError(f"{objectId} is neither pickupable nor moveable")
     pose = _copy(item)
@@ -124,7 +126,8 @@ def _first_free(
     obstacle: str | None = None
     for position in positions:
         pose = _copy(item)
-        pose.position, pose.rotation = to_array(position), turn
+        pose.position = to_array(position)
+        pose.rotation = turn
         obstacle = None if force else occupant(world, pose)
         if obstacle is None:
             return pose

@@ -145,7 +145,8 @@ def _check_type(called: Action, key: str, value: Any) -> None:
     annotation = called.parameters[key].annotation
     if _matches(value, annotation):
         return
-    expected, given = type_name(annotation), value if isinstance(value, str) else json.dumps(value)
+    expected = type_name(annotation)
+    given = value if isinstance(value, str) else json.dumps(value)
     # Unity's dispatcher converts scalars itself and reports a code. A scalar in place of a vector
     # or list fails earlier, in its JSON parser, without a code.
     if _is_structured(annotation) and not isinstance(value, dict | list):
@@ -159,7 +160,8 @@ def _check_type(called: Action, key: str, value: Any) -> None:
 
 def _is_structured(annotation: Any) -> bool:
     """Return whether values of this type are objects or lists in JSON."""
-    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    origin = typing.get_origin(annotation)
+    inner = typing.get_args(annotation)
     if origin in (types.UnionType, typing.Union):
         return any(_is_structured(option) for option in inner)
     return annotation is Vector3 or origin is list
@@ -168,7 +170,8 @@ def _is_structured(annotation: Any) -> bool:
 def _matches(value: Any, annotation: Any) -> bool:
     """Return whether a JSON value is of a parameter's type; stricter than Unity: "1" is no number,
     1 no boolean."""
-    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    origin = typing.get_origin(annotation)
+    inner = typing.get_args(annotation)
     if annotation is Any or annotation is types.NoneType:
         return annotation is Any or value is None
     if origin in (types.UnionType, typing.Union):

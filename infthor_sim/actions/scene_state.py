@@ -40,11 +40,9 @@ def _named_pose(entry: Any) -> NamedPose:
         raise ActionError(
             f"objectPoses needs entries with objectName, position and rotation, not {entry!r}"
         )
-    name, position, rotation = (
-        entry["objectName"],
-        entry.get("position"),
-        entry.get("rotation") or {},
-    )
+    name = entry["objectName"]
+    position = entry.get("position")
+    rotation = entry.get("rotation") or {}
     if not is_vector(position) or not is_vector(rotation):
         raise ActionError(f"objectPoses: {name:.60} has no usable position or rotation")
     # Unity appends "(Clone)" to the names of copies.

@@ -16,7 +16,8 @@ _SCALARS = {int: "int", float: "float", str: "String", bool: "Boolean", Vector3:
 
 def type_name(annotation: Any) -> str:
     """Return Unity's name of a type; an optional type is called as its value."""
-    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    origin = typing.get_origin(annotation)
+    inner = typing.get_args(annotation)
     if origin in (types.UnionType, typing.Union):
         return type_name(next(option for option in inner if option is not types.NoneType))
     if origin is list:

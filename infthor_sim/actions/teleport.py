@@ -37,7 +37,9 @@ def teleport(
     tilt = agent.horizon if horizon is None else float(horizon)
     if not forceAction:
         target = _place_on_floor(sim.world, target, tilt)
-    agent.position, agent.yaw, agent.horizon = target, turn % 360.0, tilt
+    agent.position = target
+    agent.yaw = turn % 360.0
+    agent.horizon = tilt
     agent.standing = agent.standing if standing is None else standing
     sim.world.carry()
 

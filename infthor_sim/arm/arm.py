@@ -55,10 +55,13 @@ def base_transforms(
 
 def _upright(yaws: Array) -> Array:
     """Return rotations (n, 3, 3) about the vertical."""
-    sines, cosines = np.sin(np.radians(yaws)), np.cos(np.radians(yaws))
+    sines = np.sin(np.radians(yaws))
+    cosines = np.cos(np.radians(yaws))
     turns = np.zeros((len(yaws), 3, 3))
     turns[:, 0, 0] = turns[:, 2, 2] = cosines
-    turns[:, 0, 2], turns[:, 2, 0], turns[:, 1, 1] = sines, -sines, 1.0
+    turns[:, 0, 2] = sines
+    turns[:, 2, 0] = -sines
+    turns[:, 1, 1] = 1.0
     return turns
 
 

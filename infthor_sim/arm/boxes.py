@@ -11,10 +11,9 @@ from infthor_sim.geometry import Array
 __all__ = ["Boxes", "join", "separations", "sphere_gaps"]
 
 _PARALLEL = 1e-4  # sine of an angle below which two edges count as parallel
-_NEXT, _LAST = (
-    [1, 2, 0],
-    [2, 0, 1],
-)  # the other two axes of each axis, in the order of cross products
+# the other two axes of each axis, in the order of cross products
+_NEXT = [1, 2, 0]
+_LAST = [2, 0, 1]
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,8 @@ def arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
 
 
 def _joints(world: World, arm: Arm) -> list[dict[str, Any]]:
-    base, joints = arm.base(world.agent), arm.rig.joints([arm.pose])
+    base = arm.base(world.agent)
+    joints = arm.rig.joints([arm.pose])
     listed: list[dict[str, Any]] = []
     parent = np.eye(3)
     for name, position, turn in zip(

@@ -32,7 +32,9 @@ class ArmObstacles:
     """
 
     def __init__(self, boxes: Boxes, owner: NDArray[np.int64], names: tuple[str, ...]) -> None:
-        self.boxes, self.owner, self.names = boxes, owner, names
+        self.boxes = boxes
+        self.owner = owner
+        self.names = names
         self._low, self._high = boxes.bounds()
 
     def near(self, low: Array, high: Array) -> "ArmObstacles":
@@ -54,7 +56,8 @@ def arm_obstacles(
     blocking = np.array([_blocks(world, name, mass_threshold) for name in names])
     owner = rows[:, INSTANCE].astype(np.int64)
     kept = blocking[owner]
-    rows, owner = rows[kept], owner[kept]
+    rows = rows[kept]
+    owner = owner[kept]
     boxes = Boxes(
         rows[:, CENTER : CENTER + 3],
         rows[:, AXES : AXES + 9].reshape(-1, 3, 3),

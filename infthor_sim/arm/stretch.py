@@ -18,10 +18,9 @@ __all__ = ["Stretch"]
 
 # All lengths in metres.
 _ORIGIN = (0.1438, -0.8132, -0.0239)  # of the base, in the agent's frame
-_LIFTS, _OUT = (
-    (-0.056, 1.045),
-    0.516,
-)  # limits of the wrist's height above the base; longest extension
+# limits of the wrist's height above the base; longest extension
+_LIFTS = (-0.056, 1.045)
+_OUT = 0.516
 _REST = (0.0, 0.1645, 0.0)
 _MAST = (
     0.0461,
@@ -36,7 +35,9 @@ _SECTIONS = (
     0.0130003,
     0.0117463,
 )  # each section from the one before, telescope drawn in
-_YAW_JOINT, _HAND_JOINT = 0.1494, 0.0987  # heights of the wrist's two joints above the hand
+# heights of the wrist's two joints above the hand
+_YAW_JOINT = 0.1494
+_HAND_JOINT = 0.0987
 _PALM = 0.2047 - 0.06  # the sphere's centre in the recorded pose, less its radius there
 _HALVES: Array = np.array([(0.03, 0.03, 0.0), (0.025, 0.05, 0.025), (0.03, 0.02, _PALM / 2)])
 _LEVEL: Array = np.eye(3)
@@ -107,12 +108,10 @@ class Stretch:
         """Return the telescope, the wrist and the gripper of each pose (n, 3), in the frame of the
         base."""
         joints = self.joints(poses)
-        mast, out, wrist, turns = (
-            joints.positions[:, 0],
-            joints.positions[:, 5],
-            joints.positions[:, 7],
-            joints.turns,
-        )
+        mast = joints.positions[:, 0]
+        out = joints.positions[:, 5]
+        wrist = joints.positions[:, 7]
+        turns = joints.turns
         tube = (np.stack([out[:, 0], out[:, 1], mast[:, 2]], axis=1) + out) / 2
         palm = (
             wrist

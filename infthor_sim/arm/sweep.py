@@ -40,7 +40,8 @@ def stance(world: World, arm: Arm) -> Stance:
 
 def take_stance(world: World, arm: Arm, to: Stance) -> None:
     """Bring the agent and its arm to a stance, with everything held."""
-    world.agent.position, world.agent.yaw = to.position, to.yaw
+    world.agent.position = to.position
+    world.agent.yaw = to.yaw
     arm.change(to.pose)
     world.carry(keep_grip=True)
 
@@ -87,7 +88,8 @@ def is_free(world: World, arm: Arm, there: Stance, around: ArmObstacles) -> bool
 
 def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:
     """Return the boxes (stances, n) of the arm and of what it holds, in the world."""
-    positions, yaws = np.stack([s.position for s in stances]), np.array([s.yaw for s in stances])
+    positions = np.stack([s.position for s in stances])
+    yaws = np.array([s.yaw for s in stances])
     origins, turns = base_transforms(arm.rig, positions, yaws, [s.pose for s in stances])
     # While the agent walks or turns its arm keeps one pose: its boxes are computed once, and only
     # moved.
@@ -96,7 +98,8 @@ def moving_boxes(world: World, arm: Arm, stances: list[Stance]) -> Boxes:
         if all(s.pose is stances[0].pose for s in stances)
         else [s.pose for s in stances]
     )
-    wrists, twists = np.stack([p.wrist for p in poses]), np.stack([p.turn for p in poses])
+    wrists = np.stack([p.wrist for p in poses])
+    twists = np.stack([p.turn for p in poses])
     held = _held_boxes(world, arm).transform(wrists, twists)
     return join([arm.rig.boxes(poses), held], axis=1).transform(origins, turns)
 

@@ -22,10 +22,12 @@ def subtract(whole: Rect, holes: Sequence[Rect]) -> tuple[Rect, ...]:
         return (whole,)
     xs = _edges(whole[0], whole[2], [v for h in cutting for v in (h[0], h[2])])
     zs = _edges(whole[1], whole[3], [v for h in cutting for v in (h[1], h[3])])
-    mid_x, mid_z = (xs[1:] + xs[:-1]) / 2, (zs[1:] + zs[:-1]) / 2
+    mid_x = (xs[1:] + xs[:-1]) / 2
+    mid_z = (zs[1:] + zs[:-1]) / 2
     solid = np.ones((len(mid_x), len(mid_z)), dtype=bool)
     for x0, z0, x1, z1 in cutting:
-        inside_x, inside_z = (mid_x > x0) & (mid_x < x1), (mid_z > z0) & (mid_z < z1)
+        inside_x = (mid_x > x0) & (mid_x < x1)
+        inside_z = (mid_z > z0) & (mid_z < z1)
         solid &= ~(inside_x[:, None] & inside_z[None, :])
     return tuple(_cover(solid, xs, zs))
 
@@ -33,8 +35,10 @@ def subtract(whole: Rect, holes: Sequence[Rect]) -> tuple[Rect, ...]:
 def polygon_rects(points: Sequence[tuple[float, float]]) -> tuple[Rect, ...]:
     """Return rectangles that cover a polygon (x, z) whose edges are parallel to the axes."""
     outline = np.asarray(points, dtype=float)
-    xs, zs = np.unique(np.round(outline[:, 0], 4)), np.unique(np.round(outline[:, 1], 4))
-    mid_x, mid_z = (xs[1:] + xs[:-1]) / 2, (zs[1:] + zs[:-1]) / 2
+    xs = np.unique(np.round(outline[:, 0], 4))
+    zs = np.unique(np.round(outline[:, 1], 4))
+    mid_x = (xs[1:] + xs[:-1]) / 2
+    mid_z = (zs[1:] + zs[:-1]) / 2
     solid = np.array(
         [[_contains(outline, x, z) for z in mid_z] for x in mid_x], dtype=bool
     ).reshape(len(mid_x), len(mid_z))
@@ -58,11 +62,13 @@ def _edges(low: float, high: float, cuts: list[float]) -> np.ndarray:
 def _cover(solid: np.ndarray, xs: np.ndarray, zs: np.ndarray) -> list[Rect]:
     """Return rectangles that cover the solid cells of an uneven grid: greedily, the largest from
     each free cell."""
-    left, rects = solid.copy(), []
+    left = solid.copy()
+    rects = []
     for i, j in np.argwhere(solid):
         if not left[i, j]:
             continue
-        i_end, j_end = i + 1, j + 1
+        i_end = i + 1
+        j_end = j + 1
         while j_end < left.shape[1] and left[i, j_end]:
             j_end += 1
         while i_end < left.shape[0] and left[i_end, j:j_end].all():

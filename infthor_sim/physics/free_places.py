@@ -73,11 +73,13 @@ def _apart(points: Array, size: Array, boxes: list[Box], overlap: float) -> NDAr
     if not len(points):
         return free
     level = float(points[0, 1])
-    half, gap = size / 2 * (1 - overlap), _CLEARANCE * (1 - overlap)
+    half = size / 2 * (1 - overlap)
+    gap = _CLEARANCE * (1 - overlap)
     for low, high in boxes:
         if low[1] > level + size[1] or high[1] < level + _TOUCH:
             continue  # above or below what is to stand here
-        middle, other = (low + high) / 2, (high - low) / 2 * (1 - overlap)
+        middle = (low + high) / 2
+        other = (high - low) / 2 * (1 - overlap)
         free &= (np.abs(points[:, 0] - middle[0]) > half[0] + other[0] + gap) | (
             np.abs(points[:, 2] - middle[2]) > half[2] + other[2] + gap
         )

@@ -10,7 +10,9 @@ from infthor_sim.world import World
 __all__ = ["blocking_object", "door_leaf", "held_object_blocks", "nearest_name"]
 
 _RADIUS = 0.2  # of the agent's capsule, metres
-_KNEE, _HEAD = 0.15, 1.5  # heights in metres between which a door stops the agent
+# heights in metres between which a door stops the agent
+_KNEE = 0.15
+_HEAD = 1.5
 
 
 def blocking_object(world: World, target: Array) -> str | None:

@@ -42,7 +42,8 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
     if receptacle.type.levels:
         return _shelves(receptacle)
     middle, half = _standing_area(receptacle)
-    yaw, overhang = float(receptacle.rotation[1]), math.inf if receptacle.type.overhang else 0.03
+    yaw = float(receptacle.rotation[1])
+    overhang = math.inf if receptacle.type.overhang else 0.03
     if receptacle.type.open_top:  # a vessel: its only surface is its bottom
         base = float(receptacle.bounds()[0][1]) + receptacle.floors[0]
         inner = [max(side * receptacle.type.open_top - WALL / 2, 0.015) for side in half]
@@ -118,7 +119,8 @@ def _shelves(receptacle: SimObject) -> list[Surface]:
     )
     heights = [float(low[1]) + floor for floor in receptacle.floors]
     tops = [*heights[1:], float(high[1]) - WALL]
-    middle, yaw = (low + high) / 2 + drawer_offset(receptacle), float(receptacle.rotation[1])
+    middle = (low + high) / 2 + drawer_offset(receptacle)
+    yaw = float(receptacle.rotation[1])
     return [
         Surface(np.array([middle[0], y, middle[2]]), inner, yaw, top - y, from_middle=True)
         for y, top in zip(heights, tops, strict=True)
@@ -142,7 +144,8 @@ def contains_box(vessel: SimObject, low: Array, high: Array) -> bool:
     if not vessel.type.open_top or (vessel.type.encloses and vessel.state.openness == 0):
         return False
     (cavity,) = surfaces(vessel)
-    middle, half = (low + high) / 2, (high - low) / 2
+    middle = (low + high) / 2
+    half = (high - low) / 2
     # The middles of its sides, not its corners, must be inside: most of what lies in vessels is
     # round.
     sides = np.array([[half[0], 0, 0], [-half[0], 0, 0], [0, 0, half[2]], [0, 0, -half[2]]])

@@ -21,7 +21,8 @@ def slide(world: World, item: SimObject, direction: Array, distance: float) -> N
     stops at anything else and at the walls of something closed. What is then beyond the edge of
     what it stands on falls.
     """
-    step, left = direction * _STEP, min(distance, _FARTHEST)
+    step = direction * _STEP
+    left = min(distance, _FARTHEST)
     moved = {item.object_id: item}
     while left >= _STEP:
         pushed = _pushed(world, item, step, {})

@@ -11,7 +11,8 @@ __all__ = ["unfold"]
 
 def unfold(item: SimObject, openness: float) -> None:
     """Change an object's box from that at its present openness to that at `openness`."""
-    turn, before = yaw_matrix(item.front), item.state.openness
+    turn = yaw_matrix(item.front)
+    before = item.state.openness
     for way in item.type.unfolds:
         # The axis is given as seen from the front; `step` is its direction in the object's own
         # frame.

@@ -54,7 +54,8 @@ class Views:
 
     def __init__(self, world: World, display: Display, settings: SimulatorSettings) -> None:
         self.settings = settings
-        self._world, self._display = world, display
+        self._world = world
+        self._display = display
         self._model = SceneModel(world)
         self._view: Picture | None = None
         self._view_key: tuple[object, ...] | None = None
@@ -73,7 +74,8 @@ class Views:
     def agent_view(self) -> Picture:
         """Return the agent's view without what it holds: that hides nothing from its sight, as in
         AI2-THOR."""
-        agent, display = self._world.agent, self._display
+        agent = self._world.agent
+        display = self._display
         # Walking changes the agent without a new version of the world, so its pose is part of the
         # key.
         key = (self._world.version, tuple(agent.position), agent.yaw, agent.horizon, agent.standing,
@@ -81,7 +83,9 @@ class Views:
         if self._view is None or key != self._view_key:
             rows, _, _ = self.primitives()
             camera = agent_camera(agent, self.settings.field_of_view, display.width, display.height)
-            self._view, self._frame, self._view_key = self.cast(rows, camera), None, key
+            self._view = self.cast(rows, camera)
+            self._frame = None
+            self._view_key = key
         return self._view
 
     def agent_frame(self) -> Picture:

@@ -40,13 +40,16 @@ class AgentVision:
         self, world: World, views: Views, display: Display, settings: SimulatorSettings
     ) -> None:
         self.settings = settings
-        self._world, self._views, self._display = world, views, display
+        self._world = world
+        self._views = views
+        self._display = display
         self._visible: tuple[Picture, float, frozenset[str]] | None = None
 
     def visible_ids(self) -> frozenset[str]:
         """Return the ids of the objects that AI2-THOR would report as visible: shown, and near
         enough."""
-        view, distance = self._views.agent_view(), self.settings.visibility_distance
+        view = self._views.agent_view()
+        distance = self.settings.visibility_distance
         if self._visible is None or self._visible[0] is not view or self._visible[1] != distance:
             self._visible = (view, distance, self._visible_in(view))
         return self._visible[2]

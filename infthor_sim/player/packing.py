@@ -96,7 +96,8 @@ class MetadataPacker:
         return parts
 
     def _color_list(self, sim: Simulation) -> bytes:
-        ids, agent = tuple(sim.world.objects), (HAND,) if sim.world.arm is None else (ARM,)
+        ids = tuple(sim.world.objects)
+        agent = (HAND,) if sim.world.arm is None else (ARM,)
         if self._colors is None or self._colors[0] != (*ids, *agent):
             types = sorted(
                 {o.object_type for o in sim.world.objects.values()} | {*SHELL_NAMES, *agent}

@@ -24,7 +24,8 @@ def arm_rows(arm: Arm, agent: Agent, instance: int) -> Array:
 
     `instance` is the arm's index in the picture's table of instances.
     """
-    boxes, base = arm.rig.boxes([arm.pose]).flat(), arm.base(agent)
+    boxes = arm.rig.boxes([arm.pose]).flat()
+    base = arm.base(agent)
     parts = []
     for center, axes, half in zip(boxes.center[:-1], boxes.axes[:-1], boxes.half[:-1], strict=True):
         longest = int(np.argmax(half))
@@ -34,7 +35,9 @@ def arm_rows(arm: Arm, agent: Agent, instance: int) -> Array:
         parts.append(ShapePart(Form.CYLINDER, center, size, _SHELL, Material.PLAIN, turn, 1.0, 0.9))
         end = center + axes[longest] * half[longest]
         parts.append(ShapePart(Form.ELLIPSOID, end, (thick * 1.25,) * 3, _JOINT))
-    hand, axes, half = boxes.center[-1], boxes.axes[-1], boxes.half[-1]
+    hand = boxes.center[-1]
+    axes = boxes.axes[-1]
+    half = boxes.half[-1]
     parts.append(ShapePart(Form.BOX, hand, half, _HAND, Material.METAL, axes.T))
     tips = hand + axes[2] * (half[2] + _FINGER[2])
     for side in (-1.0, 1.0):

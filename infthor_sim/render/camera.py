@@ -16,7 +16,9 @@ from infthor_sim.render.primitives import AXES, CENTER, HALF
 
 __all__ = ["FAR", "NEAR", "PinholeCamera", "Projection", "project"]
 
-NEAR, FAR = 0.1, 20.0  # clipping planes of AI2-THOR's cameras, metres
+# clipping planes of AI2-THOR's cameras, metres
+NEAR = 0.1
+FAR = 20.0
 _SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if bin(a ^ b).count("1") == 1])
 
@@ -81,8 +83,10 @@ def project(prims: Array, camera: PinholeCamera) -> Projection:
     points = center[:, None, :] + _SIGNS @ extents
     low, high = _screen_bounds(points, camera.near)
     us, vs = camera.rays()
-    first_column, last_column = np.searchsorted(us, low[:, 0]) - 1, np.searchsorted(us, high[:, 0])
-    first_row, last_row = np.searchsorted(vs, low[:, 1]) - 1, np.searchsorted(vs, high[:, 1])
+    first_column = np.searchsorted(us, low[:, 0]) - 1
+    last_column = np.searchsorted(us, high[:, 0])
+    first_row = np.searchsorted(vs, low[:, 1]) - 1
+    last_row = np.searchsorted(vs, high[:, 1])
     near = points[:, :, 2].min(axis=1)
     seen = (
         (points[:, :, 2].max(axis=1) > camera.near)
@@ -122,7 +126,8 @@ def _screen_bounds(points: Array, limit: float) -> tuple[Array, Array]:
     # edges cross the clipping plane take the corners' place.
     cut = np.nonzero(front.any(axis=1) & ~front.all(axis=1))[0]
     if cut.size:
-        a, b = points[cut][:, _EDGES[:, 0]], points[cut][:, _EDGES[:, 1]]
+        a = points[cut][:, _EDGES[:, 0]]
+        b = points[cut][:, _EDGES[:, 1]]
         crosses = (a[:, :, 2] >= limit) != (b[:, :, 2] >= limit)
         gap = np.where(crosses, b[:, :, 2] - a[:, :, 2], 1.0)
         share = (limit - a[:, :, 2]) / gap

@@ -12,7 +12,8 @@ from infthor_sim.geometry import Array
 __all__ = ["DARKEST", "LIGHTEST", "ROWS", "STRENGTH", "crease_factors"]
 
 STRENGTH = 7.0
-DARKEST, LIGHTEST = 0.68, 1.1
+DARKEST = 0.68
+LIGHTEST = 1.1
 # of the picture for each pixel to the neighbours: shadows are as wide in pictures of any size
 ROWS = 150
 

@@ -21,7 +21,8 @@ def crease_factors(depth: Array) -> Array:
 def _crease_factors(inverse: Array, depth: Array, step: int, factors: Array) -> None:
     height, width = depth.shape
     for y in range(height):
-        above, below = max(y - step, 0), min(y + step, height - 1)
+        above = max(y - step, 0)
+        below = min(y + step, height - 1)
         for x in range(step):
             left, right = max(x - step, 0), min(x + step, width - 1)
             around = ((inverse[above, x] + inverse[below, x]) + inverse[y, left]) + inverse[

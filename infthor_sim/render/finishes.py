@@ -20,7 +20,8 @@ def apply_finishes(prims: Array, names: Sequence[str], look: Appearance) -> Arra
     # Brightness does not count: it changes the lights and not a surface.
     if not look.finishes and np.all(look.light == 1.0):
         return prims
-    tints, patterns = np.tile(look.light, (len(names), 1)), np.full(len(names), -1)
+    tints = np.tile(look.light, (len(names), 1))
+    patterns = np.full(len(names), -1)
     for index, name in enumerate(names):
         finish = look.finishes.get(name)
         if finish is not None:

@@ -36,11 +36,10 @@ _AWAY = (
 _NEAREST = 0.115  # of the gripper: beyond the camera's clipping plane
 # of the object's lowest point below the middle of the picture, as a share of its half height
 _FOOT = 0.97
-_SMALLEST, _GROWTH, _LARGEST = (
-    0.105,
-    0.26,
-    0.2,
-)  # shares of the picture's height: at least, per metre of size, at most
+# shares of the picture's height: at least, per metre of size, at most
+_SMALLEST = 0.105
+_GROWTH = 0.26
+_LARGEST = 0.2
 _TILT = euler_matrix(
     (-24.0, 0.0, 0.0)
 )  # towards the camera, which so sees into bowls and the faces of flat things
@@ -49,7 +48,9 @@ _TURN = 155.0  # degrees: the front, as of screens and clocks, faces the camera 
 # Of the gripper, in shares of the picture's half height.
 _JAW = (0.02, 0.075, 0.04)  # half extents
 _PAD = (0.012, 0.04, 0.035)
-_NARROWEST, _WIDEST = 0.025, 0.34  # half of the space between its jaws
+# half of the space between its jaws
+_NARROWEST = 0.025
+_WIDEST = 0.34
 _GRASPED = 0.45  # the jaws close on this share of the object's height, from below
 _STEEL: Color = (0.22, 0.23, 0.26)
 _RUBBER: Color = (0.95, 0.55, 0.1)
@@ -123,7 +124,8 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
 def _gripper(left: float, right: float) -> list[ShapePart]:
     """Return a bar at the lower edge of the picture and two jaws beside what is held, in shares of
     its half height."""
-    middle, half = (left + right) / 2, min(max((right - left) / 2, _NARROWEST), _WIDEST)
+    middle = (left + right) / 2
+    half = min(max((right - left) / 2, _NARROWEST), _WIDEST)
     parts = [
         ShapePart(
             Form.BOX,

@@ -9,12 +9,11 @@ from infthor_sim.geometry import Array
 
 __all__ = ["AMBIENT", "HEADLIGHT", "LAMP_REACH", "SKY", "SUN", "SUN_DIRECTION", "Lights"]
 
-AMBIENT, SKY, SUN, HEADLIGHT = (
-    0.46,
-    0.12,
-    0.3,
-    0.16,
-)  # brightness; the headlight shows shapes that the sun misses
+# brightness; the headlight shows shapes that the sun misses
+AMBIENT = 0.46
+SKY = 0.12
+SUN = 0.3
+HEADLIGHT = 0.16
 SUN_DIRECTION = (
     0.40824829046386296,
     0.8164965809277259,

@@ -154,12 +154,10 @@ def colour_picture(
 ) -> Pixels:
     """Return RGB (h, w, 3) of a picture; with `antialias`, its jagged pixels smoothed."""
     factors = rasterizer.creases(picture.depth)
-    prims, projection, camera, nearest = (
-        picture.prims,
-        picture.projection,
-        picture.camera,
-        picture.nearest,
-    )
+    prims = picture.prims
+    projection = picture.projection
+    camera = picture.camera
+    nearest = picture.nearest
     rgb = rasterizer.shade(prims, projection, camera, picture.depth, nearest, factors, lights)
     if antialias:
         rasterizer.smooth(prims, projection, camera, nearest, factors, lights, rgb)

@@ -23,18 +23,16 @@ __all__ = [
     "Form", "Material", "ShapePart", "rows",
 ]  # fmt: skip
 
-FORM, CENTER, HALF, AXES, BOTTOM, TOP, COLOR, MATERIAL, EMISSION, INSTANCE = (
-    0,
-    1,
-    4,
-    7,
-    16,
-    17,
-    18,
-    21,
-    22,
-    23,
-)
+FORM = 0
+CENTER = 1
+HALF = 4
+AXES = 7
+BOTTOM = 16
+TOP = 17
+COLOR = 18
+MATERIAL = 21
+EMISSION = 22
+INSTANCE = 23
 COLUMNS = 24
 _MIN_HALF = 5e-4  # metres; half extents are divided by, so thinner parts are drawn this thick
 
@@ -108,7 +106,10 @@ def rows(parts: Iterable[ShapePart], position: Array, matrix: Array, instance: i
         row[CENTER : CENTER + 3] = position + matrix @ np.asarray(part.center, dtype=float)
         row[HALF : HALF + 3] = np.maximum(part.half, _MIN_HALF)
         row[AXES : AXES + 9] = axes.T.reshape(9)  # the primitive's x axis, its y axis, its z axis
-        row[BOTTOM], row[TOP] = part.bottom, part.top
+        row[BOTTOM] = part.bottom
+        row[TOP] = part.top
         row[COLOR : COLOR + 3] = part.color
-        row[MATERIAL], row[EMISSION], row[INSTANCE] = part.material, part.emission, instance
+        row[MATERIAL] = part.material
+        row[EMISSION] = part.emission
+        row[INSTANCE] = instance
     return out

@@ -30,11 +30,11 @@ class VisibilityProbe:
             np.abs(prims[:, AXES : AXES + 9].reshape(-1, 3, 3)),
             prims[:, HALF : HALF + 3],
         )
-        self._prims, self._instance, self._rasterizer = prims, instance, rasterizer
-        self._low, self._high = (
-            prims[:, CENTER : CENTER + 3] - reach,
-            prims[:, CENTER : CENTER + 3] + reach,
-        )
+        self._prims = prims
+        self._instance = instance
+        self._rasterizer = rasterizer
+        self._low = prims[:, CENTER : CENTER + 3] - reach
+        self._high = prims[:, CENTER : CENTER + 3] + reach
         self._own: NDArray[np.bool_] = prims[:, INSTANCE] == instance
         self._between: dict[bytes, Array] = {}
 

@@ -40,7 +40,8 @@ def is_visible(
 def _depth(
     profiles: Array, origin: Array, steps: Array, k: int, u: float, v: float, clip: float
 ) -> float:
-    o, step = origin[k], steps[k]
+    o = origin[k]
+    step = steps[k]
     dx = (step[0, 0] + u * step[1, 0]) + v * step[2, 0]
     dy = (step[0, 1] + u * step[1, 1]) + v * step[2, 1]
     dz = (step[0, 2] + u * step[1, 2]) + v * step[2, 2]
@@ -73,12 +74,15 @@ def _is_visible(
         for y in range(box[own, 2].min() + every // 2, box[own, 3].max() + 1, every):
             for x in range(box[own, 0].min() + every // 2, box[own, 1].max() + 1, every):
                 u, v = us[x], vs[y]
-                depth, first = far, -1  # of the object's own nearest primitive
+                # of the object's own nearest primitive
+                depth = far
+                first = -1
                 for k in own:
                     if _covers(box, k, x, y) and near[k] < depth:
                         t = _depth(profiles, origin, steps, k, u, v, clip)
                         if clip < t < depth:
-                            depth, first = t, k
+                            depth = t
+                            first = k
                 if first < 0:
                     continue
                 hidden = False
@@ -89,7 +93,8 @@ def _is_visible(
                         # Ties go to the earlier primitive, as in the ray caster, with whose picture
                         # this must agree.
                         if t > clip and (t < depth or (t == depth and k < first)):
-                            hider, hidden = k, True
+                            hider = k
+                            hidden = True
                             break
                 count += 0 if hidden else 1
                 if count >= min_pixels:

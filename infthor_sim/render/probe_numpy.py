@@ -28,7 +28,8 @@ def is_visible(
     kept = replace(projection, **{name: getattr(projection, name)[own] for name in fields})
     depths, nearest = cast(prims, kept, camera)
     ys, xs = np.nonzero(nearest >= 0)
-    depth, first = depths[ys, xs], np.nonzero(own)[0][nearest[ys, xs]]
+    depth = depths[ys, xs]
+    first = np.nonzero(own)[0][nearest[ys, xs]]
     for k in np.nonzero(~own)[0]:
         if len(ys) < min_pixels:
             break
@@ -39,5 +40,8 @@ def is_visible(
             (t < depth[within]) | ((t == depth[within]) & (k < first[within]))
         )
         left = np.delete(np.arange(len(ys)), within[hidden])
-        ys, xs, depth, first = ys[left], xs[left], depth[left], first[left]
+        ys = ys[left]
+        xs = xs[left]
+        depth = depth[left]
+        first = first[left]
     return len(ys) >= min_pixels

@@ -19,7 +19,10 @@ from infthor_sim.render.primitives import BOTTOM, FORM, TOP, Form
 __all__ = ["cast", "hit"]
 
 _TINY = 1e-12  # takes the place of smaller components of directions, which are divided by
-_BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP), int(Form.BOWL)
+_BOX = int(Form.BOX)
+_ELLIPSOID = int(Form.ELLIPSOID)
+_CUP = int(Form.CUP)
+_BOWL = int(Form.BOWL)
 
 
 def cast(
@@ -48,14 +51,20 @@ def _nonzero(d: float) -> float:
 def _hit_box(ox: float, oy: float, oz: float, dx: float, dy: float, dz: float) -> float:
     # Slab method: the ray is inside the box where it is between all three pairs of faces.
     inverse = 1.0 / _nonzero(dx)
-    t1, t2 = (-1.0 - ox) * inverse, (1.0 - ox) * inverse
-    enter, leave = min(t1, t2), max(t1, t2)
+    t1 = (-1.0 - ox) * inverse
+    t2 = (1.0 - ox) * inverse
+    enter = min(t1, t2)
+    leave = max(t1, t2)
     inverse = 1.0 / _nonzero(dy)
-    t1, t2 = (-1.0 - oy) * inverse, (1.0 - oy) * inverse
-    enter, leave = max(enter, min(t1, t2)), min(leave, max(t1, t2))
+    t1 = (-1.0 - oy) * inverse
+    t2 = (1.0 - oy) * inverse
+    enter = max(enter, min(t1, t2))
+    leave = min(leave, max(t1, t2))
     inverse = 1.0 / _nonzero(dz)
-    t1, t2 = (-1.0 - oz) * inverse, (1.0 - oz) * inverse
-    enter, leave = max(enter, min(t1, t2)), min(leave, max(t1, t2))
+    t1 = (-1.0 - oz) * inverse
+    t2 = (1.0 - oz) * inverse
+    enter = max(enter, min(t1, t2))
+    leave = min(leave, max(t1, t2))
     return enter if enter <= leave else math.inf
 
 
@@ -74,7 +83,8 @@ def _hit_bowl(
 ) -> float:
     # In this frame a bowl is the lower half of the unit sphere. Where the near side is cut off the
     # far side counts, as one sees the inside through the opening.
-    oy, dy = (oy - 1.0) * 0.5, dy * 0.5
+    oy = (oy - 1.0) * 0.5
+    dy = dy * 0.5
     a = dx * dx + dy * dy + dz * dz
     b = ox * dx + oy * dy + oz * dz
     c = ox * ox + oy * oy + oz * oz - 1.0
@@ -104,7 +114,8 @@ def _hit_cylinder(
 ) -> float:
     # The side is x^2 + z^2 = (m + k * y)^2, of which m + k * y >= 0 excludes the mirrored cone
     # beyond the apex.
-    m, k = (bottom + top) * 0.5, (top - bottom) * 0.5
+    m = (bottom + top) * 0.5
+    k = (top - bottom) * 0.5
     radius = m + k * oy
     a = _nonzero(dx * dx + dz * dz - k * k * dy * dy)
     b = ox * dx + oz * dz - k * dy * radius
@@ -172,9 +183,14 @@ def _cast(
     depth[:] = far
     nearest[:] = -1
     for order in range(len(profiles)):
-        form, bottom, top = profiles[order, 0], profiles[order, 1], profiles[order, 2]
-        ox, oy, oz = origin[order, 0], origin[order, 1], origin[order, 2]
-        step, closest = steps[order], near[order]
+        form = profiles[order, 0]
+        bottom = profiles[order, 1]
+        top = profiles[order, 2]
+        ox = origin[order, 0]
+        oy = origin[order, 1]
+        oz = origin[order, 2]
+        step = steps[order]
+        closest = near[order]
         for y in range(box[order, 2], box[order, 3] + 1):
             v = vs[y]
             for x in range(box[order, 0], box[order, 1] + 1):

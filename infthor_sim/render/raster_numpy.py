@@ -25,7 +25,10 @@ def cast(
     depth = np.full((len(vs), len(us)), camera.far)
     nearest = np.full((len(vs), len(us)), -1, dtype=np.int32)
     for order, box in enumerate(projection.box):
-        x0, x1, y0, y1 = box[0], box[1] + 1, box[2], box[3] + 1
+        x0 = box[0]
+        x1 = box[1] + 1
+        y0 = box[2]
+        y1 = box[3] + 1
         u, v = us[None, x0:x1], vs[y0:y1, None]
         t = hit(prims, projection, order, (u, v), camera.near)
         window = depth[y0:y1, x0:x1]
@@ -40,11 +43,9 @@ def hit(
 ) -> Array:
     """Return depths at which rays (u, v) meet primitive `order` of the projection; infinity where
     they do not."""
-    prim, o, steps = (
-        prims[projection.index[order]],
-        projection.origin[order],
-        projection.steps[order],
-    )
+    prim = prims[projection.index[order]]
+    o = projection.origin[order]
+    steps = projection.steps[order]
     u, v = rays
     d = [(steps[0, i] + u * steps[1, i]) + v * steps[2, i] for i in range(3)]
     form = prim[FORM]
@@ -66,7 +67,8 @@ def _hit_box(o: Array, d: list[Array]) -> Array:
     leave: Array = np.array(np.inf)
     for i in range(3):
         inverse = 1.0 / _nonzero(d[i])
-        t1, t2 = (-1.0 - o[i]) * inverse, (1.0 - o[i]) * inverse
+        t1 = (-1.0 - o[i]) * inverse
+        t2 = (1.0 - o[i]) * inverse
         enter = np.maximum(enter, np.minimum(t1, t2))
         leave = np.minimum(leave, np.maximum(t1, t2))
     return np.where(enter <= leave, enter, np.inf)
@@ -82,7 +84,8 @@ def _hit_sphere(o: Array, d: list[Array]) -> Array:
 
 
 def _hit_bowl(o: Array, d: list[Array], near: float) -> Array:
-    oy, dy = (o[1] - 1.0) * 0.5, d[1] * 0.5
+    oy = (o[1] - 1.0) * 0.5
+    dy = d[1] * 0.5
     a = d[0] * d[0] + dy * dy + d[2] * d[2]
     b = o[0] * d[0] + oy * dy + o[2] * d[2]
     c = o[0] * o[0] + oy * oy + o[2] * o[2] - 1.0
@@ -98,7 +101,8 @@ def _hit_bowl(o: Array, d: list[Array], near: float) -> Array:
 def _hit_cylinder(
     o: Array, d: list[Array], bottom: float, top: float, is_open: bool, near: float
 ) -> Array:
-    m, k = (bottom + top) * 0.5, (top - bottom) * 0.5
+    m = (bottom + top) * 0.5
+    k = (top - bottom) * 0.5
     radius = m + k * o[1]
     a = _nonzero(d[0] * d[0] + d[2] * d[2] - k * k * d[1] * d[1])
     b = o[0] * d[0] + o[2] * d[2] - k * d[1] * radius

@@ -38,7 +38,8 @@ class SceneModel:
 
     def lights(self) -> Lights:
         """Return the lamps that are on, and the daylight by the state of the light switches."""
-        lamps, switches = [], []
+        lamps = []
+        switches = []
         for item in self._world.objects.values():
             if item.type.light and item.state.toggled:
                 low, high = item.bounds()
@@ -59,7 +60,8 @@ class SceneModel:
     def _rebuild(self) -> None:
         world = self._world
         names = [*SHELL_NAMES, *world.objects]
-        parts, held = [self._shell], [np.zeros((0, COLUMNS))]
+        parts = [self._shell]
+        held = [np.zeros((0, COLUMNS))]
         # What the hand holds is drawn apart: it hides nothing from the agent's sight, and the frame
         # shows it smaller.
         in_hand = set() if world.held is None else {world.held}
@@ -75,7 +77,8 @@ class SceneModel:
         look = world.appearance
         self._all = apply_finishes(np.concatenate(parts), names, look)
         self._held = apply_finishes(np.concatenate(held), names, look)
-        self._names, self._version = tuple(names), world.version
+        self._names = tuple(names)
+        self._version = world.version
 
     def _object_rows(self, item: SimObject, index: int) -> Array:
         entry = self._rows.get(item.object_id)

@@ -100,8 +100,11 @@ def surface_normals(
     us, vs = camera.rays()
     ys, xs = np.nonzero(nearest >= 0)
     order = nearest[ys, xs]
-    u, v, t = us[xs], vs[ys], depth[ys, xs]
-    o, s = projection.origin[order], projection.steps[order]
+    u = us[xs]
+    v = vs[ys]
+    t = depth[ys, xs]
+    o = projection.origin[order]
+    s = projection.steps[order]
     local = [o[:, i] + t * (s[:, 0, i] + u * s[:, 1, i] + v * s[:, 2, i]) for i in range(3)]
     normal, _, _ = _surface(prims[projection.index[order]], local)
     return ys, xs, np.stack(normal, axis=1)
@@ -112,12 +115,15 @@ def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
     frames."""
     x, y, z = local
     form = p[:, FORM]
-    ax, ay, az = np.abs(x), np.abs(y), np.abs(z)
+    ax = np.abs(x)
+    ay = np.abs(y)
+    az = np.abs(z)
     on_x = (ax >= ay) & (ax >= az)
     on_y = ~on_x & (ay >= az)
     k = (p[:, TOP] - p[:, BOTTOM]) * 0.5
     m = (p[:, BOTTOM] + p[:, TOP]) * 0.5
-    box, ball = form == Form.BOX, (form == Form.ELLIPSOID) | (form == Form.BOWL)
+    box = form == Form.BOX
+    ball = (form == Form.ELLIPSOID) | (form == Form.BOWL)
     cap = (ay >= _RIM) & ~((y > 0) & (form == Form.CUP))
     nx = np.where(box, np.where(on_x, x, 0.0), np.where(ball | ~cap, x, 0.0))
     nz = np.where(box, np.where(on_x | on_y, 0.0, z), np.where(ball | ~cap, z, 0.0))
@@ -125,13 +131,19 @@ def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
         box, np.where(on_y, y, 0.0), np.where(ball, y, np.where(cap, y, -k * (m + k * y)))
     )
     ny = np.where(form == Form.BOWL, (y - 1.0) * 0.25, ny)
-    hx, hy, hz = p[:, HALF], p[:, HALF + 1], p[:, HALF + 2]
-    nx, ny, nz = nx / hx, ny / hy, nz / hz
+    hx = p[:, HALF]
+    hy = p[:, HALF + 1]
+    hz = p[:, HALF + 2]
+    nx = nx / hx
+    ny = ny / hy
+    nz = nz / hz
     normal = [
         p[:, AXES + i] * nx + p[:, AXES + 3 + i] * ny + p[:, AXES + 6 + i] * nz for i in range(3)
     ]
     length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) + 1e-12
-    mx, my, mz = x * hx, y * hy, z * hz
+    mx = x * hx
+    my = y * hy
+    mz = z * hz
     a = np.where(box, np.where(on_x, mz, mx), mx + mz)
     b = np.where(box & on_y, mz, my)
     return [n / length for n in normal], a, b
@@ -142,11 +154,16 @@ def _light(normal: list[Array], ray: list[Array], world: list[Array], lights: Li
     length = np.sqrt(ray[0] * ray[0] + ray[1] * ray[1] + ray[2] * ray[2])
     facing = (nx * ray[0] + ny * ray[1] + nz * ray[2]) / length
     flip = np.where(facing > 0.0, -1.0, 1.0)
-    nx, ny, nz, facing = nx * flip, ny * flip, nz * flip, np.abs(facing)
+    nx = nx * flip
+    ny = ny * flip
+    nz = nz * flip
+    facing = np.abs(facing)
     sun = nx * SUN_DIRECTION[0] + ny * SUN_DIRECTION[1] + nz * SUN_DIRECTION[2]
     light = (AMBIENT + SKY * ny + SUN * np.maximum(sun, 0.0) + HEADLIGHT * facing) * lights.daylight
     for lamp in lights.lamps:
-        lx, ly, lz = lamp[0] - world[0], lamp[1] - world[1], lamp[2] - world[2]
+        lx = lamp[0] - world[0]
+        ly = lamp[1] - world[1]
+        lz = lamp[2] - world[2]
         square = lx * lx + ly * ly + lz * lz
         cosine = (nx * lx + ny * ly + nz * lz) / (np.sqrt(square) + 1e-6)
         light = light + lamp[3] * np.maximum(cosine, 0.0) * (LAMP_REACH / (LAMP_REACH + square))

@@ -24,12 +24,14 @@ _DOOR = 2.05  # height of doorways, metres
 
 def shell_rows(world: World) -> Array:
     """Return the primitives (n, COLUMNS) of all rooms; their instances index `SHELL_NAMES`."""
-    origin, straight = np.zeros(3), np.eye(3)
+    origin = np.zeros(3)
+    straight = np.eye(3)
     parts = []
     for room in world.rooms:
         if room.walled:
             parts.append(rows(_walls(room), origin, straight, 0))
-        width, length = (room.x_max - room.x_min) / 2, (room.z_max - room.z_min) / 2
+        width = (room.x_max - room.x_min) / 2
+        length = (room.z_max - room.z_min) / 2
         middle = ((room.x_max + room.x_min) / 2, (room.z_max + room.z_min) / 2)
         ceiling = ShapePart(
             Form.BOX,
@@ -83,8 +85,10 @@ def _walls(room: RoomShell) -> list[ShapePart]:
         for low, high, bottom in _pieces(start, end, doors, room.floor):
             if high - low < 1e-6:
                 continue
-            middle, half = (low + high) / 2, (high - low) / 2
-            level, rise = (bottom + room.height) / 2, (room.height - bottom) / 2
+            middle = (low + high) / 2
+            half = (high - low) / 2
+            level = (bottom + room.height) / 2
+            rise = (room.height - bottom) / 2
             parts.append(_slab(along_x, middle, at[side], half, level, rise, _THICK, color))
             if bottom == room.floor:
                 parts.append(
@@ -107,7 +111,8 @@ def _thresholds(room: RoomShell, color: Color, material: Material) -> list[Shape
     level = room.floor - _THICK - 0.001
     parts = []
     for side, low, high in room.openings:
-        middle, half = (low + high) / 2, (high - low) / 2
+        middle = (low + high) / 2
+        half = (high - low) / 2
         at = {"x-": room.x_min, "x+": room.x_max, "z-": room.z_min, "z+": room.z_max}[side]
         parts.append(
             _slab(side[0] == "z", middle, at, half, level, _THICK, 2 * _THICK, color, material)
@@ -120,7 +125,8 @@ def _pieces(
 ) -> list[tuple[float, float, float]]:
     """Return the stretches of a wall as (from, to, bottom): whole ones between doorways, and those
     above them."""
-    stretches, at = [], start
+    stretches = []
+    at = start
     for low, high in doors:
         stretches += [(at, low, floor), (low, high, floor + _DOOR)]
         at = high

@@ -18,7 +18,8 @@ from infthor_sim.render.table import ORIGIN, STEPS, shading_table
 
 __all__ = ["smooth"]
 
-_NEIGHBOURS, _SUBPIXELS = np.array(NEIGHBOURS), np.array(SUBPIXELS)
+_NEIGHBOURS = np.array(NEIGHBOURS)
+_SUBPIXELS = np.array(SUBPIXELS)
 
 
 def smooth(
@@ -59,11 +60,13 @@ def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
             jump = np.uint8(abs(total[y + 1, x] - total[y, x]) > JUMP)
             marked[y, x] |= jump
             marked[y + 1, x] |= jump
-    places, count = np.empty((height * width, 2), dtype=np.int64), 0
+    places = np.empty((height * width, 2), dtype=np.int64)
+    count = 0
     for y in range(height):
         for x in range(width):
             if marked[y, x]:
-                places[count, 0], places[count, 1] = y, x
+                places[count, 0] = y
+                places[count, 1] = x
                 count += 1
     return places[:count]
 
@@ -76,7 +79,8 @@ def _candidates(
     return how many."""
     count = 0
     for j in range(len(_NEIGHBOURS)):
-        yy, xx = y + _NEIGHBOURS[j, 0], x + _NEIGHBOURS[j, 1]
+        yy = y + _NEIGHBOURS[j, 0]
+        xx = x + _NEIGHBOURS[j, 1]
         if (
             yy < 0
             or xx < 0
@@ -85,11 +89,14 @@ def _candidates(
             or nearest[yy, xx] < 0
         ):
             continue
-        order, listed = nearest[yy, xx], False
+        order = nearest[yy, xx]
+        listed = False
         for k in range(count):
             listed = listed or orders[k] == order
         if not listed:
-            orders[count], at[count, 0], at[count, 1] = order, yy, xx
+            orders[count] = order
+            at[count, 0] = yy
+            at[count, 1] = xx
             count += 1
     return count
 
@@ -115,8 +122,11 @@ def _smooth(
     shown = np.full(
         len(jagged) * parts, -1, dtype=np.int32
     )  # the primitive that each ray hits; -1 for none
-    ray_u, ray_v, depths = np.empty(len(shown)), np.empty(len(shown)), np.empty(len(shown))
-    crease, levels = np.empty(len(shown)), np.empty(len(shown))
+    ray_u = np.empty(len(shown))
+    ray_v = np.empty(len(shown))
+    depths = np.empty(len(shown))
+    crease = np.empty(len(shown))
+    levels = np.empty(len(shown))
     orders = np.empty(len(_NEIGHBOURS), dtype=np.int32)
     at = np.empty((len(_NEIGHBOURS), 2), dtype=np.int64)
     for place in range(len(jagged)):
@@ -124,7 +134,8 @@ def _smooth(
         count = _candidates(nearest, y, x, orders, at)
         for part in range(parts):
             u, v = us[x] + _SUBPIXELS[part, 0] * pixel, vs[y] + _SUBPIXELS[part, 1] * pixel
-            best, chosen = math.inf, -1
+            best = math.inf
+            chosen = -1
             for k in range(count):
                 order = orders[k]
                 dx = (table[order, STEPS] + u * table[order, STEPS + 3]) + v * table[
@@ -136,11 +147,9 @@ def _smooth(
                 dz = (table[order, STEPS + 2] + u * table[order, STEPS + 5]) + v * table[
                     order, STEPS + 8
                 ]
-                ox, oy, oz = (
-                    table[order, ORIGIN],
-                    table[order, ORIGIN + 1],
-                    table[order, ORIGIN + 2],
-                )
+                ox = table[order, ORIGIN]
+                oy = table[order, ORIGIN + 1]
+                oz = table[order, ORIGIN + 2]
                 t = hit(
                     table[order, FORM],
                     table[order, BOTTOM],
@@ -154,21 +163,29 @@ def _smooth(
                     clip,
                 )
                 if clip < t < far and t < best:
-                    best, chosen = t, k
+                    best = t
+                    chosen = k
             if chosen >= 0:
                 i = place * parts + part
-                shown[i], ray_u[i], ray_v[i], depths[i] = orders[chosen], u, v, best
+                shown[i] = orders[chosen]
+                ray_u[i] = u
+                ray_v[i] = v
+                depths[i] = best
                 # The crease factor is that of the pixel that showed it, as there is no depth around
                 # the ray.
                 crease[i] = factors[at[chosen, 0], at[chosen, 1]]
     brightness(table, first, eye, daylight, shown, ray_u, ray_v, depths, levels)
     for place in range(len(jagged)):
         y, x = jagged[place, 0], jagged[place, 1]
-        red, green, blue = 0.0, 0.0, 0.0
+        red = 0.0
+        green = 0.0
+        blue = 0.0
         for i in range(place * parts, (place + 1) * parts):
             order = shown[i]
             if order < 0:  # the ray misses all candidates: the pixel's own colour is taken
-                red, green, blue = red + rgb[y, x, 0], green + rgb[y, x, 1], blue + rgb[y, x, 2]
+                red = red + rgb[y, x, 0]
+                green = green + rgb[y, x, 1]
+                blue = blue + rgb[y, x, 2]
                 continue
             level = levels[i] * crease[i]
             red += min(table[order, COLOR] * level * 255.0, 255.0)

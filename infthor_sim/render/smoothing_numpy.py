@@ -14,7 +14,8 @@ from infthor_sim.render.smoothing import JUMP, NEIGHBOURS, SUBPIXELS
 
 __all__ = ["smooth"]
 
-_NEIGHBOURS, _SUBPIXELS = np.array(NEIGHBOURS), np.array(SUBPIXELS)
+_NEIGHBOURS = np.array(NEIGHBOURS)
+_SUBPIXELS = np.array(SUBPIXELS)
 
 
 def smooth(
@@ -32,14 +33,13 @@ def smooth(
         return
     us, vs = camera.rays()
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
-    around_y, around_x = ys[:, None] + _NEIGHBOURS[:, 0], xs[:, None] + _NEIGHBOURS[:, 1]
+    around_y = ys[:, None] + _NEIGHBOURS[:, 0]
+    around_x = xs[:, None] + _NEIGHBOURS[:, 1]
     inside = (
         (around_y >= 0) & (around_x >= 0) & (around_y < rgb.shape[0]) & (around_x < rgb.shape[1])
     )
-    around_y, around_x = (
-        np.where(inside, around_y, ys[:, None]),
-        np.where(inside, around_x, xs[:, None]),
-    )
+    around_y = np.where(inside, around_y, ys[:, None])
+    around_x = np.where(inside, around_x, xs[:, None])
     orders = np.where(inside, nearest[around_y, around_x], -1)
     total = np.zeros((len(ys), 3))
     for dx, dy in _SUBPIXELS:
@@ -49,7 +49,8 @@ def smooth(
         best = depths[np.arange(len(ys)), chosen]
         at = np.isfinite(best)
         total[~at] += rgb[ys[~at], xs[~at]]
-        near_y, near_x = around_y[at, chosen[at]], around_x[at, chosen[at]]
+        near_y = around_y[at, chosen[at]]
+        near_x = around_x[at, chosen[at]]
         order = nearest[near_y, near_x]
         p = prims[projection.index[order]]
         level = brightness_at(

@@ -15,7 +15,8 @@ def name_after(outer: SimObject, basin: SimObject) -> None:
 def rim_pieces(outer: SimObject, inner: SimObject) -> tuple[Rect, ...]:
     """Return the outline of `outer` from above without that of `inner`; both have the same yaw."""
     middle = outer.matrix.T @ (inner.center - outer.center)
-    whole, hole = outer.box_size / 2, inner.box_size / 2
+    whole = outer.box_size / 2
+    hole = inner.box_size / 2
     return subtract(
         (-float(whole[0]), -float(whole[2]), float(whole[0]), float(whole[2])),
         [(middle[0] - hole[0], middle[2] - hole[2], middle[0] + hole[0], middle[2] + hole[2])],

@@ -85,7 +85,8 @@ class Catalogue:
             assert self._supplement_path is not None
             self._supplement = read_supplement(self._supplement_path)
         extra = self._supplement.get(name, Supplement())
-        objects, cells = self._data.objects(name), self._data.cells(name)
+        objects = self._data.objects(name)
+        cells = self._data.cells(name)
         malformed = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
         with wrap_errors(f"{name}: its recording is malformed", "record it again", catch=malformed):
             return build_floor_plan(name, objects, cells, extra)

@@ -10,7 +10,9 @@ from infthor_sim.scenes.roomplan import RoomPlan
 
 __all__ = ["furnish_kitchen"]
 
-_HEIGHT, _DEPTH = 0.92, 0.65  # of the counter, metres
+# of the counter, metres
+_HEIGHT = 0.92
+_DEPTH = 0.65
 _MODULE = 0.6  # width of a part of the counter, metres
 _FRONT = _MODULE - 0.004  # width of its doors and drawers: a hairline between neighbours
 _APPLIANCES = (

@@ -14,10 +14,9 @@ from infthor_sim.world import World
 __all__ = ["infer_layout"]
 
 _BODY = np.array([0.2, 0.0, 0.2])  # half of the floor that the agent takes up, metres
-_LIP, _BEFORE = (
-    0.02,
-    0.6,
-)  # metres that a counter sticks out over its cabinets, and of free floor in front of them
+# metres that a counter sticks out over its cabinets, and of free floor in front of them
+_LIP = 0.02
+_BEFORE = 0.6
 
 
 def infer_layout(world: World) -> None:
@@ -50,7 +49,8 @@ def _front(item: SimObject, nav: NavGrid) -> float:
     """Return the yaw of the front in the object's own frame, degrees: towards the most free
     floor."""
     low, high = item.bounds()
-    center, half = (low + high) / 2, (high - low) / 2
+    center = (low + high) / 2
+    half = (high - low) / 2
     hinge = item.position - center
     scores = []
     for angle in (0.0, 90.0, 180.0, 270.0):
@@ -156,7 +156,8 @@ def _fronts_below(counter: SimObject, fixed: list[SimObject]) -> Iterator[tuple[
 def _own_frame(item: SimObject, low: Array, high: Array) -> Rect:
     """Return the rectangle of a box, given by its corners, in an object's own frame."""
     points = (np.array([low, high]) - item.center) @ item.matrix
-    a, b = points.min(axis=0), points.max(axis=0)
+    a = points.min(axis=0)
+    b = points.max(axis=0)
     return float(a[0]), float(a[2]), float(b[0]), float(b[2])
 
 

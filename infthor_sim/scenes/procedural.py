@@ -50,7 +50,8 @@ def build_scene(scene_type: str, seed: int) -> World:
         if scene_type == "house":
             plans, doors = _house_plans(random, seed)
         else:
-            plans, doors = [RoomPlan(_shell(scene_type, random, seed), random)], []
+            plans = [RoomPlan(_shell(scene_type, random, seed), random)]
+            doors = []
             _furnish(plans[0], scene_type)
         world = build_world(f"{scene_type}-{seed}", seed, plans, doors)
         if all(_is_accessible(world, plan) for plan in plans):
@@ -78,10 +79,8 @@ def _is_accessible(world: World, plan: RoomPlan) -> bool:
 def _shell(room_type: str, random: np.random.Generator, seed: int) -> RoomShell:
     """Return a room around (0, 0), of a random size that suits its type."""
     least_x, most_x, least_z, most_z = _SIZES[room_type]
-    width, length = (
-        round(random.uniform(least_x, most_x) / 2, 2),
-        round(random.uniform(least_z, most_z) / 2, 2),
-    )
+    width = round(random.uniform(least_x, most_x) / 2, 2)
+    length = round(random.uniform(least_z, most_z) / 2, 2)
     return RoomShell(-width, width, -length, length, floor_style=_FLOORS[room_type], style=seed)
 
 
@@ -104,8 +103,10 @@ def _house_plans(
 ) -> tuple[list[RoomPlan], list[tuple[float, float]]]:
     """Return the plans of four rooms, two by two with doorways between them, and the cells in the
     doorways."""
-    west, east = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.6, 5.2), 2)
-    south, north = round(random.uniform(4.6, 5.2), 2), round(random.uniform(4.4, 5.0), 2)
+    west = round(random.uniform(4.6, 5.2), 2)
+    east = round(random.uniform(4.6, 5.2), 2)
+    south = round(random.uniform(4.6, 5.2), 2)
+    north = round(random.uniform(4.4, 5.0), 2)
     gap = 0.1  # the thickness of an inner wall
     spans = {
         "living-room": (-west, 0.0, -south, 0.0),
@@ -113,7 +114,8 @@ def _house_plans(
         "kitchen": (-west, 0.0, gap, north),
         "bathroom": (gap, min(east, 4.2), gap, min(north, 4.2)),
     }
-    door_x, door_z = -round(west * 0.22, 2), -round(south * 0.72, 2)
+    door_x = -round(west * 0.22, 2)
+    door_z = -round(south * 0.72, 2)
     upper_z = round(gap + 1.0, 2)
     openings = {
         "living-room": (
@@ -129,7 +131,8 @@ def _house_plans(
     }
     plans: list[RoomPlan] = []
     for room_type, (x0, x1, z0, z1) in spans.items():
-        style, doorways = seed + len(plans), openings[room_type]
+        style = seed + len(plans)
+        doorways = openings[room_type]
         room = RoomShell(
             x0, x1, z0, z1, floor_style=_FLOORS[room_type], style=style, openings=doorways
         )

@@ -219,7 +219,8 @@ def _stretch(ends: Span, length: float, low: float, high: float, bottom: float, 
     """Return the part of a wall of some length between two places along it, from `bottom` to the
     ceiling."""
     x0, z0, x1, z1 = ends
-    a, b = low / length, high / length
+    a = low / length
+    b = high / length
     return Wall(
         x0 + (x1 - x0) * a,
         z0 + (z1 - z0) * a,
@@ -257,7 +258,8 @@ def _nav(rects: Sequence[Rect], walls: Sequence[Wall], objects: list[SimObject])
 
 
 def _distance(points: Array, wall: Wall) -> Array:
-    a, b = np.array([wall.x0, wall.z0]), np.array([wall.x1, wall.z1])
+    a = np.array([wall.x0, wall.z0])
+    b = np.array([wall.x1, wall.z1])
     along = b - a
     share = np.clip((points - a) @ along / max(float(along @ along), 1e-9), 0.0, 1.0)
     away: Array = np.hypot(*(points - (a + share[:, None] * along)).T)

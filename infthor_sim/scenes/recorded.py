@@ -36,14 +36,16 @@ def recorded_object(entry: Mapping[str, Any]) -> SimObject:
 
 
 def _object(entry: Mapping[str, Any]) -> SimObject:
-    position, declared = to_array(entry["position"]), _type(entry)
+    position = to_array(entry["position"])
+    declared = _type(entry)
     oriented = entry.get("objectOrientedBoundingBox")
     if oriented and oriented.get("cornerPoints"):
         points = np.array(oriented["cornerPoints"], dtype=float)
         yaw = _yaw(entry["rotation"], points)
     else:  # the world's axes are the best guess for an object that is not turned by a quarter
         box = entry["axisAlignedBoundingBox"]
-        center, half = to_array(box["center"]), to_array(box["size"]) / 2
+        center = to_array(box["center"])
+        half = to_array(box["size"]) / 2
         points = np.array([center - half, center + half])
         yaw = round(float(entry["rotation"]["y"]) / 90) * 90.0
     local = (points - position) @ yaw_matrix(yaw)

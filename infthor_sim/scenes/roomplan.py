@@ -17,7 +17,9 @@ from infthor_sim.world import RoomShell, World
 __all__ = ["RoomPlan", "build_world"]
 
 _BODY = 0.23  # the agent's radius and a margin, metres
-_KNEE, _HEAD = 0.1, 1.6  # heights in metres between which an object takes floor from the agent
+# heights in metres between which an object takes floor from the agent
+_KNEE = 0.1
+_HEAD = 1.6
 _CLEAR = 0.9  # metres of floor in front of a doorway
 
 
@@ -233,7 +235,8 @@ def build_world(
 
 
 def _connected_parts(grid: NavGrid) -> list[list[tuple[float, float]]]:
-    left, parts = set(grid), []
+    left = set(grid)
+    parts = []
     while left:
         parts.append(grid.reachable_cells(*min(left)))
         left -= {min(left), *parts[-1]}

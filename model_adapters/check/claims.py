@@ -81,7 +81,8 @@ def check_video(model: Model, black: FrameRef, white: FrameRef) -> None:
         return
     talks = [start_conversation(model, video, QUESTION) for video in videos]
     if model.capabilities.counts_tokens:
-        without, within = start_conversation(model, QUESTION).n_tokens or 0, talks[0].n_tokens or 0
+        without = start_conversation(model, QUESTION).n_tokens or 0
+        within = talks[0].n_tokens or 0
         require(within > without, "n_tokens does not grow with a video")
     replies = [talk.reply(GREEDY) for talk in talks]
     if model.capabilities.deterministic:

@@ -41,7 +41,8 @@ def check_counts(model: Model, frame: FrameRef) -> None:
             "tokens_per_frame() is not None though counts_tokens is false",
         )
         return
-    talk, sizes = model.conversation(), []
+    talk = model.conversation()
+    sizes = []
     for parts in ((frame,), (frame,), ("\nThe first frame.",), (frame, frame), (QUESTION,)):
         talk.append(*parts)
         sizes.append(talk.n_tokens or 0)
@@ -71,10 +72,8 @@ def check_turns(model: Model, frame: FrameRef) -> None:
 
 def check_marks(model: Model, frame: FrameRef) -> None:
     """Check marks and rewinding."""
-    talk, unchanged = (
-        start_conversation(model, frame, QUESTION),
-        start_conversation(model, frame, QUESTION),
-    )
+    talk = start_conversation(model, frame, QUESTION)
+    unchanged = start_conversation(model, frame, QUESTION)
     early = talk.mark()
     talk.append(" More.")
     late = talk.mark()

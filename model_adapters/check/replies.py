@@ -77,7 +77,8 @@ def check_continuations(model: Model, black: FrameRef, white: FrameRef) -> None:
         [white, "\nWhat colours are the frames?"],
         ["\nWhy?"],
     ]
-    size, together = talk.n_tokens, talk.replies(continuations, GREEDY)
+    size = talk.n_tokens
+    together = talk.replies(continuations, GREEDY)
     require(talk.n_tokens == size, "replies() changes the conversation")
     require(
         len(together) == len(continuations), "replies() does not give one reply per continuation"
@@ -93,7 +94,8 @@ def _check_counted(reply: Reply, size: int | None) -> None:
         reply.n_context_tokens == size,
         "n_tokens before a reply is not the reply's n_context_tokens",
     )
-    cached, n_new = reply.n_cached_tokens, reply.n_reply_tokens
+    cached = reply.n_cached_tokens
+    n_new = reply.n_reply_tokens
     require(
         cached is not None and 0 <= cached < (size or 0),
         "n_cached_tokens is not between 0 and the context",

@@ -68,7 +68,8 @@ def load_model(
         ModelError: the checkpoint cannot be loaded, or processor and model disagree on a frame's
             tokens.
     """
-    loaded, pretrained = load_checkpoint(located, family), located.options.pretrained
+    loaded = load_checkpoint(located, family)
+    pretrained = located.options.pretrained
     with wrap_mismatch_errors(pretrained), torch.inference_mode():
         n_slots = loaded.family.frame_ids(_SAMPLE).count(loaded.family.slot_id)
         n_features = len(loaded.family.features([Image.new("RGB", _SAMPLE)])[0])

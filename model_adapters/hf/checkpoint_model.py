@@ -96,7 +96,8 @@ class HfModel(CheckpointModel):
     def identity(self) -> dict[str, Any]:
         """Return checkpoint, precision, kernels, versions and generation settings, as JSON
         values."""
-        options, generation = self._options, self._loaded.generation
+        options = self._options
+        generation = self._loaded.generation
         return self._loaded.identity | {
             "adapter": self.name,
             "max_tokens": self._context_limit,

@@ -51,7 +51,8 @@ class VectorFile:
             DataError: the disk is full.
         """
         rows = np.zeros(len(keys), self._row_type)
-        rows["key"], rows["vector"] = keys, vectors
+        rows["key"] = keys
+        rows["vector"] = vectors
         fcntl.flock(self._file, fcntl.LOCK_EX)
         try:
             size = os.fstat(self._file.fileno()).st_size

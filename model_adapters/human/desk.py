@@ -93,10 +93,8 @@ class Desk:
             KeyboardInterrupt: the person stops the run from the page.
         """
         with self._changed:
-            self._question, self._answer = (
-                Question(next(self._numbers), asked, time.monotonic()),
-                None,
-            )
+            self._question = Question(next(self._numbers), asked, time.monotonic())
+            self._answer = None
             self._change()
             try:
                 while self._answer is None and not self._is_stopped:

@@ -104,7 +104,8 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
 
 
 def _take(desk: Desk, given: _Given) -> Response:
-    question, text = desk.question, given.text.strip()
+    question = desk.question
+    text = given.text.strip()
     if not text:
         return _problem("write an answer first", 400)
     if len(text) > _LONGEST:

@@ -17,7 +17,8 @@ def state_of(desk: Desk) -> dict[str, Any]:
     `parts` has the texts and frames that a model would be given, in order: `{"text": ...}` or
     `{"frame": n}`, n being the frame's place among all frames.
     """
-    version, question = desk.version, desk.question
+    version = desk.version
+    question = desk.question
     return {
         "version": version,
         "closed": desk.is_closed,
@@ -44,7 +45,8 @@ def _parts(turns: tuple[Turn, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _question(question: Question) -> dict[str, Any]:
-    asked, notice = question.asked, question.asked.notice
+    asked = question.asked
+    notice = question.asked.notice
     return {
         "number": question.number,
         "seconds": round(time.monotonic() - question.since, 1),

@@ -126,7 +126,8 @@ class Endpoint:
             ) from error
 
     def _classify(self, error: openai.APIStatusError) -> _TransientError | ModelError:
-        status, body = error.status_code, error.response.content
+        status = error.status_code
+        body = error.response.content
         phrase = f" {HTTPStatus(status).phrase}" if status in set(HTTPStatus) else ""
         problem = f"answers {status}{phrase}: {self._quote(body)}"
         hint = (

@@ -73,10 +73,8 @@ class ServedModel:
             completion, faults = self._send(request, charge)
         text = self._secret.redact(completion.text(self._endpoint.where))
         thinking = None if completion.thinking is None else self._secret.redact(completion.thinking)
-        reply, usage = (
-            Reply(self._cut(text, decoding), faults=faults, thinking=thinking),
-            completion.usage,
-        )
+        reply = Reply(self._cut(text, decoding), faults=faults, thinking=thinking)
+        usage = completion.usage
         if usage is None:
             return reply
         return replace(
@@ -158,7 +156,8 @@ class ServedModel:
 
 
 def _prices(options: OpenAIOptions) -> Prices | None:
-    prompt, reply = options.price_per_m_input, options.price_per_m_output
+    prompt = options.price_per_m_input
+    reply = options.price_per_m_output
     if prompt is None or reply is None:
         return None
     cached = options.price_per_m_cached

@@ -156,7 +156,8 @@ def synthetic_frames() -> Iterator[list[FrameRef]]:
 
 
 def _row(ours: Policy, theirs: Policy, frames: Sequence[FrameRef], instruction: str) -> _ParityRow:
-    differences, n_steps = [], (0, 0)
+    differences = []
+    n_steps = (0, 0)
     for frame in frames:
         ours.reset()
         theirs.reset()

@@ -18,7 +18,8 @@ from model_adapters.tiny.twin import SPREAD, TinyAdapter, Twin, siglip_config, t
 
 __all__ = ["DeepseekVLTiny"]
 
-_BEGIN, _END = "<｜begin▁of▁sentence｜>", "<｜end▁of▁sentence｜>"
+_BEGIN = "<｜begin▁of▁sentence｜>"
+_END = "<｜end▁of▁sentence｜>"
 
 _TEMPLATE = """\
 {{- 'You are a helpful language and vision assistant.\\n\\n' -}}

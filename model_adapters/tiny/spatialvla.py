@@ -33,10 +33,8 @@ _AXES = {
     "pitch_bins": (16, -1.0, 1.0, 0.0, 0.5),
     "yaw_bins": (16, -1.0, 1.0, 0.0, 0.5),
 }
-_TRANSLATION, _ROTATION = (
-    ("theta_bins", "phi_bins", "r_bins"),
-    ("roll_bins", "pitch_bins", "yaw_bins"),
-)
+_TRANSLATION = ("theta_bins", "phi_bins", "r_bins")
+_ROTATION = ("roll_bins", "pitch_bins", "yaw_bins")
 
 
 def _borders(n_bins: int, low: float, high: float, mean: float, deviation: float) -> list[float]:

@@ -78,7 +78,8 @@ class VllmModel(CheckpointModel):
     def identity(self) -> dict[str, Any]:
         """Return checkpoint, precision, engine settings, versions and generation settings, as JSON
         values."""
-        options, loaded = self._options, self._loaded
+        options = self._options
+        loaded = self._loaded
         checkpoint = {
             name: value for name, value in loaded.identity.items() if name not in _META_KEYS
         }
@@ -125,7 +126,8 @@ class VllmModel(CheckpointModel):
             prompts = [self.pieces(turns) for turns in conversations]
         for prompt in prompts:
             self._check_size(prompt, decoding)
-        settings, requests = self._settings(decoding), self._requests(prompts)
+        settings = self._settings(decoding)
+        requests = self._requests(prompts)
         first = self._new_prefixes(prompts)
         outputs: dict[int, EngineOutput] = {}
         for wave in (first, [at for at in range(len(prompts)) if at not in first]):
@@ -160,7 +162,8 @@ class VllmModel(CheckpointModel):
         read_choices(
             self._loaded.tokenizer, decoding
         )  # refuses choices that are longer than the reply may be
-        own, asked = self._loaded.generation.repetition_penalty, decoding.repetition_penalty
+        own = self._loaded.generation.repetition_penalty
+        asked = decoding.repetition_penalty
         settings: dict[str, Any] = {
             "max_tokens": decoding.max_new_tokens,
             "temperature": decoding.temperature,

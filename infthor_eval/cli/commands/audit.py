@@ -55,7 +55,8 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
     if not data.questions:
         raise DataError(f"{set_folder}: no question can be audited; fix the set, or give another")
     summaries = [_read_summary(folder) for folder in runs]
-    questions, console = audit(data), table_console()
+    questions = audit(data)
+    console = table_console()
     for table in (guessers_table(questions), *audit_tables(questions)):
         print_table(table, console)
     if summaries:

@@ -43,10 +43,8 @@ def command(manifest: Path, out: Path) -> int:
     print_line(questions.summary_text())
     if not expected.files:
         return 0
-    n_files, differing = (
-        len(expected.files.keys() | built.files.keys()),
-        differing_files(expected, built),
-    )
+    n_files = len(expected.files.keys() | built.files.keys())
+    differing = differing_files(expected, built)
     print_line(f"{n_files - len(differing)} of {n_files} files as in the manifest")
     for name in differing[:10]:
         error_console().print(f"differs: {name}")

@@ -74,7 +74,8 @@ def _import_replies(
     from infthor_eval.nieh.suite import NiehSuite
     from infthor_eval.runs.stored.writing import store_run
 
-    questions, suite = NiehSet(data), NiehSuite()
+    questions = NiehSet(data)
+    suite = NiehSuite()
     print_left_out(data, questions.malformed)
     for run in import_logs(logs, questions, model):
         stored = store_run(output, run.header(questions), suite, run.make_records, run.n_missing)
@@ -114,7 +115,8 @@ def _import_plans(
     suite = PlansSuite()
     for run in [import_counts(read_plan_log(log), model) for log in logs]:
         stored = store_run(output, run.header, suite, run.make_records, n_missing=0)
-        name, path = run.header.name, run.log.path
+        name = run.header.name
+        path = run.log.path
         n_trajectories = len({record.cluster for record in run.records})
         print_note(
             f"{name}: {len(run.records)} plans of {n_trajectories} trajectories imported; the "

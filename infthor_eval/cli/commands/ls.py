@@ -81,7 +81,8 @@ def _memories() -> None:
 @include_option
 def _tasks(include: tuple[Path, ...]) -> None:
     """Tasks and groups of tasks."""
-    catalog, packaged = Catalog.find_installed(include), Catalog.find_packaged().tasks
+    catalog = Catalog.find_installed(include)
+    packaged = Catalog.find_packaged().tasks
     for suite, tasks in split_by_suite(catalog.tasks.values()).items():
         table = RichTable(suite, "what it evaluates", "data", box=box.SIMPLE_HEAD)
         for group, members in catalog.groups.items():

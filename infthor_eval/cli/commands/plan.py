@@ -112,7 +112,8 @@ def _row(item: TaskEstimate) -> Row:
 def _totals(
     request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None
 ) -> list[str]:
-    seconds, workers = sum(item.total.seconds for item in tasks), request.worker_settings.workers
+    seconds = sum(item.total.seconds for item in tasks)
+    workers = request.worker_settings.workers
     by_all = f", {format_duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
     lines = [f"time: {format_duration(seconds)} of one worker{by_all}, loading not counted"]
     lines.append(f"memory: {_peak_megabytes():,} MB at most while measuring{_gpu_memory()}")

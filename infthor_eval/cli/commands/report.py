@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_PAGE, _FOLDER = Path("results/report.html"), Path("results/figures")
+_PAGE = Path("results/report.html")
+_FOLDER = Path("results/figures")
 
 
 @click.command(

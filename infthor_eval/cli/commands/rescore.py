@@ -96,7 +96,8 @@ def command(
         raise click.UsageError("--judge-prompt is how a judge is asked; give one with --judge")
     if judge is not None and len(judge) > 1:
         raise click.UsageError(f"--judge names {len(judge)} models; give one")
-    source, own = read_source(folder), find_scorer(scorer) if scorer is not None else None
+    source = read_source(folder)
+    own = find_scorer(scorer) if scorer is not None else None
     prompt = judge_prompt or _JUDGE_PROMPT
     asked = (judge_tokens or _JUDGE_TOKENS[prompt], seed, prompt)
     with _load_judge(judge[0], judge_args, *asked) if judge else nullcontext() as loaded:
@@ -142,7 +143,9 @@ def _print(rescoring: Rescoring, rescored: Rescored) -> None:
     from infthor_eval.nieh.suite import NiehSuite
     from infthor_eval.report.terminal import print_table, table_console
 
-    report, run, console = rescored.report, rescored.run, table_console()
+    report = rescored.report
+    run = rescored.run
+    console = table_console()
     _print_counts(report)
     print_table(change_table(report, sources_of(rescoring.header.config)), console)
     if report.judge is not None and rescoring.judge is not None:

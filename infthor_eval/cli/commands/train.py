@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_GPUS, _TFLOPS = 8, 400.0
+_GPUS = 8
+_TFLOPS = 400.0
 _PER_TRAJECTORY = 500  # more than there are questions on a trajectory
 _STAGES = {
     "vision": "recognising objects",
@@ -257,7 +258,8 @@ def _generate_data(
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.thor.launch import embedded_launch
 
-    trajectories, replayed_set = prepare_folder(out / "trajectories"), prepare_folder(out / "set")
+    trajectories = prepare_folder(out / "trajectories")
+    replayed_set = prepare_folder(out / "set")
     jobs = trajectory_jobs(
         scenes.names,
         seed=seed,

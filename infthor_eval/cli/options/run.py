@@ -177,7 +177,8 @@ class RunOptions:
             click.UsageError: options that exclude each other.
             UsageError: an engine that does not run the model.
         """
-        for_all, engine = _options_of_all_models(given), given["engine"]
+        for_all = _options_of_all_models(given)
+        engine = given["engine"]
         models = _with_threads(
             given["threads"],
             [

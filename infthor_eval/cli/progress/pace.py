@@ -27,7 +27,8 @@ class Pace:
         self._n_units = n_units
         self._context_tokens = self._cached_tokens = 0
         self._started_at = self._last_line_at = now
-        self.n_resumed, self.n_new = n_resumed, 0
+        self.n_resumed = n_resumed
+        self.n_new = 0
         self._n_done_at_last_line = n_resumed
 
     def count(self, resumed: bool, now: float, context: int = 0, cached: int = 0) -> None:
@@ -60,7 +61,8 @@ class Pace:
 
     def line(self, now: float) -> str:
         """Return all of it: `37 of 147 (25 %), 2 min left, 1.3 a second, 83 % of tokens cached`."""
-        n_done, rate = self._n_done, self._rate(now)
+        n_done = self._n_done
+        rate = self._rate(now)
         position = f"{n_done:,} of {self._n_units:,} ({100 * n_done / self._n_units:.0f} %)"
         if rate is None:
             return position
@@ -81,7 +83,8 @@ class Pace:
         has_step = self._n_done - self._n_done_at_last_line >= _STEP * self._n_units
         due = elapsed >= _MAX_INTERVAL_S or (elapsed >= _MIN_INTERVAL_S and has_step)
         if due:
-            self._last_line_at, self._n_done_at_last_line = now, self._n_done
+            self._last_line_at = now
+            self._n_done_at_last_line = self._n_done
         return due
 
     @property

@@ -52,10 +52,8 @@ def slicings(history: TrajectoryHistory) -> Iterator[Candidate]:
     """Yield the question on what the agent sliced."""
     events = [event for event in history.events if event.action == "SliceObject"]
     if all(history.shows_slices(event.frame, event.target) for event in events):
-        clues, types = (
-            tuple(event.frame for event in events),
-            [event.object_type for event in events],
-        )
+        clues = tuple(event.frame for event in events)
+        types = [event.object_type for event in events]
         yield from type_question(SLICING, "What did you slice?", (), clues, types)
 
 

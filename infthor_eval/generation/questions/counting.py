@@ -34,7 +34,8 @@ def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
         moves = history.moves_of(item)
         shown = all(history.shows(move.after, move.item, move.target) for move in moves)
         if len(items) == 1 and shown and len(moves) == history.pickups[item] > 1:
-            form, frames = "How many times did you move {}?", [move.after for move in moves]
+            form = "How many times did you move {}?"
+            frames = [move.after for move in moves]
             yield _count(QUESTION_TYPE, form, (with_the(object_type),), frames, object_type)
 
 
@@ -79,7 +80,8 @@ def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     for target, moves in sorted(by_target.items()):
         shown = all(history.shows_put(move) for move in moves)
         if shown and all(history.is_only_one(move.after, target) for move in moves):
-            place_type, frames = history.target_type(moves[0]), [move.after for move in moves]
+            place_type = history.target_type(moves[0])
+            frames = [move.after for move in moves]
             form = "How many times did you put something {}?"
             yield _count(FURTHER, form, (in_or_on(place_type),), frames, place_type)
 

@@ -47,10 +47,8 @@ def _inside(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
             continue  # ambiguous
         if here == move.target and history.shows_put(move):  # still where the last clue shows it
             place_type = states[receptacle].type
-            names, subjects = (
-                (with_the(states[item].type), in_or_on(place_type)),
-                (states[item].type, place_type),
-            )
+            names = (with_the(states[item].type), in_or_on(place_type))
+            subjects = (states[item].type, place_type)
             answer = "yes" if here == receptacle else "no"
             yield Candidate(QUESTION_TYPE, "Is {} {}?", names, (move.after,), (answer,), subjects)
 
@@ -79,7 +77,8 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
         return
     place_type = states[receptacle].type
     types = sorted(states[key].type for key in inside)
-    where, count = (in_or_on(place_type),), str(len(inside))
+    where = (in_or_on(place_type),)
+    count = str(len(inside))
     yield Candidate(
         QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (place_type, "#")
     )

@@ -128,7 +128,8 @@ def generate_questions(
     rule_jobs = [_RuleJob(path, vocabularies[rooms[path]], seed, share, further) for path in types]
     candidates_by_path = _share_out(rule_jobs, worker_settings, say, result)
     chooser = Chooser(by_subject=by_subject)
-    check_jobs, chosen_by_path = [], {}
+    check_jobs = []
+    chosen_by_path = {}
     # Not shared out: the balance depends on what was chosen on all trajectories before.
     for path in [path for path in types if path in candidates_by_path]:
         candidates, rng = candidates_by_path[path]

@@ -75,7 +75,8 @@ def _moved_from(
     origin = _start(history, move)
     others = [_start(history, other) for other in moves[:-1]]
     if _changes(history, move) and origin not in others and None not in others:
-        form, clues = "Where did you move {} from {}?", (move.before, move.after)
+        form = "Where did you move {} from {}?"
+        clues = (move.before, move.after)
         yield _candidate(
             QUESTION_TYPE, form, clues, [history.target_type(move)], object_type, origin
         )
@@ -84,7 +85,8 @@ def _moved_from(
 def _now(
     history: TrajectoryHistory, object_type: str, moves: tuple[ObjectMove, ...]
 ) -> Iterator[Candidate]:
-    move, last = moves[-1], len(history) - 1
+    move = moves[-1]
+    last = len(history) - 1
     alone = move.item in history.states(last) and history.is_only_one(last, move.item)
     if alone and history.shows_put(move) and _is_down(history, move):
         place = history.states(last)[move.target].type

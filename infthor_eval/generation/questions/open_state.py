@@ -36,7 +36,8 @@ def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
         object_type = history.states(len(history) - 1)[key].type
         frame = history.clearest(open_at or frames, key)
         if object_type in _CONTAINERS and frame is not None:
-            names, answer = (with_the(object_type),), "yes" if open_at else "no"
+            names = (with_the(object_type),)
+            answer = "yes" if open_at else "no"
             yield Candidate(
                 QUESTION_TYPE, "Was {} open?", names, (frame,), (answer,), (object_type,)
             )
@@ -89,10 +90,8 @@ def _then(history: TrajectoryHistory, key: str, event: Event, phrase: str) -> It
     states = history.states(event.frame)
     if key in states and history.shows(event.frame, key) and _shows_event(history, event):
         answer = "yes" if states[key].is_open else "no"
-        names, subjects = (
-            (with_the(states[key].type), phrase),
-            (states[key].type, event.object_type),
-        )
+        names = (with_the(states[key].type), phrase)
+        subjects = (states[key].type, event.object_type)
         yield Candidate(
             FURTHER, "Was {} open when you {}?", names, (event.frame,), (answer,), subjects
         )

@@ -22,7 +22,8 @@ from infthor_eval.household.wording import noun, with_article
 __all__ = ["QUESTION_TYPE", "no_questions", "yes_questions"]
 
 QUESTION_TYPE = "object_presence"
-_IN_ROOM, _SEEN = "Is there any {} in this room?", "Have you seen {}?"
+_IN_ROOM = "Is there any {} in this room?"
+_SEEN = "Have you seen {}?"
 _FEW = 8  # with fewer types of other rooms, AI2-THOR's are added
 _BUSY = 3  # minimum number of objects in a sampled frame, if the trajectory has such frames
 

@@ -23,11 +23,9 @@ def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
         (move, *others) = moves
         before = move.after - 1
         if not others and history.shows(before, move.item) and history.shows_put(move):
-            form, names, clues = (
-                "What object did you put {}?",
-                (in_or_on(place_type),),
-                (before, move.after),
-            )
+            form = "What object did you put {}?"
+            names = (in_or_on(place_type),)
+            clues = (before, move.after)
             yield from type_question(
                 QUESTION_TYPE, form, names, clues, [move.object_type], (place_type,)
             )
@@ -61,8 +59,6 @@ def _what(
     """Yield a question on the moved objects, with the frame after the first put of each."""
     first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
     if all(history.shows_put(move) for move in first_puts):
-        clues, types = (
-            tuple(move.after for move in first_puts),
-            [move.object_type for move in first_puts],
-        )
+        clues = tuple(move.after for move in first_puts)
+        types = [move.object_type for move in first_puts]
         yield from type_question(FURTHER, form, tuple(map(in_or_on, places)), clues, types, places)

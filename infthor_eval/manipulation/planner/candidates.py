@@ -19,7 +19,10 @@ __all__ = ["PutGoal", "ReleasePoses", "passing_poses", "release_poses"]
 
 # Release poses that are drawn, rated (of those within reach), tested for collisions (of the best),
 # and kept. Each step costs more a pose than the one before, so it sees fewer of them.
-_DRAWN, _RATED, _TESTED, _KEPT = 8000, 1000, 400, 24
+_DRAWN = 8000
+_RATED = 1000
+_TESTED = 400
+_KEPT = 24
 _ABOVE = (
     0.02,
     0.02,
@@ -30,7 +33,8 @@ _ABOVE = (
 )  # metres between a place, or a rim, and the object released above it
 # In units of the places' spacing: a receptacle narrower than the first has few places, and one may
 # go beyond its outermost ones by the second.
-_FEW, _BEYOND = 1.5, 0.4
+_FEW = 1.5
+_BEYOND = 0.4
 _RIM = 0.05  # metres that a rim is above the places within it
 _INTO = 0.3  # share of poses that are below a rim, as on the seat of a sofa
 _YAWS = np.radians(np.arange(-150.0, 151.0, 30.0))  # directions of the hand, from straight ahead
@@ -39,11 +43,16 @@ _BASES = (0.0, 0.2, -0.2, 0.4, -0.4)  # metres of the base above the wrist
 # Costs of release poses, in metres of path: of an object over an edge, or on other objects; of a
 # place at an edge; of releasing below a rim; of a radian that the hand points down, or aside; of a
 # metre to fall.
-_LOOSE, _OCCUPIED, _EDGE, _BELOW_RIM, _PITCHED, _TURNED, _DROP = 1.0, 3.0, 0.6, 0.3, 0.2, 0.05, 0.5
-_COLLIDED, _NEAR = (
-    0.2,
-    0.06,
-)  # cost of each collision with the receptacle within so many metres of the place
+_LOOSE = 1.0
+_OCCUPIED = 3.0
+_EDGE = 0.6
+_BELOW_RIM = 0.3
+_PITCHED = 0.2
+_TURNED = 0.05
+_DROP = 0.5
+# cost of each collision with the receptacle within so many metres of the place
+_COLLIDED = 0.2
+_NEAR = 0.06
 _OUT = (0.12, 0.24, 0.36, 0.5, 0.65)  # metres before a place
 _CLEAR = 0.02  # metres by which the object is raised on the way there
 _UP = (0.08, 0.2, 0.4)  # metres above a place
@@ -89,7 +98,8 @@ def release_poses(
     receptacle."""
     poses, costs = _draw_above(goal, terrain.linkage, stand, draw)
     reached = np.flatnonzero(terrain.linkage.can_reach(poses))[:_RATED]
-    poses, costs = poses[reached], costs[reached]
+    poses = poses[reached]
+    costs = costs[reached]
     held = terrain.linkage.held_box(poses)
     over = support(held, goal.places)
     costs = costs + _LOOSE * (1.0 - over) + _EDGE * (1.0 - firmness(held, goal.places))
@@ -121,7 +131,8 @@ def _draw_above(
     it would rest."""
     points = _within_reach(goal.places.points, linkage)
     spots = _jitter(points[draw.integers(len(points), size=_DRAWN)], goal.places, draw)
-    yaws, pitches = draw.choice(_YAWS, size=_DRAWN), draw.choice(_PITCHES, size=_DRAWN)
+    yaws = draw.choice(_YAWS, size=_DRAWN)
+    pitches = draw.choice(_PITCHES, size=_DRAWN)
     yaws = np.where(
         draw.random(_DRAWN) < 1 / 2, yaws, draw.uniform(_YAWS[0], _YAWS[-1], size=_DRAWN)
     )

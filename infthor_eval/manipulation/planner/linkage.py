@@ -109,12 +109,11 @@ class Linkage:
         turn = _matrix(arm.joints[-1].rotation)
         self.now = Poses((wrist - base[1] * _UP)[None], np.array([base[1]]), turn[None])
         if before is not None:
-            self._lengths, self._side = before._lengths, before._side
-            self.lever, self._held_axes, self._held_half = (
-                before.lever,
-                before._held_axes,
-                before._held_half,
-            )
+            self._lengths = before._lengths
+            self._side = before._side
+            self.lever = before.lever
+            self._held_axes = before._held_axes
+            self._held_half = before._held_half
             return
         self._lengths = (
             float(np.linalg.norm(elbow - shoulder)),

@@ -171,8 +171,10 @@ def cavity(item: ThorObject, places: Places, entry: Entry, hinge: int) -> list[C
         hinge: edge of the opening that the door hangs on: -1 for the one of lower coordinate, 1 for
             the other, 0 for no door.
     """
-    box, half = corners_of(item), places.spacing / 2
-    axis, across = entry.axis, 2 - entry.axis
+    box = corners_of(item)
+    half = places.spacing / 2
+    axis = entry.axis
+    across = 2 - entry.axis
     low, high = places.points.min(axis=0) - half, places.points.max(axis=0) + half
     inner = Corners((low[0], box.low[1], low[2]), (high[0], box.high[1], high[2]))
     boxes = [_slab(inner, across, side, 2 * _BOARD) for side in (-1, 1)]

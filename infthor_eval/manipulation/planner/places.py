@@ -41,10 +41,9 @@ _LEVEL = 0.01  # metres within which places are on one board
 _BREADTH = 0.05  # metres from the foremost places to the opening
 _THIN = 0.05  # metres above its topmost places from which a receptacle has a roof
 _SHRUNK = 0.9  # of the held object's box, whose outermost corners may stick out
-_FIRM, _WHOLE = (
-    1.1,
-    4.0,
-)  # radius in units of the spacing, and the number of places within it around an inner one
+# radius in units of the spacing, and the number of places within it around an inner one
+_FIRM = 1.1
+_WHOLE = 4.0
 _BESIDE = 0.5  # occupancy of a place at which another object would be touched
 _OVER = 0.75  # distance to a place, in units of the spacing, within which a point is over the board
 

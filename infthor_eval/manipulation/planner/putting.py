@@ -24,7 +24,9 @@ from infthor_eval.manipulation.planner.surroundings import Belief, Surroundings
 __all__ = ["put_steps"]
 
 _MAX_PATHS = 40  # after which it gives up
-_EXACT, _LEVEL = 0.015, 0.03  # metres, and entries of rotations, within which a pose is reached
+# metres, and entries of rotations, within which a pose is reached
+_EXACT = 0.015
+_LEVEL = 0.03
 # Beliefs about obstacles, tried one after the other until there is a path, and the number of poses
 # drawn for each. The metadata's boxes are larger than the things, so with all of them there is
 # often no path.

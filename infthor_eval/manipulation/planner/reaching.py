@@ -69,7 +69,8 @@ def _aim(view: SimulatorView, goal: Point) -> Call:
     """Turn the hand so that it points to a goal."""
     arm = arm_of(view)
     wrist = point_of(arm.wrist)
-    now, aim = offset(wrist, point_of(arm.sphere_center)), offset(wrist, goal)
+    now = offset(wrist, point_of(arm.sphere_center))
+    aim = offset(wrist, goal)
     yaw = math.degrees(math.atan2(aim[0], aim[2]) - math.atan2(now[0], now[2]))
     pitch = math.degrees(_elevation(now) - _elevation(aim))
     return {

@@ -21,10 +21,9 @@ from infthor_eval.manipulation.planner.obstacles import Obstacles, clearances
 
 __all__ = ["ArmMove", "Contact", "MoveKind", "Roadmap", "Terrain", "first_pose_of"]
 
-_STEP, _ANGLE = (
-    0.03,
-    math.radians(5.0),
-)  # metres and radians between two poses of a movement that are tested
+# metres and radians between two poses of a movement that are tested
+_STEP = 0.03
+_ANGLE = math.radians(5.0)
 _MARGIN = 0.01  # metres that are kept from obstacles
 _STUCK = (
     0.02  # metres of overlap from which a thing cannot be where its box says, as the arm is there
@@ -34,18 +33,16 @@ _NEAR = (
 )
 _NEIGHBOURS = 14  # of a pose in the roadmap
 _GLANCE = 3  # every third pose of a movement is tested first: most collisions show there
-_HARD, _CLOSE = (
-    0.15,
-    0.12,
-)  # cost in metres that is added to edges within so many metres of a collision
+# cost in metres that is added to edges within so many metres of a collision
+_HARD = 0.15
+_CLOSE = 0.12
 _LEARNT = 3  # colliding poses of each edge that this is done for
 _MAX_SEARCHES = 150
 _SAME = 1e-3  # metres and radians within which poses are equal: simulators round
-_MOVE, _BASE, _TURN = (
-    0.15,
-    0.5,
-    0.25,
-)  # costs in metres: of a movement, a metre of the base, and a radian
+# costs in metres: of a movement, a metre of the base, and a radian
+_MOVE = 0.15
+_BASE = 0.5
+_TURN = 0.25
 _MAX_LENGTH = 2.0  # cost above which edges are left out
 _MAX_TURN = math.radians(170.0)  # nearly half a turn, whose direction depends on rounding
 
@@ -206,7 +203,8 @@ class Terrain:
         """Return how far (n, contacts) poses are from earlier collisions, metres."""
         if not self.contacts:
             return np.zeros((len(poses), 0))
-        wrists, held = poses.world(), self.linkage.held_box(poses).center[:, 0]
+        wrists = poses.world()
+        held = self.linkage.held_box(poses).center[:, 0]
         apart = [
             np.maximum(
                 np.linalg.norm(wrists - c.wrist, axis=1), np.linalg.norm(held - c.held, axis=1)
@@ -274,17 +272,16 @@ class Roadmap:
     def __init__(self, terrain: Terrain, others: Poses, ends: Poses, costs: Array) -> None:
         """Collect the poses that may be passed (n), and those to reach (m) with their costs
         (m,)."""
-        self._terrain, self._costs = terrain, costs
+        self._terrain = terrain
+        self._costs = costs
         self._poses = Poses.join([terrain.linkage.now, ends, others])
         self._n_ends = len(ends)
         self._movements: dict[tuple[int, int], list[ArmMove] | None] = {}
         self._lengths = self._edge_costs()
         self._edges = np.nonzero(np.isfinite(self._lengths))
         spots = self._spots_of(self._poses)
-        self._edge_starts, self._edge_lines = (
-            spots[self._edges[0]],
-            spots[self._edges[1]] - spots[self._edges[0]],
-        )
+        self._edge_starts = spots[self._edges[0]]
+        self._edge_lines = spots[self._edges[1]] - spots[self._edges[0]]
         self._squared_lengths = np.maximum((self._edge_lines**2).sum(axis=1), _SAME)
 
     def _edge_costs(self) -> Array:

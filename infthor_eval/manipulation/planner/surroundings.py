@@ -62,7 +62,8 @@ class Surroundings:
     def __init__(self, environment: ArmEnvironment, linkage: Linkage, floor: float) -> None:
         """Collect the boxes around an environment that was reset to an episode; `floor` is a height
         in metres."""
-        self._environment, self._linkage = environment, linkage
+        self._environment = environment
+        self._linkage = linkage
         self._item = environment.view.objects[str(environment.start.receptacle_id)]
         self.places = places_of(environment, self._item)
         self.entry = (

@@ -52,7 +52,8 @@ class ArmObserver:
         sent no frame."""
         if view.frame is None:
             raise DataError("the simulator sent no frame; use one that renders")
-        arm, hand = arm_of(view), self._hand(view)
+        arm = arm_of(view)
+        hand = self._hand(view)
         if hand != self._path[-1]:
             self._path.append(hand)
         reach = Reach(

@@ -96,11 +96,9 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
         trajectory: ArmTrajectory,
         start_simulator: Callable[..., Simulator],
     ) -> None:
-        self._recorded, self._trajectory, self._start_simulator = (
-            recorded,
-            trajectory,
-            start_simulator,
-        )
+        self._recorded = recorded
+        self._trajectory = trajectory
+        self._start_simulator = start_simulator
         self._environments: dict[
             tuple[int, float], ArmEnvironment
         ] = {}  # by camera, see `ArmTaskSettings.camera`
@@ -197,7 +195,9 @@ class _EpisodeInReplay:
     """An episode that is being replayed."""
 
     def __init__(self, environment: ArmEnvironment, begun: ArmOutcome, payload: ArmRecord) -> None:
-        self._environment, self._outcome, self._payload = environment, begun, payload
+        self._environment = environment
+        self._outcome = begun
+        self._payload = payload
         named = [
             name
             for name in (environment.start.object_id, environment.start.receptacle_id)

@@ -82,7 +82,8 @@ class _UnitRequest:
     ) -> UnitRecord[NiehAnswer]:
         """Return the record of a reply; a failed one, with the reply, if the task's own metrics
         fail on it."""
-        scores, failure = {}, None
+        scores = {}
+        failure = None
         thinking, answer = answer_of(reply)
         answer = self.prepared.cut(answer)
         try:
@@ -157,7 +158,8 @@ class ModelAnswerer:
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
         """See `Answerer`."""
-        context, decoding = requests[0].context, requests[0].decoding
+        context = requests[0].context
+        decoding = requests[0].decoding
         if self._person is not None:
             self._person.tell(
                 Notice(title="Question", words=requests[0].prepared.task_samples.words)

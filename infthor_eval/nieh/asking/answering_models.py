@@ -73,7 +73,8 @@ class _ConversationModel:
         if any(sample.awaits_recall for sample in prepared.task_samples.samples):
             lines.append("what a memory recalls for each question is not counted yet")
         if prepared.task_samples.shows_films:
-            name, as_video = self._model.name, "the film is given as a video"
+            name = self._model.name
+            as_video = "the film is given as a video"
             lines.append(
                 as_video
                 if self.video_input

@@ -87,10 +87,8 @@ class Random(BaselineSubject):
 
         def predict(sample: Sample) -> str:
             counts = _counts(seen, sample.question)
-            draw, answers = (
-                random.Random(seed_of(f"{self._seed}\n{sample.question.id}")),
-                sorted(counts),
-            )
+            draw = random.Random(seed_of(f"{self._seed}\n{sample.question.id}"))
+            answers = sorted(counts)
             return draw.choices(answers, weights=[counts[text] for text in answers])[0]
 
         return predict

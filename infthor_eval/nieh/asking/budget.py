@@ -69,7 +69,8 @@ def budget_of(prepared: PreparedTask, model: Model) -> Budget:
         ModelError: the model can take none of the requests, whatever their length.
     """
     capabilities = model.capabilities
-    limit, before = capabilities.max_tokens, capabilities.max_tokens_before_extension
+    limit = capabilities.max_tokens
+    before = capabilities.max_tokens_before_extension
     longest = _longest_questions(prepared.task_samples.samples)
     counts = _counts(model, prepared, longest)
     fitting = [count for count in counts if limit is None or count <= limit]

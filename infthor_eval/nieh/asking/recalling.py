@@ -69,7 +69,10 @@ class Recaller:
             find: finds an earlier recall.
             keep: keeps a new one.
         """
-        self._task_samples, self._write, self._find, self._keep = task_samples, write, find, keep
+        self._task_samples = task_samples
+        self._write = write
+        self._find = find
+        self._keep = keep
         self._built: _Built | None = None
         self._identities: dict[RecallSettings, dict[str, Any]] = {}
         self._observed: dict[
@@ -93,7 +96,8 @@ class Recaller:
                 recalls what it may not: beyond its budget, or what it has not observed.
             UserCodeError: the memory fails.
         """
-        settings, question = sample.recall, sample.question
+        settings = sample.recall
+        question = sample.question
         if settings is None:
             raise ValueError("the sample's context has no memory")
         steps, digests = self._observations(sample)
@@ -102,7 +106,9 @@ class Recaller:
         if known is not None:
             return known
         built = self._build(question.traj_id, settings, steps)
-        memory, past, present = built.memory, built.steps[:-1], built.steps[-1]
+        memory = built.memory
+        past = built.steps[:-1]
+        present = built.steps[-1]
         clues = clue_positions(self._task_samples.data, question) if not question.absence else ()
         query = Query(
             text=question.text,
@@ -222,7 +228,8 @@ def _visible(steps: Sequence[Observation], memory: Memory) -> list[Observation]:
 
 def _observations(task_samples: TaskSamples, sample: Sample) -> list[Observation]:
     """Return all steps of a sample's trajectory."""
-    data, traj_id = task_samples.data, sample.question.traj_id
+    data = task_samples.data
+    traj_id = sample.question.traj_id
     frames = task_samples.all_frames(sample)
     steps = sorted(read_steps(data.folder(traj_id)), key=lambda step: step.img_idx)
     outline = data.outline(traj_id)

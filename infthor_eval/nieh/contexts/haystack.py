@@ -30,7 +30,8 @@ def haystack(
     data: NiehSet, question: Question, settings: ContextSettings
 ) -> list[Sample | SkippedQuestion]:
     """Return a question on one window per depth."""
-    n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
+    n_all = len(data.frames(question.traj_id))
+    n = settings.n_frames(_K_TOKENS)
     if question.absence:
         return [_anywhere(question, n_all, n, settings.seed)]
     clues = clue_positions(data, question)

@@ -39,7 +39,8 @@ def interleaved_plans(
 def _actions_before_marks(text: str) -> list[int]:
     """Return the number of actions before each frame mark. The frame after a goal shows the result
     of the last one."""
-    done, n_actions = [], 0
+    done = []
+    n_actions = 0
     for before in text.split(_MARK)[:-1]:
         n_actions += before.rstrip().endswith(_ACT)
         done.append(n_actions)

@@ -33,7 +33,8 @@ def truncate_head(
 ) -> list[Sample | SkippedQuestion]:
     """The last frames that fit the context (published under the same name); clues before them are
     lost."""
-    n_all, n = len(data.frames(question.traj_id)), settings.n_frames(_K_TOKENS)
+    n_all = len(data.frames(question.traj_id))
+    n = settings.n_frames(_K_TOKENS)
     if n < 1:
         return [SkippedQuestion(question, "no frame fits the context")]
     n_cut = max(0, n_all - n)

@@ -109,7 +109,8 @@ def groups(questions: Sequence[AuditedQuestion], by: str) -> list[Group]:
     several."""
     split: dict[str, list[AuditedQuestion]] = {}
     for item in questions:
-        name, file = BY[by](item.question), item.question.file
+        name = BY[by](item.question)
+        file = item.question.file
         split.setdefault(f"{file}: {name}" if file and by != "file" else name, []).append(item)
     return [Group(by, name, items) for name, items in sorted(split.items())]
 

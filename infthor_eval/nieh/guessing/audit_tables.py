@@ -47,7 +47,8 @@ def audit_tables(questions: Sequence[AuditedQuestion]) -> list[Table]:
     for by, head in _HEADS.items():
         rows = []
         for group in groups(questions, by):
-            yes, (best, mean) = group.share_yes, group.best()
+            yes = group.share_yes
+            (best, mean) = group.best()
             cells = (
                 group.name,
                 str(len(group.questions)),

@@ -113,7 +113,8 @@ def _best_cut(sizes: Sequence[int]) -> tuple[int, int]:
     Args:
         sizes: number of questions of each answer, descending.
     """
-    best, kept = (0, 0), 0
+    best = (0, 0)
+    kept = 0
     for n_answers in range(2, len(sizes) + 1):
         for most in range(sizes[0], 0, -1):
             total = sum(min(size, most) for size in sizes[:n_answers])

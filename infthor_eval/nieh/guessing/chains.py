@@ -53,7 +53,8 @@ def chains_of_words_and_place(sample: Sample) -> list[Chain]:
     the stem."""
     stem = words_of(sample.question)[:_STEM]
     first, last = sample.frames[0], sample.frames[-1]
-    place, span = ("place", *stem, last // _PLACE), ("span", *stem, (last - first).bit_length())
+    place = ("place", *stem, last // _PLACE)
+    span = ("span", *stem, (last - first).bit_length())
     return [*chains_of_words(sample), [("stem", *stem), place], [("stem", *stem), span]]
 
 
@@ -101,7 +102,8 @@ class Guesser:
         return self._answers[known[np.argmax(np.round(total, _DIGITS))]]
 
     def _count(self, sample: Sample) -> None:
-        answer, group = self._number[doc_target(sample.question)], self._held_out(sample)
+        answer = self._number[doc_target(sample.question)]
+        group = self._held_out(sample)
         for context in {(), *(context for chain in self._chains(sample) for context in chain)}:
             self._seen[context][answer] += 1
             self._own[group, context][answer] += 1

@@ -55,7 +55,8 @@ def _guess_constant(samples: Sequence[Sample], group_of: Callable[[Sample], str]
     everywhere: dict[str, Counter[str]] = defaultdict(Counter)
     own: dict[tuple[str, str], Counter[str]] = defaultdict(Counter)
     for sample in samples:
-        group, answer = group_of(sample), doc_target(sample.question)
+        group = group_of(sample)
+        answer = doc_target(sample.question)
         everywhere[group][answer] += 1
         own[group, own_of(sample)][answer] += 1
     guesses = []
@@ -73,7 +74,9 @@ def _guess_by_chains(
     return [guesser.guess(sample) for sample in samples]
 
 
-_WORDS, _NUMBER, _PLACE = Knowledge.WORDS, Knowledge.NUMBER, Knowledge.PLACE
+_WORDS = Knowledge.WORDS
+_NUMBER = Knowledge.NUMBER
+_PLACE = Knowledge.PLACE
 GUESSERS = (
     NamedGuesser(
         "one answer a file", Knowledge.FILE, partial(_guess_constant, group_of=lambda _: "")

@@ -22,7 +22,9 @@ _FOLDS = 10
 _PLACE = 100  # frames that count as one place
 # On the published files any strength from 1 to 10 gives the same within a point; nothing more is
 # tuned.
-_INVERSE_PENALTY, _TOLERANCE, _ITERATIONS = 3.0, 1e-2, 1000
+_INVERSE_PENALTY = 3.0
+_TOLERANCE = 1e-2
+_ITERATIONS = 1000
 
 
 def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -> list[str]:
@@ -62,7 +64,8 @@ def guess_by_learning(samples: Sequence[Sample], *, number: bool, place: bool) -
 
 def _features(sample: Sample, number: bool, place: bool) -> dict[str, float]:
     """Return features by name, each also crossed with the form of the question."""
-    form, words = form_of(sample.question), words_of(sample.question)
+    form = form_of(sample.question)
+    words = words_of(sample.question)
     names = [*words, *(f"{first} {second}" for first, second in pairwise(words))]
     if number:
         names.append(f"#number {len(sample.frames)}")

@@ -40,11 +40,13 @@ def _fitting(reply: LoggedReply) -> str | None:
     if (
         reply.mode == "video"
     ):  # its rows do not count frames, and no text is as long as a pair of them
-        n_text, known = reply.n_context_tokens % _PER_PAIR - _MARKS, _OF_FILMS
+        n_text = reply.n_context_tokens % _PER_PAIR - _MARKS
+        known = _OF_FILMS
     elif reply.n_frames is None:
         return None
     else:
-        n_text, known = reply.n_context_tokens - _PER_FRAME * reply.n_frames, _OF_FRAMES
+        n_text = reply.n_context_tokens - _PER_FRAME * reply.n_frames
+        known = _OF_FRAMES
     n_least = len(reply.published.text.split()) + 1
     return next(
         (prompt for prompt, n in known.items() if 0 <= n_text - n - n_least <= _MOST_SPLITS), None

@@ -131,10 +131,8 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
         name = _PUBLISHED_NAME.match(log.name)
         if model is None and name is None:
             raise UsageError(f"{log}: its name has no model; give one with --model")
-        of_model, (task, settings) = (
-            model or (name and name["model"]) or "",
-            _mode_of(replies_of[log], log),
-        )
+        of_model = model or (name and name["model"]) or ""
+        (task, settings) = _mode_of(replies_of[log], log)
         if task != _OTHER[0]:
             settings["prompt"] = asked_prompt(replies_of[log])
             task = _published_task(settings) or task
@@ -221,7 +219,8 @@ def _add_log(
 ) -> None:
     by_id = {question.id: question for question in questions if isinstance(question, Question)}
     answered = {record.id for record in run.records}
-    n_before, refused = len(run.records), []
+    n_before = len(run.records)
+    refused = []
     for row in rows:
         question = _find_question(row, questions, by_id)
         if isinstance(question, str):
@@ -260,7 +259,8 @@ def _find_question(
         )
     if row.row is None or not 0 <= row.row < len(questions):
         return f"answers question {row.row}; the file has {len(questions)}"
-    question, said = questions[row.row], row.published
+    question = questions[row.row]
+    said = row.published
     if isinstance(question, SkippedQuestion):
         return question.reason
     if said and (said.traj_id, said.text, said.clues, said.answers) != (

@@ -29,7 +29,8 @@ def table4(data: NiehSet) -> Table:
         DataError: the set has no questions with the scores of a model.
     """
     published = next(table for table in published_tables("nieh") if table.title == _TITLE)
-    rows, misprints = [], []
+    rows = []
+    misprints = []
     for row in published.rows:
         cells = derive_row(data, row)
         low, high = (

@@ -215,7 +215,8 @@ def judge_replies(
         session: the journal that has the verdicts.
         track: wraps the replies that the judge is asked about, to show its progress.
     """
-    known, scored = KnownAnswers(records), [record for record in records if record.payload.scores]
+    known = KnownAnswers(records)
+    scored = [record for record in records if record.payload.scores]
     unsure = [record for record in scored if known.is_unsure(record)]
     right, wrong = _sample(scored, {record.key for record in unsure}, judge.seed)
     verdicts: dict[UnitKey, float | None] = {}

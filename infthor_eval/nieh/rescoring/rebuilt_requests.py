@@ -93,7 +93,8 @@ class RequestRebuilder:
         return sample
 
     def _variants(self, question: Question, record: UnitRecord[NiehAnswer]) -> Iterator[Sample]:
-        data, name = self._samples.data, self._samples.context_name
+        data = self._samples.data
+        name = self._samples.context_name
         if name == _RETRIEVED:  # by a model, which may not be there, and takes minutes
             raise DataError(
                 "its frames were retrieved by a model, and the journal does not have them"

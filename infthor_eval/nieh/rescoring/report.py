@@ -121,7 +121,8 @@ def sources_of(config: Mapping[str, Any]) -> dict[str, str]:
     by: dict[str, str] = dict(
         zip(SCORERS, ("the published scorer", "our strict scorer"), strict=True)
     )
-    scorer, judge = config["rescored"]["scorer"], config["rescored"]["judge"]
+    scorer = config["rescored"]["scorer"]
+    judge = config["rescored"]["judge"]
     if scorer:
         by |= {
             name: f"{scorer['name']} in {scorer.get('file') or scorer['package']}"

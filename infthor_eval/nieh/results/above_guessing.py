@@ -76,7 +76,8 @@ def above_guessing(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> Ab
     ]
     pairs = [(score_above_guessing(record.payload, scorer), record.cluster) for record in known]
     counted = [(score, cluster) for score, cluster in pairs if score is not None]
-    scores, clusters = [score for score, _ in counted], [cluster for _, cluster in counted]
+    scores = [score for score, _ in counted]
+    clusters = [cluster for _, cluster in counted]
     low, high = (bootstrap_interval(scores, clusters) if scores else None) or (None, None)
     return AboveGuessing(
         mean=sum(scores) / len(scores) if scores else None,
@@ -108,5 +109,6 @@ def _by_form(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> dict[str
 
 def _form(record: UnitRecord[NiehAnswer]) -> str:
     assert record.payload.guess is not None
-    file, form = record.payload.file, record.payload.guess.form
+    file = record.payload.file
+    form = record.payload.guess.form
     return f"{file}: {form}" if file else form

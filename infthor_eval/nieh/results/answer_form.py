@@ -54,7 +54,8 @@ def format_failures(records: Sequence[Record], max_new_tokens: int | None) -> di
 
 
 def _failures(record: Record, said: str, max_new_tokens: int | None) -> list[str]:
-    gold, reasons = _gold(record), []
+    gold = _gold(record)
+    reasons = []
     if not said:
         reasons.append("empty" if record.payload.thinking is None else "cut off while thinking")
     elif gold in ({"yes"}, {"no"}) and says_yes_or_no(said) is None:

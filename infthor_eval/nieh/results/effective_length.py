@@ -160,7 +160,8 @@ def _points(sized: tuple[float, TaskSummary], scorer: str) -> Iterator[_Point]:
 
 
 def _point(length: str, task: TaskSummary, scorer: str) -> _Point:
-    total, above = task.by_clues["total"], task.above_guessing.get(scorer)
+    total = task.by_clues["total"]
+    above = task.above_guessing.get(scorer)
     return _Point(
         length, total.scores[scorer].mean if total.n else None, above.mean if above else None
     )

@@ -29,7 +29,8 @@ class Gain:
     def in_column(self, column: str) -> float | None:
         """Return the gain for a number of clues or in total, between -1 and 1; None if nothing was
         asked."""
-        seeing, blind = self.seeing.by_clues[column], self.blind.by_clues[column]
+        seeing = self.seeing.by_clues[column]
+        blind = self.blind.by_clues[column]
         if not seeing.n or not blind.n:
             return None
         return seeing.scores[self.metric].mean - blind.scores[self.metric].mean
@@ -40,7 +41,8 @@ class Gain:
 
         Runs whose configs differ in their frames only ask the same questions, in the same order.
         """
-        seeing, blind = self.seeing.scores[self.metric], self.blind.scores[self.metric]
+        seeing = self.seeing.scores[self.metric]
+        blind = self.blind.scores[self.metric]
         clusters = [trajectory for trajectory, scores in seeing.items() for _ in scores]
         if not clusters:
             return None

@@ -56,7 +56,9 @@ def _rows(runs: Sequence[RunSummary]) -> Iterator[tuple[tuple[str | int, ...], R
 
 
 def _cells(summary: NiehSummary, name: str, task: TaskSummary) -> tuple[str, ...]:
-    memory, times, metric = task.memory, summary.took.get(name), main_metric(task)
+    memory = task.memory
+    times = summary.took.get(name)
+    metric = main_metric(task)
     assert memory is not None
     score = task.by_clues["total"].scores[metric]
     low, high = (None if end is None else 100 * end for end in (score.low, score.high))
@@ -81,5 +83,6 @@ def _recalled(task: TaskSummary, share: str, metric: str) -> TableCell:
     if share not in cells:
         return TableCell("-", {"": "", "questions": "0"})
     cell = cells[share]
-    mean, part = f"{100 * cell.scores[metric].mean:.1f}", f"{100 * cell.n / n_all:.0f}"
+    mean = f"{100 * cell.scores[metric].mean:.1f}"
+    part = f"{100 * cell.n / n_all:.0f}"
     return TableCell(f"{mean} ({part} %)", {"": mean, "questions": str(cell.n)})

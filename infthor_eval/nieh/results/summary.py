@@ -360,10 +360,8 @@ def _cell(records: Sequence[Record], metrics: Sequence[str]) -> Cell:
 
 
 def _mean(records: Sequence[Record], metric: str) -> Score:
-    scores, trajectories = (
-        [_score(record, metric) for record in records],
-        [record.cluster for record in records],
-    )
+    scores = [_score(record, metric) for record in records]
+    trajectories = [record.cluster for record in records]
     estimate = clustered_mean(scores, trajectories)
     return Score(
         mean=estimate.mean,

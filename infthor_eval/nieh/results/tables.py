@@ -98,7 +98,8 @@ def overview(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _name_and_total(name: str, task: TaskSummary) -> tuple[str, ...]:
-    total, metric = task.by_clues["total"], main_metric(task)
+    total = task.by_clues["total"]
+    metric = main_metric(task)
     name_and_metric = name if metric == "strict" else f"{name}, {metric}"
     return name_and_metric, _mean(total, metric), *_intervals(total, metric), str(total.n)
 
@@ -136,10 +137,8 @@ def clues_table(runs: Sequence[RunSummary]) -> Table:
     rows."""
     apart = (OPEN_ENDED, ABSENCE, "above guessing")
     numbers = (*CLUE_COLUMNS, "95 %", "bootstrap", *apart, "n", "skipped", "failed")
-    rows, notes = (
-        [row for run in runs for row in _rows_of(run)],
-        [*_LEGEND, *above_guessing_notes(runs)],
-    )
+    rows = [row for run in runs for row in _rows_of(run)]
+    notes = [*_LEGEND, *above_guessing_notes(runs)]
     for table in filter(_is_by_clues, published_tables("nieh")):
         rows += _published_rows(table, runs)
         notes += table.notes

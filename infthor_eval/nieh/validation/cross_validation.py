@@ -167,7 +167,8 @@ def write_inspection_list(path: Path, items: Iterable[JudgedQuestion]) -> Path |
 def _row(item: JudgedQuestion, decision: str) -> list[object]:
     question = item.question
     replies = "; ".join(f"{model}: {text}" for model, text in item.replies.items())
-    clues, answers = list(question.clues), list(question.answers)
+    clues = list(question.clues)
+    answers = list(question.answers)
     return [question.id, question.traj_id, question.text, clues, answers, replies, decision]
 
 
@@ -183,7 +184,8 @@ def read_decisions(path: Path) -> dict[str, str]:
         place = f"{path}, line {row.line}"
         if row.problem is not None:
             raise DataError(f"{place}: {row.problem}")
-        name, decision = unshield(row.cells["question_id"]), row.cells["decision"].strip().lower()
+        name = unshield(row.cells["question_id"])
+        decision = row.cells["decision"].strip().lower()
         if decision and decision not in DECISIONS:
             raise DataError(f"{place}: decision is {decision!r:.60}; write keep or drop")
         if decisions.get(name, decision) != decision:

@@ -57,7 +57,8 @@ def expert_texts(trajectory: Trajectory, plan: Plan, words: Words) -> list[str]:
 def _situations(plan: str, done: Sequence[str]) -> Iterator[_Key]:
     """Yield descriptions of a situation, the most specific first."""
     verb, _ = read_plan(plan)
-    before, number = open_action(done[-1], plan) if done else _START, str(len(done))
+    before = open_action(done[-1], plan) if done else _START
+    number = str(len(done))
     yield "text", plan, number, before
     yield "text", plan, before
     yield "verb", verb, number, before

@@ -56,7 +56,8 @@ class ModelActor:
     """
 
     def __init__(self, model: Model, config: AgentConfig) -> None:
-        self._model, self._config = model, config
+        self._model = model
+        self._config = config
         self._conversation = model.conversation()
         if config.form is not None:
             self._conversation.append(config.form.system, role="system")
@@ -64,8 +65,10 @@ class ModelActor:
 
     def begin(self, situation: PlanSituation) -> None:
         """See `PlanActor`."""
-        environment, plan = situation.environment, situation.plan.index
-        self._seed, self._n_acts = situation.seed, 0
+        environment = situation.environment
+        plan = situation.plan.index
+        self._seed = situation.seed
+        self._n_acts = 0
         self._observation = situation.observation
         if situation.goes_on:
             return

@@ -22,7 +22,8 @@ class PersonActor(ModelActor):
     def begin(self, situation: PlanSituation) -> None:
         """See `PlanActor`."""
         super().begin(situation)
-        environment, plan = situation.environment, situation.plan
+        environment = situation.environment
+        plan = situation.plan
         self._title = f"Plan {plan.index + 1} of {len(environment.plans)}: {plan.text}"
         self._goal = environment.tasks[plan.task].text
         self._of_plan = 0.0

@@ -79,7 +79,8 @@ def _script(verb: str, types: tuple[str, ...]) -> list[str]:
 
 
 def _treat(item: str, appliance: str, treatment: list[str]) -> list[str]:
-    put, take = f"PutObject {item} {appliance}", f"PickupObject {item}"
+    put = f"PutObject {item} {appliance}"
+    take = f"PickupObject {item}"
     return [*_inside(appliance, put), *treatment, *_inside(appliance, take)]
 
 

@@ -67,7 +67,9 @@ class LastTokens:
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`; by bisection, as each count encodes the window."""
         segments = past.all
-        least, most = 1, len(segments)  # number of last segments
+        # number of last segments
+        least = 1
+        most = len(segments)
         if not self._fits(segments, least, count):
             raise ModelError(
                 f"the plan alone takes more than {self._n_tokens} tokens; give --history last:N a "

@@ -49,7 +49,10 @@ class RecalledHistory:
         Raises:
             UsageError: there is no such memory, or it needs a model that writes.
         """
-        self._name, self._options, self._budget, self._blank = name, options, budget, blank
+        self._name = name
+        self._options = options
+        self._budget = budget
+        self._blank = blank
         self._memory = open_memory(name, options)
         self._privileged = self._memory.capabilities.privileged
         if self._memory.capabilities.writes:
@@ -97,7 +100,8 @@ class RecalledHistory:
     def _tokens_per_frame(self, present: Observation, count: CountTokens) -> int | None:
         if self._budget is None:
             return None
-        both, one = count([present.frame, present.frame]), count([present.frame])
+        both = count([present.frame, present.frame])
+        one = count([present.frame])
         if both is None or one is None:
             raise ModelError("the model counts no tokens, so --budget cannot be used; leave it out")
         return both - one

@@ -113,10 +113,8 @@ def _names(retrieved: Mapping[str, Any] | None, action: int, k: int, place: str)
 def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
     """Return the step of each named frame; of several frames of one action all stand for its last
     one."""
-    where, hint = (
-        f"trajectory {trajectory.traj_id}: images is no list of low_idx and image_name",
-        "restore the file",
-    )
+    where = f"trajectory {trajectory.traj_id}: images is no list of low_idx and image_name"
+    hint = "restore the file"
     with wrap_errors(where, hint, catch=msgspec.ValidationError):
         images = msgspec.convert(trajectory.images, list[_Image])
     return {Path(image.image_name).stem: image.low_idx + 1 for image in images} | {_FIRST: 0}

@@ -26,9 +26,12 @@ def final_table(logs: Sequence[PlanLog]) -> Table:
     """
     published = next(table for table in published_tables("plans") if table.title == _TITLE)
     by_log = {row.log: row for row in published.rows if row.log is not None}
-    rows, remarks, n_cells = [], [], 0
+    rows = []
+    remarks = []
+    n_cells = 0
     for log in logs:
-        printed, counts = by_log.get(log.model or ""), count_plans(log)
+        printed = by_log.get(log.model or "")
+        counts = count_plans(log)
         rows.append(_row_of(log, counts, ends_section=printed is None))
         if printed is not None:
             cells, wrong = _printed(printed, published, counts)
@@ -107,7 +110,8 @@ def _printed(
 ) -> tuple[list[str], list[str]]:
     """Return the printed cells, those that do not follow with a mark, and a note on each of
     these."""
-    cells, notes = [], []
+    cells = []
+    notes = []
     for name, value in zip(table.columns, row.values, strict=True):
         follows = _percent(counts[name]) == f"{value:.1f}"
         cells.append(f"{value:.1f}{'' if follows else '*'}")

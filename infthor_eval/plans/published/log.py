@@ -42,21 +42,20 @@ def log_rows(plans: Sequence[PlanRecord]) -> Iterator[LogRow]:
     first is `INIT`."""
     last = LogRow()
     yield last
-    n_expert, expert_total, agent_total = 0, 0.0, 0.0
+    n_expert = 0
+    expert_total = 0.0
+    agent_total = 0.0
     for plan in plans:
-        n_actions, total = n_expert, expert_total
+        n_actions = n_expert
+        total = expert_total
         for number, step in enumerate(plan.steps, 1):
             # A failed action ends the plan and earns nothing; a completing one is left out.
             ends = number == len(plan.steps) and plan.ended != Ended.LIMIT
             if not ends:
-                n_actions, total, agent_total = (
-                    n_actions + 1,
-                    total + step.reward,
-                    agent_total + step.reward,
-                )
+                n_actions = n_actions + 1
+                total = total + step.reward
+                agent_total = agent_total + step.reward
             said = step.reply if step.reply is not None else step.action
             yield LogRow(n_actions, total, agent_total, said, step.reward, plan.kind, plan.index)
-        n_expert, expert_total = (
-            n_expert + plan.n_expert_steps,
-            expert_total + (plan.expert_reward or 0.0),
-        )
+        n_expert = n_expert + plan.n_expert_steps
+        expert_total = expert_total + (plan.expert_reward or 0.0)

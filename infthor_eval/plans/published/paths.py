@@ -20,10 +20,9 @@ Pose = tuple[
 ]  # cell (x, z) of 0.25 m, quarter turn, degrees of the camera downwards
 _Node = tuple[int, int, int]
 _MARGIN = 30  # cells around the reachable ones
-_FREE, _WALL = (
-    np.float32(1 + 1e-4),
-    np.float32(1e5),
-)  # costs of entering a cell; those of turns are 1
+# costs of entering a cell; those of turns are 1
+_FREE = np.float32(1 + 1e-4)
+_WALL = np.float32(1e5)
 _IMPASSABLE = 10.0
 _LOOK_DEGREES = 30
 _AHEAD = ((0, 1), (1, 0), (0, -1), (-1, 0))  # by quarter turn

@@ -153,15 +153,15 @@ class PublishedTask:
     def _pickup(self, step: "_Step") -> tuple[float, bool]:
         if not step.state.held:
             return 0.0, False
-        held, wanted = (
-            step.state.held[0],
-            _required(self._planner_action(step.index).object_id, "objectId"),
-        )
+        held = step.state.held[0]
+        wanted = _required(self._planner_action(step.index).object_id, "objectId")
         return self._pay(PlanKind.PICKUP, _unsliced(held) == _unsliced(wanted))
 
     def _put(self, step: "_Step") -> tuple[float, bool]:
-        per_success, now = self.rules.rewards[PlanKind.PUT], step.state.last_action
-        sub_goal, planner = self.plan[step.index], self._planner_action(step.index)
+        per_success = self.rules.rewards[PlanKind.PUT]
+        now = step.state.last_action
+        sub_goal = self.plan[step.index]
+        planner = self._planner_action(step.index)
         # What a sub-goal lacks is missed only where the published function comes to it.
         receptacle_id = (
             ""
@@ -218,7 +218,8 @@ class PublishedTask:
         return self._pay(PlanKind.HEAT, item is not None and item.object_id in step.treated.heated)
 
     def _cool(self, step: "_Step") -> tuple[float, bool]:
-        per_success, item = self.rules.rewards[PlanKind.COOL], self._put_next(step)
+        per_success = self.rules.rewards[PlanKind.COOL]
+        item = self._put_next(step)
         if item is None or item.object_id not in step.treated.cooled:
             return 0.0, False
         if not self.cooled:

@@ -35,7 +35,8 @@ class PublishedReward:
     see `PlanReward`."""
 
     def __init__(self, task: PublishedTask, sub_goal: int) -> None:
-        self._task, self._sub_goal = task, sub_goal
+        self._task = task
+        self._sub_goal = sub_goal
         self.goal_reached = False
 
     def after(
@@ -102,7 +103,10 @@ class PublishedScript:
             InfeasibleError: the agent can reach no cell.
             SimulatorError: the simulator fails.
         """
-        self._rules, self._trajectory, self._plans, self._tasks = rules, trajectory, plans, tasks
+        self._rules = rules
+        self._trajectory = trajectory
+        self._plans = plans
+        self._tasks = tasks
         self._empty = _first_empty(plans, tasks[-2:-1] if in_one_go else tasks)
         self._first = PublishedState.of(simulator.view, _FIRST)
         grid = reachable_grid(simulator)

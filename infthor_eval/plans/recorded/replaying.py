@@ -94,11 +94,9 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
         trajectory: PlanTrajectory,
         start_simulator: Callable[..., Simulator],
     ) -> None:
-        self._recorded, self._trajectory, self._start_simulator = (
-            recorded,
-            trajectory,
-            start_simulator,
-        )
+        self._recorded = recorded
+        self._trajectory = trajectory
+        self._start_simulator = start_simulator
         self._world: tuple[PlanEnvironment, Simulator] | None = None
 
     @property
@@ -119,7 +117,8 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
             rules = msgspec.convert(config.rewards, RewardRules)
             max_steps = msgspec.convert(config.settings.get("max_steps", MAX_STEPS), int)
         simulator = self._start_simulator()
-        data, words = self._trajectory.data, _words(config)
+        data = self._trajectory.data
+        words = _words(config)
         return PlanEnvironment(
             data, simulator, rules=rules, words=words, max_steps=max_steps
         ), simulator
@@ -130,7 +129,8 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
     def _frame(
         self, record: Record, number: int, observation: PlanObservation | None, note: str
     ) -> PlanFrame:
-        payload, step = record.payload, record.payload.steps[number - 1] if number else StepRecord()
+        payload = record.payload
+        step = record.payload.steps[number - 1] if number else StepRecord()
         n_steps = len(payload.steps)
         is_end = 0 < number == n_steps
         return PlanFrame(
@@ -175,7 +175,8 @@ class _PlanInReplay:
     def __init__(self, environment: PlanEnvironment, simulator: Simulator, plan: int) -> None:
         self._environment = environment
         observation, _ = environment.reset(plan)
-        self._view, self._is_over = observation.view, False
+        self._view = observation.view
+        self._is_over = False
         self._walked = [_point(self._view.agent)]
         self._named = frozenset(environment.named_objects(plan))
         grid = reachable_grid(simulator)
@@ -218,7 +219,10 @@ class _PlanInReplay:
         box = item.axis_aligned_bounding_box
         if box is None:
             return None
-        x, z, half_x, half_z = box.center.x, box.center.z, box.size.x / 2, box.size.z / 2
+        x = box.center.x
+        z = box.center.z
+        half_x = box.size.x / 2
+        half_z = box.size.z / 2
         is_named = item.object_id in self._named
         return MapObject(
             item.object_type, (x - half_x, z - half_z), (x + half_x, z + half_z), is_named

@@ -23,7 +23,9 @@ from infthor_eval.terminal import printable
 
 __all__ = ["curves_figure", "draw_curves"]
 
-_PANEL, _NARROW = (4.6, 2.7), 3.5  # inches; the width of one of many
+# inches; the width of one of many
+_PANEL = (4.6, 2.7)
+_NARROW = 3.5
 _MARGIN = 1.1  # inches around the panels
 _IN_THOUSANDS = 10_000  # end of an x axis from which its ticks are in thousands
 _LINE = 0.2  # inches of a line of the legend

@@ -26,7 +26,10 @@ __all__ = ["draw_radii", "radii_figure", "radii_table"]
 _FLOOR = "in the sphere at the start"
 _FLOOR_LOOK = Look("#9a9a9a", "solid", 3.0)
 _OFFSET = 0.004  # metres between the intervals of two lines
-_PANEL, _MARGIN, _LINE = (4.4, 2.9), 1.1, 0.2  # inches
+# inches
+_PANEL = (4.4, 2.9)
+_MARGIN = 1.1
+_LINE = 0.2
 
 
 def draw_radii(success: SuccessByRadius, folder: Path, name: str) -> list[Path]:
@@ -88,7 +91,8 @@ def radii_figure(success: SuccessByRadius) -> Figure:
 
 def _draw_floor(axes: Axes, points: Sequence[tuple[float, Rate]]) -> None:
     """Draw the success of an arm that only closes its hand, below all lines."""
-    radii, means = [radius for radius, _ in points], [100 * rate.mean for _, rate in points]
+    radii = [radius for radius, _ in points]
+    means = [100 * rate.mean for _, rate in points]
     axes.fill_between(radii, means, color=_FLOOR_LOOK.colour, alpha=0.15, linewidth=0, zorder=1)
     axes.plot(
         radii, means, color=_FLOOR_LOOK.colour, lw=_FLOOR_LOOK.width, zorder=2.5, marker="o", ms=5

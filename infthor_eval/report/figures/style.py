@@ -51,7 +51,8 @@ _SETTINGS: dict[Any, Any] = {
 _SVG_METADATA: dict[str, Any] = {"Date": None}  # a date would make equal figures differ
 # On a page, ink takes the page's colours, which matplotlib cannot write: these placeholders are
 # replaced afterwards.
-_INK, _GRID = "#010203", "#040506"
+_INK = "#010203"
+_GRID = "#040506"
 _PAGE_SETTINGS: dict[Any, Any] = {
     **dict.fromkeys(
         ("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), _INK
@@ -93,7 +94,8 @@ def looks_of(labels: Iterable[str], together: Iterable[Collection[str]] = ()) ->
     """
     # The colours of one style of line, then those of the next.
     all_looks = [Look(colour, style, 1.5) for style in _STYLES for colour in _COLOURS]
-    panels, looks = list(together), dict[str, Look]()
+    panels = list(together)
+    looks = dict[str, Look]()
     for number, label in enumerate(dict.fromkeys(labels)):
         beside = {name for panel in panels if label in panel for name in panel}
         colours = {looks[name].colour for name in beside if name in looks}
@@ -124,7 +126,8 @@ def inline_svg(draw: Callable[[], Figure]) -> str:
     """Return a figure as an element of a page, in the page's colours (light or dark) and no wider
     than its column."""
     with _in_style(_PAGE_SETTINGS):
-        text, figure = io.StringIO(), draw()
+        text = io.StringIO()
+        figure = draw()
         figure.savefig(text, format="svg", transparent=True, metadata=_SVG_METADATA)
         width = figure.get_figwidth()
     svg = text.getvalue()

@@ -27,7 +27,8 @@ def live_routes(run: LiveRun) -> list[Route]:
     def state(_request: Request) -> Response:
         return Response(msgspec.json.encode(run.state()), media_type="application/json")
 
-    own, report = __package__, "infthor_eval.report.web"
+    own = __package__
+    report = "infthor_eval.report.web"
     files = [("/", own, "live.html"), ("/live.js", own, "live.js"), ("/live.css", own, "live.css")]
     files.append(("/report.css", report, "report.css"))
     return [*(file_route(*file) for file in files), Route("/state.json", state)]

@@ -119,7 +119,9 @@ class LiveRun:
             find_suite: returns the suite of a name.
             find_presenter: returns the presenter of a suite.
         """
-        self._folder, self._find_suite, self._find_presenter = folder, find_suite, find_presenter
+        self._folder = folder
+        self._find_suite = find_suite
+        self._find_presenter = find_presenter
         self._asking = Lock()
         self._run: Path | None = None
         self._journal: FollowedJournal | None = None
@@ -128,7 +130,8 @@ class LiveRun:
             dict[str, Rate](),
             tuple[LiveSample, ...](),
         )
-        self._has_new_metrics, self._metrics_due = False, 0.0
+        self._has_new_metrics = False
+        self._metrics_due = 0.0
 
     def state(self) -> LiveState:
         """Return the state of the run now."""
@@ -149,9 +152,11 @@ class LiveRun:
         if self._journal is None:
             self._journal = FollowedJournal(self._run, self._find_suite, _N_NEWEST)
         # Before the journal is read: a process that ends meanwhile has written all that is read.
-        held, results = is_written(self._run), read_results(self._run)
+        held = is_written(self._run)
+        results = read_results(self._run)
         has_grown = self._journal.read()
-        header, suite = self._journal.header, self._journal.suite
+        header = self._journal.header
+        suite = self._journal.suite
         if header is None or suite is None:
             return LiveState(status="waiting", folder=str(self._run))
         presenter = self._find_presenter(header.suite)

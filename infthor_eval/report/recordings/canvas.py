@@ -34,16 +34,30 @@ __all__ = [
 ]
 
 SIZE = (1248, 896)  # of a picture; multiples of 16, as video codecs work in blocks of that size
-TITLE_REPEATS, END_REPEATS = 3, 3  # pictures that show a title and an end
+# pictures that show a title and an end
+TITLE_REPEATS = 3
+END_REPEATS = 3
 PANE = 600  # width and height of a pane
-_EDGE, _TOP = 16, 40
+_EDGE = 16
+_TOP = 40
 _BELOW = _TOP + PANE + 16  # top of the text
-_LABELS, _WORDS, _RIGHT = _EDGE, 150, 880  # left edges of the columns
-INK, FAINT, _PAPER = "#1c1c1c", "#6b6b6b", "#ffffff"
+# left edges of the columns
+_LABELS = _EDGE
+_WORDS = 150
+_RIGHT = 880
+INK = "#1c1c1c"
+FAINT = "#6b6b6b"
+_PAPER = "#ffffff"
 # Colours of maps: Okabe and Ito's, as in the figures, for what the instruction names.
-FURNITURE, FURNITURE_EDGE, NAMED, NAMED_EDGE = "#d9cbb3", "#9c8a6a", "#f8c89b", "#D55E00"
+FURNITURE = "#d9cbb3"
+FURNITURE_EDGE = "#9c8a6a"
+NAMED = "#f8c89b"
+NAMED_EDGE = "#D55E00"
 OVERSAMPLING = 2  # Pillow draws hard edges; drawn larger and reduced they are smooth
-GOOD, BAD, WARN, _BAR = "#1a7f37", "#c1272d", "#9a5b00", "#0072B2"
+GOOD = "#1a7f37"
+BAD = "#c1272d"
+WARN = "#9a5b00"
+_BAR = "#0072B2"
 _ROW = 29  # height of a row of numbers
 
 
@@ -137,7 +151,9 @@ def write_numbers(pen: ImageDraw.ImageDraw, numbers: Sequence[tuple[str, str]]) 
 
 def write_bar(pen: ImageDraw.ImageDraw, share: float) -> None:
     """Draw a bar below the three numbers, filled by a share from 0 to 1."""
-    y, left, right = _BELOW + 3.0 * _ROW, _RIGHT, SIZE[0] - _EDGE
+    y = _BELOW + 3.0 * _ROW
+    left = _RIGHT
+    right = SIZE[0] - _EDGE
     pen.rectangle((left, y, right, y + 10), fill="#e3e6ea")
     if share:
         pen.rectangle((left, y, left + share * (right - left), y + 10), fill=_BAR)

@@ -12,9 +12,16 @@ from infthor_eval.report.runs import choose_evenly
 
 __all__ = ["COLUMNS", "MOST_ROWS", "draw_sheet", "sheet_rows", "shown_steps"]
 
-COLUMNS, MOST_ROWS = 5, 8  # more would not fit on a screen
-_CELL, _CAPTION, _GAP = 260, 56, 12  # pixels; a caption has three lines
-_SIDE, _EDGE, _TOP = 230, 16, 44
+# more would not fit on a screen
+COLUMNS = 5
+MOST_ROWS = 8
+# pixels; a caption has three lines
+_CELL = 260
+_CAPTION = 56
+_GAP = 12
+_SIDE = 230
+_EDGE = 16
+_TOP = 44
 _WIDTH = 2 * _EDGE + _SIDE + COLUMNS * (_CELL + _GAP) - _GAP
 
 
@@ -59,7 +66,8 @@ def sheet_rows(frames: Iterable[ArmFrame]) -> Iterator[list[ArmFrame]]:
             note = ""
         if frame.ending:
             yield row
-            row, note = [], ""
+            row = []
+            note = ""
 
 
 def _write_side(pen: ImageDraw.ImageDraw, end: ArmFrame, top: float) -> None:

@@ -15,9 +15,16 @@ from infthor_eval.report.recordings.fonts import Font, font
 
 __all__ = ["draw_reach"]
 
-_GAP, _HEAD, _LEGEND = 12, 22, 30  # pixels
-_PAPER, _INK = "#f3f4f6", "#222222"
-_ARM, _HAND, _SPHERE, _PATH = "#555555", "#0072B2", (0, 114, 178, 40), "#56B4E9"
+# pixels
+_GAP = 12
+_HEAD = 22
+_LEGEND = 30
+_PAPER = "#f3f4f6"
+_INK = "#222222"
+_ARM = "#555555"
+_HAND = "#0072B2"
+_SPHERE = (0, 114, 178, 40)
+_PATH = "#56B4E9"
 _TITLES = ("from above", "from the side")
 _PanePoint = tuple[float, float]  # metres: to the right in the pane, and up
 
@@ -37,7 +44,9 @@ class _Pane:
     """One view."""
 
     def __init__(self, reach: Reach, wide: int, high: int, *, is_above: bool) -> None:
-        self._reach, self._size, self._is_above = reach, (wide, high), is_above
+        self._reach = reach
+        self._size = (wide, high)
+        self._is_above = is_above
         # Objects in front of the arm or behind it would hide it.
         self._items = [
             item for item in reach.objects if _is_in_view(item, reach, is_above=is_above)

@@ -26,10 +26,20 @@ from infthor_eval.report.recordings.fonts import Font, font
 __all__ = ["draw_map"]
 
 _CELL = 0.25  # metres
-_MARGIN, _LEGEND, _RING = 14, 34, 12  # pixels
-_REACH, _HALF_FIELD = 1.5, 30  # metres and degrees: where objects count as visible in AI2-THOR
-_OUTSIDE, _FLOOR, _GRID = "#e9ebee", "#ffffff", "#e3e3e3"
-_AGENT, _SEEN, _PATH, _GOAL = "#0072B2", (0, 114, 178, 40), "#56B4E9", "#009E73"
+# pixels
+_MARGIN = 14
+_LEGEND = 34
+_RING = 12
+# metres and degrees: where objects count as visible in AI2-THOR
+_REACH = 1.5
+_HALF_FIELD = 30
+_OUTSIDE = "#e9ebee"
+_FLOOR = "#ffffff"
+_GRID = "#e3e3e3"
+_AGENT = "#0072B2"
+_SEEN = (0, 114, 178, 40)
+_PATH = "#56B4E9"
+_GOAL = "#009E73"
 _INK = "#222222"
 _PARTS = re.compile(r"[A-Z]?[^A-Z]+|[A-Z]+")  # words of a type's name: "SideTable"
 
@@ -62,8 +72,10 @@ class _Scale:
         corners += [
             (x + shift, z + shift) for x, z in room.floor for shift in (-_CELL / 2, _CELL / 2)
         ]
-        xs, zs = [x for x, _ in corners], [z for _, z in corners]
-        wide, high = size - 2 * _MARGIN, size - 2 * _MARGIN - _LEGEND
+        xs = [x for x, _ in corners]
+        zs = [z for _, z in corners]
+        wide = size - 2 * _MARGIN
+        high = size - 2 * _MARGIN - _LEGEND
         self.per_metre = min(
             wide / max(max(xs) - min(xs), _CELL), high / max(max(zs) - min(zs), _CELL)
         )
@@ -209,7 +221,8 @@ def _name(item: MapObject, scale: _Scale, size: int) -> _Name | None:
     )
     for text in (item.name, "\n".join(_PARTS.findall(item.name))):
         lines = text.split("\n")
-        half, tall = max(map(face.getlength, lines)) / 2, len(lines) * 7.5
+        half = max(map(face.getlength, lines)) / 2
+        tall = len(lines) * 7.5
         if 2 * half <= wide + 8 and 2 * tall <= high + 4:
             return _Name(text, face, (x - half, y - tall, x + half, y + tall), True)
     if not item.is_named:
@@ -241,7 +254,9 @@ def _draw_legend(
 ) -> None:
     """Draw the dots of the legend; its text is written into the final picture, as letters need no
     oversampling."""
-    fine, radius, y = size * OVERSAMPLING, 6 * OVERSAMPLING, (size - _LEGEND / 2) * OVERSAMPLING
+    fine = size * OVERSAMPLING
+    radius = 6 * OVERSAMPLING
+    y = (size - _LEGEND / 2) * OVERSAMPLING
     pen.rectangle((0, fine - _LEGEND * OVERSAMPLING, fine, fine), fill="white")
     for left, _, colour in legend:
         x = left * OVERSAMPLING

@@ -65,10 +65,8 @@ def _chart(task: str, curves: dict[str, list[_Point]]) -> Chart:
         axes = figure.subplots()
         for name, points in curves.items():
             colour = looks[name].colour
-            tokens, means = (
-                [point.n_tokens for point in points],
-                [100 * point.score.mean for point in points],
-            )
+            tokens = [point.n_tokens for point in points]
+            means = [100 * point.score.mean for point in points]
             axes.plot(
                 tokens,
                 means,

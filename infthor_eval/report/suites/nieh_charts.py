@@ -32,7 +32,9 @@ __all__ = ["nieh_charts"]
 
 _COLUMNS = (*CLUE_COLUMNS, ABSENCE)
 _SPREAD = 0.6  # share of a column's width that the dots of several runs are spread over
-_PANEL, _ROW = (4.6, 2.6), 0.34  # inches
+# inches
+_PANEL = (4.6, 2.6)
+_ROW = 0.34
 _DEPTH = "depth="
 _GAIN = looks_of(("gain",))["gain"].colour
 
@@ -247,7 +249,8 @@ def _heat_map(run: ReportRun) -> Chart | None:
     }
     if not tasks:
         return None
-    sizes, metric = sorted(tasks), main_metric(next(iter(tasks.values())))
+    sizes = sorted(tasks)
+    metric = main_metric(next(iter(tasks.values())))
     depths = sorted(
         {depth for task in tasks.values() for depth in task.by_variant if depth.startswith(_DEPTH)}
     )

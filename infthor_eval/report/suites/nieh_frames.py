@@ -30,7 +30,8 @@ def find_timelines(
     Clues of all questions get their pictures before any neighbour does, as there is a limit on the
     size of all.
     """
-    sets, logs = RunSets(runs, data), _TrajectoryFacts()
+    sets = RunSets(runs, data)
+    logs = _TrajectoryFacts()
     chosen: dict[UnitKey, _FrameChoice] = {}
     for key, records in records_by_unit(runs).items():
         question = sets.find_question(key, next(record for record in records if record))

@@ -46,7 +46,8 @@ class RunSets:
         )
 
     def _open(self, run: ReportRun, task: str, data: Path | None) -> None:
-        folder, options = data or run.data, _options_of(run)
+        folder = data or run.data
+        options = _options_of(run)
         try:
             opened = find_set(
                 str(folder) if folder else None,

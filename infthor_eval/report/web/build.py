@@ -105,7 +105,8 @@ def _title(runs: Sequence[ReportRun]) -> str:
 
 
 def _suite_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
-    suite, presenter = runs[0].suite, runs[0].presenter
+    suite = runs[0].suite
+    presenter = runs[0].presenter
     title = presenter.title or suite.name.replace("_", " ").capitalize()
     tables = suite.tables([run.summary for run in runs])
     yield Section(suite.name, title, tuple(presenter.charts(runs)), tuple(tables))
@@ -115,7 +116,8 @@ def _suite_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
 
 def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
     """Each run against each before it, of its suite; if there are many, each against the first."""
-    tables, notes = [], []
+    tables = []
+    notes = []
     for runs in suites:
         pairs = (
             combinations(runs, 2) if len(runs) <= _FEW else ((runs[0], other) for other in runs[1:])
@@ -134,7 +136,8 @@ def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
 
 
 def _labels(runs: Sequence[ReportRun], same: Sequence[ReportRun]) -> SuiteLabels:
-    presenter, places = same[0].presenter, tuple(runs.index(run) for run in same)
+    presenter = same[0].presenter
+    places = tuple(runs.index(run) for run in same)
     return SuiteLabels(
         places, presenter.target_label, presenter.reply_label, presenter.compares_scorers
     )

@@ -20,7 +20,8 @@ __all__ = ["EpisodePictures", "EpisodeReplays"]
 Record = UnitRecord[Any]
 # Pixels of a map's side: drawn larger than it is shown, since small letters are easier to read when
 # they are reduced.
-_DRAWN, _SHOWN = 560, 300
+_DRAWN = 560
+_SHOWN = 300
 _WORK = "episodes replayed"
 
 
@@ -62,7 +63,8 @@ class EpisodeReplays:
             run.folder: _choose(run, most) for run in runs if run.presenter.replay is not None
         }
         self._data, self._scenes = folders
-        self._thumbnails, self._progress = thumbnails, progress
+        self._thumbnails = thumbnails
+        self._progress = progress
         n_episodes = sum(map(len, self._chosen.values()))
         if n_episodes:
             progress.begin(_WORK, n_episodes)

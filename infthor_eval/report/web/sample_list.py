@@ -141,7 +141,8 @@ def _sample(
 
 
 def _result(source: _Source, record: Record, pictures: EpisodePictures) -> SampleResult:
-    run, tokens = source.run, record.tokens
+    run = source.run
+    tokens = record.tokens
     presenter = run.presenter
     return SampleResult(
         outcome=run.outcome(record),

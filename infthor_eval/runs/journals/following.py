@@ -49,7 +49,8 @@ class FollowedJournal:
             find_suite: returns the suite of a name.
             n_newest: number of records to keep in `newest`.
         """
-        self._run, self._find_suite = run, find_suite
+        self._run = run
+        self._find_suite = find_suite
         self._newest = n_newest
         self._start()
 

@@ -141,10 +141,8 @@ def read_failures(run: Path) -> dict[UnitKey, bool]:
             ):
                 unit = decoder.decode(line)
             if isinstance(unit, _UnitOutcome):
-                key, rank = (
-                    UnitKey(unit.task, unit.id, unit.variant, unit.repeat),
-                    (unit.attempt, unit.failure is None),
-                )
+                key = UnitKey(unit.task, unit.id, unit.variant, unit.repeat)
+                rank = (unit.attempt, unit.failure is None)
                 latest[key] = max(latest.get(key, rank), rank)
     return {key: not succeeded for key, (_, succeeded) in latest.items()}
 

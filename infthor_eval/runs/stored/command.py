@@ -103,7 +103,8 @@ def read_options(path: Path) -> dict[str, Any]:
 def _options_of(request: RunRequest) -> dict[str, Any]:
     """Return all options of a request. Keys of servers are none: they come from the environment
     only."""
-    tasks, given = request.tasks, dict(request.model_options)
+    tasks = request.tasks
+    given = dict(request.model_options)
     if _CHECKPOINT in given:
         given[_CHECKPOINT] = _absolute(given[_CHECKPOINT])
     every = {

@@ -77,7 +77,8 @@ def read_results(folder: Path) -> Results | None:
     Raises:
         DataError: the file is not valid.
     """
-    path, hint = folder / RESULTS, "run the same command again"
+    path = folder / RESULTS
+    hint = "run the same command again"
     if not path.is_file():
         return None
     with wrap_errors(f"{path}: not the results of a run", hint, catch=NOT_JSON):
@@ -104,7 +105,9 @@ def run_folders(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
 
 
 def _read_run(folder: Path) -> StoredRun:
-    header, failures, results = read_header(folder), read_failures(folder), read_results(folder)
+    header = read_header(folder)
+    failures = read_failures(folder)
+    results = read_results(folder)
     return StoredRun(
         folder=folder,
         header=header,

@@ -54,7 +54,8 @@ def bind_run(run: PreparedRun[U, P]) -> BoundRun[U, P]:
 
 
 def _load_subject(run: PreparedRun[U, P]) -> Subject:
-    request, suite = run.request, run.suite
+    request = run.request
+    suite = run.suite
     if request.model in suite.baselines:
         return suite.baselines[request.model](request.tasks.seed)
     subject = load(request.model, request.model_options, request.tasks.seed)

@@ -93,7 +93,8 @@ def execute(
     """
     observer = observer or Silent()
     with closing(_start_executor(run, observer.note)) as executor:
-        header, workload = executor.header, executor.workload
+        header = executor.header
+        workload = executor.workload
         folder = run.request.folder(header)
         if run.request.fresh:
             journals.set_aside(folder)

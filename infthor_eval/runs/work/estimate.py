@@ -151,7 +151,8 @@ def _measure(evaluation: BoundEvaluation[U, P], n_units: int) -> Iterator[_Measu
     ):
         units = list(group.units)
         part = list(dict.fromkeys((0, len(units) // 2, len(units) - 1)))
-        quantities, failures = [], []
+        quantities = []
+        failures = []
         few = replace(group, units=[units[n] for n in part])
         start = time.perf_counter()
         for record in group_records(evaluation, few, session):
@@ -187,13 +188,16 @@ def estimate_tasks(
         shares = [
             (group, sum(unit.key.task == task for unit in group.units)) for group in workload.groups
         ]
-        total, n_units, frames = Quantities(), 0, 0
+        total = Quantities()
+        n_units = 0
+        frames = 0
         for group, n in shares:
             share = n / len(group.units)  # a group may have units of several tasks
             total = total.plus(excess(group), group.frames * share).plus(
                 later.get(task, later[""]), n
             )
-            n_units, frames = n_units + n, frames + round(group.frames * share)
+            n_units = n_units + n
+            frames = frames + round(group.frames * share)
         n_measured = sum(name == task for group in measured for name, _ in group.quantities)
         estimates.append(TaskEstimate(task, n_units, n_measured, frames, total))
     return estimates

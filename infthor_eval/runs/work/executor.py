@@ -62,7 +62,8 @@ class LocalExecutor(Generic[U, P]):
         self, folder: Path, journal: Journal[P], should_stop: Callable[[], bool]
     ) -> Iterator[tuple[UnitRecord[P], bool]]:
         """See `Executor`."""
-        session, evaluation = JournalSession(journal), self._bound.evaluation
+        session = JournalSession(journal)
+        evaluation = self._bound.evaluation
         in_flight = self._bound.subject.capabilities.max_in_flight
         for record in run_groups(
             self.workload.groups, lambda group: group_records(evaluation, group, session), in_flight

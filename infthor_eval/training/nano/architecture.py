@@ -79,7 +79,8 @@ def build_untrained(
 
 
 def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
-    width, layers = recipe.hidden, recipe.layers
+    width = recipe.hidden
+    layers = recipe.layers
     return Qwen2_5_VLConfig(
         image_token_id=ids["<|image_pad|>"],
         video_token_id=ids["<|video_pad|>"],

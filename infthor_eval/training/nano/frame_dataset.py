@@ -23,7 +23,8 @@ _READER_THREADS = 2
 _LEAST_PIXELS = 90
 # An object is in a cell if its box covers this share of the cell, or has this share of its own area
 # in the cell.
-_OF_CELL, _OF_OBJECT = 0.4, 0.5
+_OF_CELL = 0.4
+_OF_OBJECT = 0.5
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,8 @@ def _labels(
     seen: dict[str, ObjectInFrame], types: Sequence[str], size: tuple[int, int]
 ) -> tuple[Tensor, Tensor, Tensor]:
     cells = torch.zeros(TOKENS, len(types))
-    shown, present = torch.zeros(len(types)), torch.zeros(len(types))
+    shown = torch.zeros(len(types))
+    present = torch.zeros(len(types))
     coverage = _cell_coverage(
         torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size
     )

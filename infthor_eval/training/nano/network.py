@@ -23,7 +23,9 @@ from model_adapters.hf.prompting.prompt import Frame
 __all__ = ["NanoNetwork", "spellings"]
 
 _BATCH = 256  # frames in the tower at once
-_SCALE, _BIAS = 8.0, -4.0  # initial scale and bias of similarities, which are trained
+# initial scale and bias of similarities, which are trained
+_SCALE = 8.0
+_BIAS = -4.0
 
 
 def spellings(object_type: str) -> tuple[str, ...]:
@@ -116,7 +118,8 @@ class NanoNetwork(SequenceModel):
         cell_loss = binary_cross_entropy_with_logits(
             logits, self._dataset.cells[rows], reduction="none"
         )
-        shown, present = self._dataset.shown[rows], self._dataset.present[rows]
+        shown = self._dataset.shown[rows]
+        present = self._dataset.present[rows]
         frame_loss = binary_cross_entropy_with_logits(
             torch.logsumexp(logits, 1), shown, reduction="none"
         )

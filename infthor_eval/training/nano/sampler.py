@@ -85,7 +85,8 @@ class SequenceSampler:
     ) -> None:
         self._encoder = encoder
         self._dataset = dataset
-        self._limit, self._words = window_tokens, words
+        self._limit = window_tokens
+        self._words = words
         self._rng = random.Random(seed)
         self._questions: list[TrainingSequence] = []
         self._samples: list[tuple[NiehSet, Sample]] = []  # of the questions on their clue frames

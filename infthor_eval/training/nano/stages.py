@@ -146,7 +146,8 @@ class _StageTrainer:
         The embeddings of names change in this stage; the vision loss keeps them close to the
         features of the objects.
         """
-        recipe, indices = self._recipe, self._sampler.frames(_TEXT_STAGE_FRAMES)
+        recipe = self._recipe
+        indices = self._sampler.frames(_TEXT_STAGE_FRAMES)
         loss = self._token_loss(self._sampler.synthetic_plans(recipe.text_plans_per_step))
         vision_loss = self._vision_loss(self._network.frame_features(indices), indices)
         return loss + recipe.vision_weight * vision_loss, loss.detach()

@@ -119,7 +119,8 @@ def _lamp(b: Builder, foot: float, shade_low: float) -> None:
     y = b.thick(0.015, 1)
     b.tube((0, -1 + y, 0), (foot, y, foot), BRASS, Material.METAL)
     b.rod((0, -0.1, 0), 0.012, float(b.half[1]) * 0.9, 1, BRASS)
-    middle, half = (1 + shade_low) / 2, (1 - shade_low) / 2
+    middle = (1 + shade_low) / 2
+    half = (1 - shade_low) / 2
     color = _WARM if lit else pick(_SHADES, b.style)
     b.tube((0, middle, 0), (1, half, 1), color, Material.FABRIC, top=0.6, glow=0.95 if lit else 0.0)
 

@@ -132,7 +132,8 @@ class Builder:
             glow: share of light of its own of the lining.
             top: whether it has an upper board: sinks hang in cabinets without.
         """
-        board, below = WALL - _LINING, floor - _LINING
+        board = WALL - _LINING
+        below = floor - _LINING
         self._boards((0.0, 0.0), (board, below), outside, material, 0.0, top)
         self._boards((board, below), (_LINING, _LINING), inside, material, glow, top)
 
@@ -154,8 +155,11 @@ class Builder:
             top: whether there is an upper board.
         """
         size = 2 * self.half
-        (x, y, z), (dx, dy, dz) = inset[0] / size * 2, thick[0] / size * 2
-        low, floor, back = self.level(inset[1]), self.level(inset[1] + thick[1]), -1 + z + dz
+        (x, y, z) = inset[0] / size * 2
+        (dx, dy, dz) = thick[0] / size * 2
+        low = self.level(inset[1])
+        floor = self.level(inset[1] + thick[1])
+        back = -1 + z + dz
         self.span((x - 1, low, z - 1), (1 - x, 1 - y, back), color, material, glow=glow)
         self.span((x - 1, low, back), (x - 1 + dx, 1 - y, 1), color, material, glow=glow)
         self.span((1 - x - dx, low, back), (1 - x, 1 - y, 1), color, material, glow=glow)

@@ -11,7 +11,9 @@ __all__ = ["shape"]
 
 _DIRT: Color = (0.36, 0.27, 0.16)
 _DIRT_SHARE = 0.45
-_TINTS, _TINT = 5, 0.045  # objects of one colour differ a little in brightness, by their style
+# objects of one colour differ a little in brightness, by their style
+_TINTS = 5
+_TINT = 0.045
 
 
 def shape(item: SimObject) -> list[ShapePart]:

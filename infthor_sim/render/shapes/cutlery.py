@@ -65,7 +65,8 @@ def ladle(b: Builder) -> None:
     b.bowl((0, -0.58, -0.68), (0.95, 0.42, 0.31), STEEL, Material.METAL)
     b.bowl((0, -0.54, -0.68), (0.84, 0.4, 0.27), shade_of(STEEL, 0.5))
     start, end = (-0.24, -0.4), (0.86, 0.9)  # height and place along, in fractions
-    rise, run = (end[0] - start[0]) * float(b.half[1]), (end[1] - start[1]) * float(b.half[2])
+    rise = (end[0] - start[0]) * float(b.half[1])
+    run = (end[1] - start[1]) * float(b.half[2])
     lean = -math.degrees(math.atan2(rise, run))
     length = math.hypot(rise, run) / 2 / float(b.half[2])
     middle = ((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)

@@ -107,7 +107,9 @@ def toilet(b: Builder) -> None:
 @draws
 def window(b: Builder) -> None:
     """A bright pane in a white frame with a cross, at the wall side of its box."""
-    x, y, z = b.thick(0.03, 0), b.thick(0.03, 1), b.thick(0.05, 2)
+    x = b.thick(0.03, 0)
+    y = b.thick(0.03, 1)
+    z = b.thick(0.05, 2)
     at = z - 1
     b.box((0, 0, at), (1 - x, 1 - y, z * 0.85), _SKY, Material.GLASS, glow=0.8)
     for side in (-1, 1):
@@ -211,7 +213,9 @@ def shower_head(b: Builder) -> None:
 @draws
 def shower_glass(b: Builder) -> None:
     """A frame around a pane that one sees through: only its edges are drawn."""
-    x, y, z = b.thick(0.012, 0), b.thick(0.012, 1), b.thick(0.012, 2)
+    x = b.thick(0.012, 0)
+    y = b.thick(0.012, 1)
+    z = b.thick(0.012, 2)
     flat = 0 if b.half[0] < b.half[2] else 2
     for side in (-1, 1):
         if flat == 0:

@@ -74,11 +74,14 @@ def loaf(
 ) -> None:
     """Add a tin loaf along `axis`, with a share of its width and height and a share of its
     length."""
-    at, half = (0.0, -0.3 * share, 0.0), [0.86 * share] * 3
-    half[1], half[axis] = 0.7 * share, length
+    at = (0.0, -0.3 * share, 0.0)
+    half = [0.86 * share] * 3
+    half[1] = 0.7 * share
+    half[axis] = length
     b.box(at, half, shade_of(color, 0.92), material)
     metres = [float(v) for v in b.half]
-    wide, high = metres[2 - axis] * share, metres[1] * 0.62 * share
+    wide = metres[2 - axis] * share
+    high = metres[1] * 0.62 * share
     turned = (wide, high)
     tilt = (90.0, 0.0, 0.0) if axis == 2 else (0.0, 0.0, 90.0)
     radii = [0.0, metres[axis] * length, 0.0]

@@ -48,7 +48,8 @@ def mug(b: Builder) -> None:
     """A cup with a handle on the longer side."""
     color = pick(CERAMICS, b.style)
     ratio = b.slenderness
-    at, half = b.lengthwise(ratio - 1, 0, 0), b.lengthwise(ratio, 1, 1)
+    at = b.lengthwise(ratio - 1, 0, 0)
+    half = b.lengthwise(ratio, 1, 1)
     b.cup(at, half, color, bottom=0.85)
     _inner_floor(b, 0.85, shade_of(color, 0.8), at, half)
     _liquid(b, 0.6, min(half[0], half[2]) * 0.9, (at[0], at[2]))
@@ -104,7 +105,8 @@ def pot(b: Builder) -> None:
 def pan(b: Builder) -> None:
     """A shallow pan with a long handle."""
     ratio = min(0.95, b.slenderness)
-    at, half = b.lengthwise(ratio - 1, 0, 0), b.lengthwise(ratio, 0.95, 1)
+    at = b.lengthwise(ratio - 1, 0, 0)
+    half = b.lengthwise(ratio, 0.95, 1)
     b.cup(at, half, DARK, Material.METAL, bottom=0.88)
     _inner_floor(b, 0.88, (0.14, 0.14, 0.15), at, half)
     length = max(1 - ratio, 0.05)

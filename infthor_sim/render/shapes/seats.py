@@ -19,7 +19,9 @@ def chair(b: Builder) -> None:
     """A wooden chair with a back of slats."""
     color = pick(WOODS, b.style)
     level = _seat_level(b, -0.05)
-    x, y, z = b.thick(0.018, 0), b.thick(0.015, 1), b.thick(0.018, 2)
+    x = b.thick(0.018, 0)
+    y = b.thick(0.015, 1)
+    z = b.thick(0.018, 2)
     b.box((0, level - y, 0), (1, y, 1), color, Material.WOOD)
     for side in (-1, 1):
         b.box(
@@ -56,7 +58,8 @@ def sofa(b: Builder) -> None:
     """A padded bench with a back and arms."""
     color = pick(CLOTHS, b.style)
     level = _seat_level(b, -0.05)
-    arm, back = min(0.3, b.thick(0.11, 0)), min(0.5, b.thick(0.11, 2))
+    arm = min(0.3, b.thick(0.11, 0))
+    back = min(0.5, b.thick(0.11, 2))
     b.box(
         (0, (level - 1) / 2 - 0.02, 0),
         (1 - arm, (level + 1) / 2 - 0.05, 0.97),
@@ -95,7 +98,8 @@ def ottoman(b: Builder) -> None:
 @draws
 def bed(b: Builder) -> None:
     """A frame with a headboard at its back, a mattress and a blanket."""
-    wood, cloth = pick(WOODS, b.style), pick(CLOTHS, b.style)
+    wood = pick(WOODS, b.style)
+    cloth = pick(CLOTHS, b.style)
     level = _seat_level(b, 0.2)
     z = b.thick(0.03, 2)
     frame = -1 + (level + 1) * 0.45

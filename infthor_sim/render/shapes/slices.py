@@ -84,7 +84,8 @@ def _rib(b: Builder, at: tuple[float, float], angle: float, half: tuple[float, f
     thin = _thin_axis(b)
     # A tilted box has half extents along its own axes, hence lengths in metres and not in fractions
     # of the tilted ones.
-    wide, tall = half[0] * float(b.half[2 - thin]), half[1] * float(b.half[1])
+    wide = half[0] * float(b.half[2 - thin])
+    tall = half[1] * float(b.half[1])
     metres = (
         (float(b.half[0]) * 0.95, tall, wide)
         if thin == 0

@@ -48,7 +48,9 @@ def towel(b: Builder) -> None:
     color = pick(CLOTHS, b.style + 1)
     b.box((0, 0, 0), (1, 1, 1), color, Material.FABRIC)
     flat = min(range(3), key=lambda i: float(b.half[i]))
-    half, at = [1.005] * 3, [0.0] * 3
+    half = [1.005] * 3
+    at = [0.0] * 3
     axis = 1 if flat != 1 else 2
-    half[axis], at[axis] = 0.06, -0.75
+    half[axis] = 0.06
+    at[axis] = -0.75
     b.box(at, half, WHITE, Material.FABRIC)

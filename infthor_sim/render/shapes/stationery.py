@@ -26,7 +26,8 @@ def card(b: Builder) -> None:
 @draws
 def pen(b: Builder) -> None:
     """A round pen: a cap with a clip, a barrel, a point."""
-    axis, thick = b.longest, _thickness(b)
+    axis = b.longest
+    thick = _thickness(b)
     color = pick(((0.1, 0.15, 0.5), (0.1, 0.1, 0.1), (0.6, 0.1, 0.1)), b.style)
     b.bar(axis, -1.0, -0.92, (0.2 * thick, 0.5 * thick), STEEL, Material.METAL)
     b.bar(axis, -0.92, -0.8, (0.5 * thick, 0.9 * thick), color)
@@ -38,7 +39,8 @@ def pen(b: Builder) -> None:
 @draws
 def pencil(b: Builder) -> None:
     """A yellow pencil: a rubber in a metal ring, a cone of wood, a black point."""
-    axis, thick = b.longest, 1.15 * _thickness(b)
+    axis = b.longest
+    thick = 1.15 * _thickness(b)
     b.bar(axis, -1.0, -0.93, (0.1 * thick, 0.36 * thick), BLACK)
     b.bar(axis, -0.93, -0.74, (0.36 * thick, thick), (0.88, 0.7, 0.48))
     b.bar(axis, -0.74, 0.74, (thick, thick), (0.98, 0.76, 0.08))
@@ -55,7 +57,8 @@ def _thickness(b: Builder) -> float:
 @draws
 def keys(b: Builder) -> None:
     """A ring with two keys spread apart and a tag."""
-    wide, deep = float(b.half[0]), float(b.half[2])
+    wide = float(b.half[0])
+    deep = float(b.half[2])
     for index in range(10):
         angle = 36.0 * index
         x, z = math.sin(math.radians(angle)), math.cos(math.radians(angle))
@@ -75,7 +78,8 @@ def keys(b: Builder) -> None:
 
 def _key(b: Builder, angle: float, color: Color) -> None:
     """A key from the ring at (-0.5, 0, 0) outwards: a head with a hole, a shaft, two teeth."""
-    wide, deep = float(b.half[0]), float(b.half[2])
+    wide = float(b.half[0])
+    deep = float(b.half[2])
     x, z = math.cos(math.radians(angle)), math.sin(math.radians(angle))
 
     def at(along: float, across: float) -> tuple[float, float, float]:

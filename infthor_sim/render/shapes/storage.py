@@ -20,7 +20,8 @@ _TINTED: Color = (0.55, 0.76, 0.84)
 _WINDOW: Color = (0.13, 0.14, 0.16)
 # Of a fridge's shelves, in fractions: one looks down between glass and rim onto the lower ones, as
 # through clear glass.
-_GLASS_END, _RIM = 0.3, 0.76
+_GLASS_END = 0.3
+_RIM = 0.76
 
 
 def _door(
@@ -40,7 +41,8 @@ def _door(
     """
     side = b.item.hinge or -1
     width, height, depth = (float(v) for v in b.half)
-    middle, half = (low + high) / 2 * height, (high - low) / 2 * height
+    middle = (low + high) / 2 * height
+    half = (high - low) / 2 * height
     angle = side * DOOR_SWING * b.state.openness
     leaf = min(_LEAF / 2, depth * 0.3)
     hinge = (side, 0.0, 1.0)
@@ -89,9 +91,12 @@ def drawer(b: Builder) -> None:
     out = 2 * DRAWER_SLIDE * b.state.openness
     leaf = b.thick(_LEAF / 2, 2)
     if b.state.openness > 0:
-        x, gap, back = b.thick(WALL, 0), b.thick(0.004, 0), out - 1 + b.thick(WALL, 2)
+        x = b.thick(WALL, 0)
+        gap = b.thick(0.004, 0)
+        back = out - 1 + b.thick(WALL, 2)
         side = shade_of(color, 1.1)
-        floor, front = b.floor, out + 1 - 2 * leaf
+        floor = b.floor
+        front = out + 1 - 2 * leaf
         b.span((gap - 1, -0.96, out - 1), (1 - gap, floor, front), shade_of(color, 1.3), glow=_LIT)
         b.span((gap - 1, floor, out - 1), (1 - gap, _TRAY, back), side, Material.WOOD, glow=_LIT)
         b.span((gap - 1, floor, back), (x - 1, _TRAY, front), side, Material.WOOD, glow=_LIT)
@@ -127,8 +132,11 @@ def _lit_inside(b: Builder, outside: Color) -> None:
     """The body of an open fridge: white and bright within, shelves of tinted glass, a lamp."""
     b.open_front(outside, _COLD, Material.METAL, WALL, glow=0.45)
     x, y = 1 - b.thick(WALL, 0), b.thick(0.008, 1)
-    back, edge = b.thick(WALL, 2) - 1, b.thick(0.012, 0)
-    rim, middle, half = shade_of(_TINTED, 0.62), (_RIM + _GLASS_END) / 2, (_RIM - _GLASS_END) / 2
+    back = b.thick(WALL, 2) - 1
+    edge = b.thick(0.012, 0)
+    rim = shade_of(_TINTED, 0.62)
+    middle = (_RIM + _GLASS_END) / 2
+    half = (_RIM - _GLASS_END) / 2
     for metres in b.item.floors:
         level = b.level(metres)
         b.span((-x, level - y, back), (x, level, _GLASS_END), _TINTED, Material.GLASS, glow=0.3)
@@ -143,9 +151,11 @@ def _door_racks(b: Builder) -> None:
     side = b.item.hinge or -1
     angle = side * DOOR_SWING * b.state.openness
     width, height, _ = (float(v) for v in b.half)
-    hinge, inward = (side, 0.0, 1.0), -_LEAF - _FRIDGE_GRIP
+    hinge = (side, 0.0, 1.0)
+    inward = -_LEAF - _FRIDGE_GRIP
     for low, high in ((-0.93, 0.26), (0.37, 0.96)):
-        half, middle = (high - low) / 2 * height, (high + low) / 2 * height
+        half = (high - low) / 2 * height
+        middle = (high + low) / 2 * height
         b.hinged_box(hinge, (-side * width, middle, inward - 0.006), (width * 0.9, half, 0.006),
                      angle, _COLD,
                 Material.PLAIN, glow=0.3)  # fmt: skip
@@ -168,7 +178,8 @@ def microwave(b: Builder) -> None:
     body = (STEEL, DARK, WHITE)[b.style % 3]
     x, z = b.thick(0.02, 0), b.thick(0.01, 2)
     lit = 0.75 if b.state.toggled else 0.0
-    panel, door = shade_of(body, 0.9), shade_of(body, 0.85)
+    panel = shade_of(body, 0.9)
+    door = shade_of(body, 0.85)
     if b.state.openness == 0:
         b.box((0, 0, -z), (1, 1, 1 - z), body, Material.METAL)
         window: Color = (0.9, 0.75, 0.4) if b.state.toggled else _WINDOW
@@ -181,7 +192,8 @@ def microwave(b: Builder) -> None:
             (0.2, b.floor, 0), (0.55, b.thick(0.002, 1), 0.75), (0.8, 0.86, 0.88), Material.GLASS
         )
         b.box((-0.76, 0, 0), (0.22, 0.94, 0.98), panel, Material.METAL)
-        wide, high = float(b.half[0]), float(b.half[1])
+        wide = float(b.half[0])
+        high = float(b.half[1])
         angle = DOOR_SWING * b.state.openness
         b.hinged_box(
             (1, 0, 1),
@@ -255,7 +267,8 @@ def _flaps(b: Builder, color: Color, share: float) -> None:
     """Four flaps that hang outwards from the rim, to the edges of the box."""
     for axis in (0, 2):
         out = (1 - share) * float(b.half[axis])  # metres
-        length, drop = 2.2 * out, 1.96 * out
+        length = 2.2 * out
+        drop = 1.96 * out
         half = [share, 0.005 / float(b.half[1]), share]
         half[axis] = length / 2 / float(b.half[axis])
         lean = 63.0

@@ -63,7 +63,8 @@ def _turn(rect: Rect, quarters: int) -> Rect:
 def _carcass(b: Builder, color: Color, top: float) -> None:
     """Add sides and back from the floor up to `top`; the front is left to drawers."""
     x, z = b.thick(0.012, 0), b.thick(0.01, 2)
-    middle, half = (top - 1) / 2, (top + 1) / 2
+    middle = (top - 1) / 2
+    half = (top + 1) / 2
     for side in (-1, 1):
         b.box((side * (1 - x), middle, 0), (x, half, 1), shade_of(color, 0.9), Material.WOOD)
     b.box((0, middle, -1 + z), (1 - 2 * x, half, z), shade_of(color, 0.7), Material.WOOD)
@@ -158,10 +159,9 @@ def dining_table(b: Builder) -> None:
         _carcass(b, color, under)
         return
     runner = pick(CLOTHS, b.style)
-    level, half = (
-        _surface(b) - b.thick(0.001, 1),
-        b.thick(0.0015, 1),
-    )  # half a millimetre above the board
+    # half a millimetre above the board
+    level = _surface(b) - b.thick(0.001, 1)
+    half = b.thick(0.0015, 1)
     b.box((0, level, 0), b.lengthwise(0.999, half, 0.3), runner, Material.FABRIC)
     b.box(
         (0, level, 0), b.lengthwise(0.9, half * 1.3, 0.22), shade_of(runner, 1.3), Material.FABRIC
@@ -172,7 +172,8 @@ def dining_table(b: Builder) -> None:
     neck = under - b.thick(0.12, 1)
     for sx in (-1, 1):
         for sz in (-1, 1):
-            at_x, at_z = sx * (0.94 - x), sz * (0.94 - z)
+            at_x = sx * (0.94 - x)
+            at_z = sz * (0.94 - z)
             b.box((at_x, (under + neck) / 2, at_z), (x, (under - neck) / 2, z), leg, Material.WOOD)
             b.tube(
                 (at_x, (neck + low) / 2, at_z),
@@ -223,12 +224,14 @@ def chest(b: Builder) -> None:
     """A closed body with a board on top: dressers and stands whose drawers are not objects of their
     own."""
     color = pick(WOODS, b.style)
-    board, top = b.thick(0.02, 1), _surface(b)
+    board = b.thick(0.02, 1)
+    top = _surface(b)
     b.box((0, top - board, 0), (1, board, 1), color, Material.WOOD)
     if b.item.hollow:
         _carcass(b, color, top - 2 * board)
         return
-    middle, half = (top - 2 * board - 1) / 2, (top - 2 * board + 1) / 2
+    middle = (top - 2 * board - 1) / 2
+    half = (top - 2 * board + 1) / 2
     b.box((0, middle, -0.02), (0.97, half, 0.95), shade_of(color, 0.85), Material.WOOD)
     for row in range(3):
         level = middle + half * (0.6 - row * 0.6)
@@ -256,7 +259,9 @@ def shelf(b: Builder) -> None:
 def shelving(b: Builder) -> None:
     """An open rack on posts."""
     color = pick(WOODS, b.style)
-    x, y, z = b.thick(0.015, 0), b.thick(0.01, 1), b.thick(0.015, 2)
+    x = b.thick(0.015, 0)
+    y = b.thick(0.01, 1)
+    z = b.thick(0.015, 2)
     for side_x in (-1, 1):
         for side_z in (-1, 1):
             b.box((side_x * (1 - x), 0, side_z * (1 - z)), (x, 1, z), color, Material.WOOD)

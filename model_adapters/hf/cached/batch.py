@@ -52,7 +52,8 @@ class _Branches:
                 self._ends[branch] = span.end
                 if group and n_tokens + len(span.embeds) > chunk_tokens:
                     yield group
-                    group, n_tokens = [], 0
+                    group = []
+                    n_tokens = 0
                 group.append((branch, span))
                 n_tokens += len(span.embeds)
         yield group

@@ -71,7 +71,8 @@ class BranchAttention:
         self._n_new = len(branches)
         self._masks.clear()
         self._n_calls = 0
-        name, before = f"branches_{id(self)}", self._config._attn_implementation
+        name = f"branches_{id(self)}"
+        before = self._config._attn_implementation
         # transformers creates no mask for a name that it does not know. The function is put into
         # the dictionary directly, because a registered one cannot be removed.
         ALL_ATTENTION_FUNCTIONS[name] = self._attention
@@ -143,7 +144,8 @@ class BranchAttention:
 
     def _new_mask(self, window: int | None, dtype: torch.dtype) -> Tensor:
         new = slice(len(self._branches) - self._n_new, None)
-        own, at = self._branches[new, None], self._places[new, None]
+        own = self._branches[new, None]
+        at = self._places[new, None]
         seen = (self._branches == own) & (self._places <= at)
         mask = torch.zeros(
             self._n_new, self._n_prefix + len(self._branches), dtype=dtype, device=seen.device

@@ -22,7 +22,8 @@ class Choices:
     def after(self, ids: Sequence[int]) -> set[int]:
         """Return the tokens that continue these ids towards an allowed reply; none if the reply has
         to end."""
-        prefix, n = tuple(ids), len(ids)
+        prefix = tuple(ids)
+        n = len(ids)
         return {choice[n] for choice in self._texts if len(choice) > n and choice[:n] == prefix}
 
     def text(self, ids: Sequence[int]) -> str | None:

@@ -98,7 +98,8 @@ class BufferedLayer(DynamicLayer):
         keys, values = self._buffers
         keys[..., old:new, :] = key_states
         values[..., old:new, :] = value_states
-        self.keys, self.values = keys[..., :new, :], values[..., :new, :]
+        self.keys = keys[..., :new, :]
+        self.values = values[..., :new, :]
         return self.keys.to(key_states.device), self.values.to(value_states.device)
 
     def _grow(

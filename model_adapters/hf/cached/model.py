@@ -117,7 +117,8 @@ class TransformersModel(HfModel):
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
     ) -> list[int]:
         """Decode a single reply; return how many tokens of the prompt were in the cache."""
-        (prompt,), (reply,) = prompts, replies
+        (prompt,) = prompts
+        (reply,) = replies
         shared = self._prefix.rewind_to(prompt)
         cached = self._prefix.n_tokens
         logits = self._prefix.feed(prompt[shared:], reserve=reply.decoding.max_new_tokens)

@@ -183,7 +183,8 @@ def chunks(pieces: Sequence[Piece], chunk_tokens: int) -> Iterator[list[Piece]]:
         width = 1 if isinstance(piece, int) else len(piece.ids)
         if chunk and size + width > chunk_tokens:
             yield chunk
-            chunk, size = [], 0
+            chunk = []
+            size = 0
         chunk.append(piece)
         size += width
     if chunk:

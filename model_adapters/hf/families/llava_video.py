@@ -48,7 +48,8 @@ class LlavaVideo:
             overviews.to(weight.device, self._model.dtype)[None], return_dict=True
         )
         features = output.pooler_output[0]
-        pooled, line_break = features[:-1].chunk(len(frames)), features[-1:]
+        pooled = features[:-1].chunk(len(frames))
+        line_break = features[-1:]
         return [
             torch.cat([own, line_break]) if _is_last(shape) else own
             for own, (shape, _) in zip(pooled, clips, strict=True)

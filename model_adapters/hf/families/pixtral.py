@@ -34,7 +34,8 @@ class PixtralFamily(PlainFamily):
             raise ModelError(
                 "the checkpoint's tokenizer has no [IMG_BREAK] or no [IMG_END]; it is not Pixtral's"
             )
-        self._break_id, self._end_id = vocabulary["[IMG_BREAK]"], vocabulary["[IMG_END]"]
+        self._break_id = vocabulary["[IMG_BREAK]"]
+        self._end_id = vocabulary["[IMG_END]"]
 
     def frame_ids(self, size: Size) -> tuple[int, ...]:
         """Return rows of slots, each followed by a break, the last one by the end."""

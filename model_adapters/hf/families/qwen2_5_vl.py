@@ -77,7 +77,8 @@ class Qwen25VLFamily(PlainFamily):
         for in_video, run in groupby(
             ids.tolist(), lambda token: token == self._clips.placeholder_id
         ):
-            own, sizes = list(run), list[Size]()
+            own = list(run)
+            sizes = list[Size]()
             while left and own and isinstance(left[0], ClipShape) == in_video:
                 shape = left.pop(0)
                 if isinstance(shape, ClipShape):

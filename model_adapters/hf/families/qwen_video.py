@@ -46,7 +46,8 @@ class QwenVideo:
         The tower attends within a temporal patch only, so clips can be encoded one by one as well
         as together.
         """
-        pixels, grids = [], []
+        pixels = []
+        grids = []
         for shape, images in clips:
             inputs = self._image_processor(
                 images=list(images), size=self._limits(shape), return_tensors="pt"
@@ -111,7 +112,8 @@ class QwenVideo:
         The clips of a long video share the pixels that a video may have.
         """
         size = self._image_processor.size
-        least, most = size["shortest_edge"], size["longest_edge"]
+        least = size["shortest_edge"]
+        most = size["longest_edge"]
         lower = min(max(_MIN_PIXELS, least), most)
         upper = max(min(_MAX_PIXELS, _TOTAL_PIXELS / shape.n_clips), lower * _MARGIN)
         return {"shortest_edge": lower, "longest_edge": int(min(max(upper, least), most))}

@@ -111,7 +111,8 @@ def read_checkpoint(
         ModelError: the checkpoint is incomplete or damaged.
         UsageError: raised by `build_model`.
     """
-    options, folder = located.options, located.folder
+    options = located.options
+    folder = located.folder
     remote = {"trust_remote_code": options.trust_remote_code}
     with wrap_loading_errors(options.pretrained):
         image_processor = transformers.AutoImageProcessor.from_pretrained(
@@ -191,7 +192,8 @@ def assemble(
 
 def _check_pixels(image_processor: Any) -> None:
     size = dict(getattr(image_processor, "size", None) or {})
-    least, most = size.get("shortest_edge"), size.get("longest_edge")
+    least = size.get("shortest_edge")
+    most = size.get("longest_edge")
     if least is not None and most is not None and least > most:
         raise ModelError(f"min_pixels is {least} and max_pixels {most}; set both to fit")
 
@@ -283,10 +285,8 @@ def wrap_loading_errors(pretrained: str) -> Iterator[None]:
     Raises:
         ModelError: a part of the checkpoint cannot be loaded.
     """
-    problem, hint = (
-        f"the checkpoint {pretrained} cannot be loaded",
-        "restore its files, or give another checkpoint",
-    )
+    problem = f"the checkpoint {pretrained} cannot be loaded"
+    hint = "restore its files, or give another checkpoint"
     # transformers, tokenizers and safetensors raise errors of any type on damaged files.
     with (
         wrap_errors(problem, hint, catch=Exception, raise_as=ModelError),

@@ -15,7 +15,8 @@ def hide_transformers_output() -> Iterator[None]:
 
     Both settings are global in transformers, so they are restored afterwards.
     """
-    verbosity, has_bars = logging.get_verbosity(), logging.is_progress_bar_enabled()
+    verbosity = logging.get_verbosity()
+    has_bars = logging.is_progress_bar_enabled()
     logging.set_verbosity_error()
     logging.disable_progress_bar()
     try:

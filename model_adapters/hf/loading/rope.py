@@ -127,7 +127,8 @@ def take_length_rope(model: Any) -> LengthRope | None:
     if not modules:
         return None
     first = modules[0]
-    rope_type, parameters = first.rope_type, first.config.rope_parameters
+    rope_type = first.rope_type
+    parameters = first.config.rope_parameters
     original = parameters.get(
         "original_max_position_embeddings", first.config.max_position_embeddings
     )

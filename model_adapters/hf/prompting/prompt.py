@@ -155,7 +155,8 @@ class Prompter:
         Raises:
             DataError: a frame cannot be read, or differs in size from the others.
         """
-        per_clip, refs = converter.clip_frames, video.frames
+        per_clip = converter.clip_frames
+        refs = video.frames
         size = refs[0].size
         other = next((ref for ref in refs if ref.size != size), None)
         if other is not None:

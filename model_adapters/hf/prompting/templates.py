@@ -25,7 +25,8 @@ def chat_template(folder: Path, tokenizer: Any) -> str:
     Raises:
         ModelError: the checkpoint has no chat template.
     """
-    jinja, legacy = folder / "chat_template.jinja", folder / "chat_template.json"
+    jinja = folder / "chat_template.jinja"
+    legacy = folder / "chat_template.json"
     if jinja.is_file():
         return jinja.read_text(encoding="utf-8")
     if legacy.is_file():

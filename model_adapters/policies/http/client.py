@@ -89,7 +89,8 @@ class JsonClient:
     def _read(self, reply: http.client.HTTPResponse) -> bytes:
         """Read the whole reply within the limit; a socket's own timeout restarts with every
         piece."""
-        content, end = b"", time.monotonic() + self._timeout_s
+        content = b""
+        end = time.monotonic() + self._timeout_s
         while piece := reply.read1(_PIECE):
             content += piece
             if time.monotonic() > end:

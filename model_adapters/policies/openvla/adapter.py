@@ -68,7 +68,8 @@ def load_openvla(name: str, checkpoint: PolicyCheckpoint, options: PolicyOptions
     description = describe_openvla(checkpoint, options.unnorm_key)
     config = description.config
     device, dtype = checkpoint.resolve_placement(options)
-    towers, size = config.towers(checkpoint.pretrained), config.image_size(checkpoint.pretrained)
+    towers = config.towers(checkpoint.pretrained)
+    size = config.image_size(checkpoint.pretrained)
     with wrap_loading_errors(checkpoint.pretrained):
         with empty_parameters():
             weights = OpenVLAWeights(towers, size, config.language(options.attn_implementation))

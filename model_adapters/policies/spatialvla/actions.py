@@ -100,7 +100,8 @@ class SpatialBins:
             ModelError: the numbers of bins and tokens contradict each other, or translations are
                 not spherical.
         """
-        policy, counts = config.bin_policy, config.action_config.num_bins
+        policy = config.bin_policy
+        counts = config.action_config.num_bins
         axes = {**msgspec.to_builtins(policy.translation), **msgspec.to_builtins(policy.rotation)}
         expected = {**counts.translation, **counts.rotation}
         wrong = [name for name, borders in axes.items() if len(borders) - 1 != expected.get(name)]

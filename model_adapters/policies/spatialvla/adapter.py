@@ -80,7 +80,8 @@ def _view(
     options: SpatialVLAOptions,
     pretrained: str,
 ) -> View:
-    degrees, cameras = parse_field_of_view(options.intrinsics), processor.intrinsic_config
+    degrees = parse_field_of_view(options.intrinsics)
+    cameras = processor.intrinsic_config
     size, patch, zoe_size = config.sides(pretrained)
     return View(
         image_size=size,

@@ -60,7 +60,8 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
         Raises:
             ModelError: one of them is not a square.
         """
-        vision, backbone = self.vision(), self.zoe().backbone_config
+        vision = self.vision()
+        backbone = self.zoe().backbone_config
         sides = vision.image_size, vision.patch_size, getattr(backbone, "image_size", None)
         image, patch, zoe = sides
         if not (isinstance(image, int) and isinstance(patch, int) and isinstance(zoe, int)):

@@ -81,8 +81,10 @@ def back_project(
         patch: side of a patch in pixels.
         resolution: points along each side of a patch.
     """
-    size, cell = depth.shape[-1], patch // resolution
-    n_patches, n_cells = size // patch, size // patch * resolution
+    size = depth.shape[-1]
+    cell = patch // resolution
+    n_patches = size // patch
+    n_cells = size // patch * resolution
     middle = torch.arange(0, size, cell, device=depth.device).float() + patch / resolution / 2
     # The original computes these in the type of its weights, which rounds: in bfloat16, 220.5
     # becomes 220.

@@ -29,7 +29,8 @@ from model_adapters.policies.weights import Layout
 __all__ = ["SpatialVLANetwork", "SpatialVLAWeights", "View", "prompt"]
 
 _HALF = (0.5, 0.5, 0.5)
-_IMAGE, _BEGIN = "<image>", "<bos>"
+_IMAGE = "<image>"
+_BEGIN = "<bos>"
 _LM_HEAD = "language_model.lm_head.weight"
 
 
@@ -49,7 +50,9 @@ class SpatialVLAWeights(nn.Module):
 
     def __init__(self, config: SpatialVLAConfig, attn_implementation: str) -> None:
         super().__init__()
-        text, vision, zoe = config.text(), config.vision(), config.zoe()
+        text = config.text()
+        vision = config.vision()
+        zoe = config.zoe()
         parts: tuple[Any, ...] = (text, vision, zoe, zoe.backbone_config)
         for part in parts:
             part._attn_implementation = attn_implementation
@@ -79,7 +82,8 @@ class SpatialVLAWeights(nn.Module):
     def place_action_embeddings(self) -> None:
         """Copy the embeddings of action tokens, which have their own key, into those of the
         vocabulary."""
-        model, spatial = self.language_model, self.spatial_embed_tokens.weight
+        model = self.language_model
+        spatial = self.spatial_embed_tokens.weight
         model.model.embed_tokens.weight[-len(spatial) :] = spatial
         if self.has_tied_head:
             model.lm_head.weight = model.model.embed_tokens.weight
@@ -157,7 +161,8 @@ class SpatialVLANetwork:
 
     def features(self, image: Image.Image) -> torch.Tensor:
         """Return the patches as input of Gemma, (1, patches, hidden)."""
-        weights, view = self.weights, self.view
+        weights = self.weights
+        view = self.view
         weight = weights.multi_modal_projector.linear.weight
         # Like the original, pixels and intrinsics are rounded to the weights' type first.
         pixels = resize(image, view.image_size).to(weight.device, weight.dtype)[None]
@@ -182,7 +187,8 @@ class SpatialVLANetwork:
         cache = DynamicCache(config=model.config)
 
         def logits(embeds: torch.Tensor) -> torch.Tensor:
-            past, new = cache.get_seq_length(), embeds.shape[1]
+            past = cache.get_seq_length()
+            new = embeds.shape[1]
             # No position is masked: the prefix attends in both directions (PaliGemma), and actions
             # follow one by one.
             mask = embeds.new_zeros(1, 1, new, past + new)
