@@ -13,7 +13,7 @@ from infthor_eval.cli.options.show import ShowOptions
 from infthor_eval.report.exporting import export_tables
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.runs import RunSummary, Suite, Usage, read_header
-from infthor_eval.runs.journals.shards import read_shards
+from infthor_eval.runs.journals.shards import read_run_log
 from infthor_eval.runs.results import results_document
 from infthor_eval.runs.stored.labels import label_runs
 from infthor_eval.runs.stored.search import read_results
@@ -52,9 +52,8 @@ def read_run_results(folder: Path) -> RunResults:
         DataError: there is no journal, or one with a bad line, or of another format.
         UsageError: its suite is not known here.
     """
-    header = read_header(folder)
-    suite = find_suite(header.suite)
-    log = read_shards(folder, suite.records.decoder())
+    suite = find_suite(read_header(folder).suite)
+    header, log = read_run_log(folder, suite.records)
     results = read_results(folder)
     summary = RunSummary(header, suite.summarise(header, log.records))
     return RunResults(folder, suite, summary, log.usage, results.n_missing if results else None)

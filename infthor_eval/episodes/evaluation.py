@@ -9,6 +9,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
+from infthor_eval.episodes.config import EpisodesConfig
 from infthor_eval.episodes.options import SimulatorOptions
 from infthor_eval.episodes.records import P
 from infthor_eval.episodes.simulators import Simulators
@@ -35,10 +36,8 @@ E = TypeVar("E")
 K = TypeVar("K", bound=EpisodeTask[Any, Any])
 Options = TypeVar("Options", bound=SimulatorOptions)
 
-_OF_ALL_TRAJECTORIES = (
-    "trajectories",
-    "broken",
-)  # parts of a task's config that one episode does not depend on
+# Parts of a task's config that one episode does not depend on.
+_OF_ALL_TRAJECTORIES = ("trajectories", "broken")
 
 
 @dataclass(frozen=True)
@@ -96,8 +95,24 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
     def units(self) -> list[U]:
         """The episodes of all tasks, task by task, in the order of trajectories and time."""
 
-    def workload(self, groups: Iterable[Iterable[U]], **settings: Any) -> Workload[U]:
-        """Return the workload, given the episodes in groups and the suite's own settings."""
+    @property
+    def _shared_config(self) -> dict[str, Any]:
+        """The fields of `EpisodesConfig`, and those that all runs have."""
+        return {
+            "tasks": {name: task.config() for name, task in self.tasks.items()},
+            "simulator": self.options.simulator,
+            "ai2thor": version("ai2thor"),
+            "floor_plans": self._floor_plans,
+            "frames": self.options.frames,
+        }
+
+    @property
+    @abstractmethod
+    def config(self) -> EpisodesConfig[Any]:
+        """The suite's part of the run's config."""
+
+    def workload(self, groups: Iterable[Iterable[U]]) -> Workload[U]:
+        """Return the workload, given the episodes in groups."""
         listed = [list(units) for units in groups]
         return Workload(
             groups=[
@@ -109,14 +124,7 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
                 for name, task in self.tasks.items()
                 for place, reason in task.trajectories.broken
             ],
-            config={
-                "tasks": {name: task.config() for name, task in self.tasks.items()},
-                "simulator": self.options.simulator,
-                "ai2thor": version("ai2thor"),
-                "floor_plans": self._floor_plans,
-                "frames": self.options.frames,
-                **settings,
-            },
+            config=self.config,
         )
 
     def simulators(self, **options: Any) -> Simulators:
@@ -152,14 +160,14 @@ class BoundEpisodes(Generic[U, P]):
 
     def _fingerprint(self, unit: U) -> str:
         """Return the hash of everything that an episode depends on."""
-        config = {name: value for name, value in self.workload.config.items() if name != "tasks"}
-        of_task = self.workload.config["tasks"][unit.key.task].items()
+        config = self.workload.config.document
+        task = config.pop("tasks")[unit.key.task]
+        for name in _OF_ALL_TRAJECTORIES:
+            task.pop(name, None)
         return fingerprint(
             {
                 **config,
-                "task": {
-                    name: value for name, value in of_task if name not in _OF_ALL_TRAJECTORIES
-                },
+                "task": task,
                 "trajectory": unit.trajectory.digest,
                 "index": unit.payload.index,
                 "seed": self.seed,

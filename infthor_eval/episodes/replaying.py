@@ -93,7 +93,7 @@ def restore_trajectory(
     task = recorded.records[0].task
     config = recorded.run.config.tasks[task]
     digest = config.trajectories.get(recorded.trajectory)
-    bundled = config.settings.get("bundled")
+    bundled = config.dataset_kwargs.get("bundled")
     available, trajectory = find_recorded_trajectory(
         task, recorded.trajectory, digest, data, bundled, read
     )

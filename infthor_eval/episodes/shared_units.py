@@ -2,16 +2,15 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic
 
-from infthor_eval.episodes.recorded_runs import RecordedRun, TaskConfig
+from infthor_eval.episodes.recorded_runs import RecordedRun
 from infthor_eval.episodes.records import P
 from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.runs.journals.records import UnitRecord
 
 __all__ = ["SharedUnits", "difference_notes", "only_name", "shared_tasks", "shared_units"]
 
-T = TypeVar("T", bound=TaskConfig)
 Units = Mapping[str, Mapping[Any, UnitRecord[P]]]  # by trajectory, then by their order in time
 
 
@@ -56,7 +55,7 @@ def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | 
 
 
 def shared_units(
-    runs: Sequence[RecordedRun[P, T]],
+    runs: Sequence[RecordedRun[P, Any]],
     tasks: Sequence[str],
     excluded: str,
     differences: Iterable[str] = (),
@@ -73,22 +72,12 @@ def shared_units(
     """
     units = [run.by_trajectory(tasks) for run in runs]
     digests = [run.digests(tasks) for run in runs]
-    names = sorted(
-        {*(name for known in digests for name in known), *(name for item in units for name in item)}
-    )
-    left_out = {
-        name: {
-            place
-            for item in units
-            for place, record in item.get(name, {}).items()
-            if record.excluded is not None
-        }
-        for name in names
-    }
+    names = sorted(set().union(*digests, *units))
+    excluded_units = {name: _excluded_units(name, units) for name in names}
     shared = [
         name
         for name in names
-        if _is_shared(name, digests, units) and units[0][name].keys() - left_out[name]
+        if _is_shared(name, digests, units) and units[0][name].keys() - excluded_units[name]
     ]
     if not shared:
         which = " and ".join(tasks)
@@ -96,13 +85,7 @@ def shared_units(
             f"the runs share no trajectory of {which} that all of them have in full; draw runs on "
             "the same data"
         )
-    records = tuple(
-        tuple(
-            tuple(item[name][place] for place in sorted(item[name].keys() - left_out[name]))
-            for name in shared
-        )
-        for item in units
-    )
+    records = tuple(_counted_records(of_run, shared, excluded_units) for of_run in units)
     notes = []
     if len(shared) < len(names):
         notes.append(
@@ -111,7 +94,7 @@ def shared_units(
         )
     if len(shared) == 1:
         notes.append("a mean over one trajectory has no interval")
-    if n_excluded := sum(len(left_out[name]) for name in shared):
+    if n_excluded := sum(len(excluded_units[name]) for name in shared):
         notes.append(f"{excluded}: {n_excluded}")
     notes += difference_notes("simulator", runs, [run.config.simulator for run in runs])
     return SharedUnits(tuple(tasks), tuple(shared), records, (*notes, *differences))
@@ -141,6 +124,27 @@ def only_name(what: str, option: str, name: str | None, known: Sequence[str]) ->
     if name is not None and name not in known:
         raise unknown_name(f"{what} of this run", name, known)
     return name or known[0]
+
+
+def _excluded_units(trajectory: str, units: Sequence[Units[P]]) -> set[Any]:
+    """Return the episodes of a trajectory that do not count in some run."""
+    excluded = set()
+    for of_run in units:
+        for episode, record in of_run.get(trajectory, {}).items():
+            if record.excluded is not None:
+                excluded.add(episode)
+    return excluded
+
+
+def _counted_records(
+    of_run: Units[P], trajectories: Sequence[str], excluded: Mapping[str, set[Any]]
+) -> tuple[tuple[UnitRecord[P], ...], ...]:
+    """Return a run's records of some trajectories that count in every run, in time order."""
+    records = []
+    for name in trajectories:
+        episodes = sorted(of_run[name].keys() - excluded[name])
+        records.append(tuple(of_run[name][episode] for episode in episodes))
+    return tuple(records)
 
 
 def _is_shared(name: str, digests: Sequence[Mapping[str, str]], units: Sequence[Units[P]]) -> bool:

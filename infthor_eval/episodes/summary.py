@@ -1,11 +1,12 @@
 """Results of a run of episodes: a pure function of its journal, without times."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, TypeVar
 
 import msgspec
 
+from infthor_eval.episodes.config import EpisodesConfig, EpisodeTaskConfig
 from infthor_eval.episodes.records import P
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
@@ -38,6 +39,7 @@ class EpisodeTaskSummary(msgspec.Struct, frozen=True, kw_only=True):
     endings: dict[str, int]
 
 
+C = TypeVar("C", bound=EpisodeTaskConfig)
 T = TypeVar("T", bound=EpisodeTaskSummary)
 
 
@@ -49,18 +51,18 @@ class EpisodesSummary(msgspec.Struct, Generic[T], frozen=True):
 
 
 def summarise_episodes(
-    config: Mapping[str, Any],
+    config: EpisodesConfig[C],
     records: Sequence[UnitRecord[P]],
-    summarise_task: Callable[[Mapping[str, Any], list[UnitRecord[P]]], T],
+    summarise_task: Callable[[C, list[UnitRecord[P]]], T],
 ) -> EpisodesSummary[T]:
     """Summarise a run; `summarise_task` returns a task's results, given its config and its records
     in order."""
     ordered = sorted(records, key=lambda record: record.key)
-    tasks = {
-        name: summarise_task(of_task, [record for record in ordered if record.task == name])
-        for name, of_task in config["tasks"].items()
-    }
-    return EpisodesSummary(str(config["simulator"]), tasks)
+    tasks = {}
+    for name, task in config.tasks.items():
+        chosen = [record for record in ordered if record.task == name]
+        tasks[name] = summarise_task(task, chosen)
+    return EpisodesSummary(config.simulator, tasks)
 
 
 def counted_records(records: Sequence[UnitRecord[P]]) -> list[UnitRecord[P]]:
@@ -68,14 +70,14 @@ def counted_records(records: Sequence[UnitRecord[P]]) -> list[UnitRecord[P]]:
     return [record for record in records if record.excluded is None]
 
 
-def common_results(config: Mapping[str, Any], records: Sequence[UnitRecord[P]]) -> dict[str, Any]:
+def common_results(config: EpisodeTaskConfig, records: Sequence[UnitRecord[P]]) -> dict[str, Any]:
     """Return the fields of `EpisodeTaskSummary`, given a task's config and its records."""
     counted = counted_records(records)
     return {
         "n_trajectories": len({record.cluster for record in counted}),
         "n_failed": sum(record.failure is not None for record in counted),
         "excluded": _count(record.excluded for record in records if record.excluded is not None),
-        "skipped": _count(reason for _, reason in config["broken"]),
+        "skipped": _count(reason for _, reason in config.broken),
         "endings": _count(record.payload.ended or "failed" for record in counted),
     }
 

@@ -20,7 +20,7 @@ T = TypeVar("T", bound=EpisodeTaskSummary)
 
 def run_name(header: RunHeader) -> str:
     """Return the name of a run, with its frames if they are not the actual ones."""
-    frames = header.config["frames"]
+    frames = header.config.frames
     return header.name if frames == "shown" else f"{header.name}, {frames} frames"
 
 

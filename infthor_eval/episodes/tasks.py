@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from typing import Any, Generic, Protocol, TypeVar
 
+from infthor_eval.episodes.config import EpisodeTaskConfig
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory, TrajectorySet, find_trajectories
 from infthor_eval.formats.trajectory import TrajectorySource
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -45,14 +46,13 @@ class EpisodeTask(ABC, Generic[S, T]):
         )
 
     @abstractmethod
-    def config(self) -> dict[str, Any]:
-        """Return everything that the task's numbers depend on, as JSON values."""
+    def config(self) -> EpisodeTaskConfig:
+        """Return everything that the task's numbers depend on."""
 
-    def _config(self, used: Iterable[T], **settings: Any) -> dict[str, Any]:
-        """Return the config, given the trajectories that are used and the suite's own settings."""
+    def _shared_config(self, used: Iterable[T]) -> dict[str, Any]:
+        """Return the fields of `EpisodeTaskConfig`, given the trajectories that are used."""
         return {
-            "config": dict(self.file.settings),
+            "settings": dict(self.file.settings),
             "trajectories": {trajectory.traj_id: trajectory.digest for trajectory in used},
-            "broken": [list(item) for item in self.trajectories.broken],
-            **settings,
+            "broken": tuple(self.trajectories.broken),
         }

@@ -14,10 +14,10 @@ from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.harness.registration import NAME, say_model_takes_references
 from infthor_eval.harness.requests import RequestAdapter
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
+from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import P, U
 from infthor_eval.runs.journals.session import JournalSession
-from infthor_eval.runs.run_config import run_config
 from infthor_eval.runs.work.binding import require_capability
 from infthor_eval.storage.scratch import ScratchFolder
 from infthor_eval.suites import baseline_suites, find_request_adapter, find_suite
@@ -152,11 +152,12 @@ class InfthorLM(LM):
         """Return the session of a suite, whose journal is in a folder of the suite's name."""
         if suite.name not in self._sessions:
             model = {"name": self._model.name, **self._model.identity()}
-            config = run_config(suite.name, model, self._code, {"host": "lm-eval"}, seed=self._seed)
+            config: RunConfig[dict[str, Any]] = RunConfig(host="lm-eval")
+            config = config.complete(suite.name, model, adapter=self._code, seed=self._seed)
             header = RunHeader(suite=suite.name, name=self._name, config=config)
-            self._sessions[suite.name] = JournalSession(
-                Journal(self._folder / suite.name, header, suite.records)
-            )
+            types = replace(suite.records, config=RunConfig[dict[str, Any]])  # no task is known
+            journal = Journal(self._folder / suite.name, header, types)
+            self._sessions[suite.name] = JournalSession(journal)
         return self._sessions[suite.name]
 
 

@@ -10,6 +10,7 @@ from infthor_eval.episodes.retries import with_retries
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.errors import SceneError
 from infthor_eval.manipulation.actors import ArmActor, ArmBaseline, PolicyActor
+from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.manipulation.expert import replay_expert
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import ArmRecord
@@ -39,6 +40,11 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
             for name, task in self.tasks.items()
             for trajectory, episode in task.episodes
         ]
+
+    @property
+    def config(self) -> ManipulationConfig:
+        """See `EpisodeEvaluation`."""
+        return ManipulationConfig(**self._shared_config)
 
     def bind(self, subject: Subject) -> "BoundManipulation":
         """See `infthor_eval.runs.Evaluation.bind`; TypeError for neither a policy nor a baseline of

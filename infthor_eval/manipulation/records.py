@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
+from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.runs.journals.records import RecordTypes
 
 __all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep"]
@@ -81,4 +82,4 @@ class ArmRecord(
         return sum(step.n_collisions for step in self.steps)
 
 
-RECORDS = RecordTypes(unit=ArmRecord)
+RECORDS = RecordTypes(unit=ArmRecord, config=ManipulationConfig)

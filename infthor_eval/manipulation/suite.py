@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 from infthor_eval.manipulation.actors import BASELINES
-from infthor_eval.manipulation.config_form import ManipulationConfig
 from infthor_eval.manipulation.evaluation import ManipulationEvaluation
 from infthor_eval.manipulation.options import ManipulationOptions
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
@@ -20,7 +19,6 @@ from infthor_eval.runs import (
     TaskFile,
     TaskRequest,
     UnitRecord,
-    check_config,
 )
 from infthor_eval.runs.suite import Need
 from infthor_eval.tables import Table
@@ -49,8 +47,7 @@ class ManipulationSuite:
     def summarise(
         self, header: RunHeader, records: Sequence[UnitRecord[ArmRecord]]
     ) -> ManipulationSummary:
-        """See `Suite.summarise`; raises DataError for a journal whose config is of another form."""
-        check_config(header, ManipulationConfig)
+        """See `Suite.summarise`."""
         return summarise_manipulation(header.config, records)
 
     def scores(self, record: UnitRecord[ArmRecord]) -> Mapping[str, float]:

@@ -1,8 +1,7 @@
 """Results of a run of manipulation: a pure function of its journal, without times."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from statistics import fmean
-from typing import Any
 
 from infthor_eval.episodes.summary import (
     EpisodesSummary,
@@ -12,6 +11,7 @@ from infthor_eval.episodes.summary import (
     success_rate,
     summarise_episodes,
 )
+from infthor_eval.manipulation.config import ArmTaskConfig, ManipulationConfig
 from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
@@ -52,20 +52,20 @@ ManipulationSummary = EpisodesSummary[ArmTaskSummary]
 
 
 def summarise_manipulation(
-    config: Mapping[str, Any], records: Sequence[Record]
+    config: ManipulationConfig, records: Sequence[Record]
 ) -> ManipulationSummary:
     """Summarise a run, given its config and the records of all its episodes."""
     return summarise_episodes(config, records, _summarise_task)
 
 
-def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> ArmTaskSummary:
+def _summarise_task(config: ArmTaskConfig, records: Sequence[Record]) -> ArmTaskSummary:
     counted = counted_records(records)
     acted = [record for record in counted if record.failure is None]
     starts_inside = [float(record.payload.starts_inside) for record in acted]
     return ArmTaskSummary(
         **common_results(config, records),
-        kind=config["kind"],
-        radius=config["radius"],
+        kind=config.kind,
+        radius=config.radius,
         success=success_rate(counted),
         inside=clustered_rate(starts_inside, [record.cluster for record in acted]),
         closest=_mean([record.payload.closest for record in acted]),

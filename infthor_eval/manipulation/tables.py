@@ -94,7 +94,7 @@ def _above_floor(
         for other in runs
         if other.header.name == _STILL
         and other is not run
-        and other.header.config["tasks"].get(name) == run.header.config["tasks"][name]
+        and other.header.config.tasks.get(name) == run.header.config.tasks[name]
     ]
     if not stills:
         return None

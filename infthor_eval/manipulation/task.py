@@ -8,6 +8,7 @@ from infthor_eval.episodes.task_settings import task_settings
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.household.wording import canonical_type, noun
+from infthor_eval.manipulation.config import ArmTaskConfig
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import Grasp
 from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
@@ -165,11 +166,11 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             **{key: noun(canonical_type(name)) for key, name in names.items() if name is not None}
         )
 
-    def config(self) -> dict[str, Any]:
+    def config(self) -> ArmTaskConfig:
         """See `EpisodeTask`."""
-        return self._config(
-            (trajectory for trajectory, _ in self.episodes),
-            kind=str(self.kind),
+        return ArmTaskConfig(
+            **self._shared_config(trajectory for trajectory, _ in self.episodes),
+            kind=self.kind,
             radius=self.settings.radius,
             instruction=self.settings.instruction,
             stand=self.settings.stand,

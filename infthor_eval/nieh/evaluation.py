@@ -11,6 +11,7 @@ from infthor_eval.nieh.asking.answering import answer_units
 from infthor_eval.nieh.asking.answering_models import AnsweringModel, OpenAnswerer, answering_model
 from infthor_eval.nieh.asking.baselines import Baseline
 from infthor_eval.nieh.asking.recalling import apply_recall
+from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.docs import doc_of, doc_target, prompt_of
 from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
@@ -71,22 +72,13 @@ class NiehEvaluation:
                 for name, item in prepared.items()
                 for skipped in item.task_samples.skipped
             ],
-            config={
-                "tasks": {
+            config=self._config(
+                {
                     name: task.config(prepared[name], model.video_input)
                     for name, task in tasks.items()
                 },
-                "k_tokens": self._options.k_tokens,
-                "tokens_per_frame": tokens,
-                "frames": self._options.frames,
-                **(
-                    {"prompt": prompt}
-                    if (prompt := self._options.prompt) not in (None, PUBLISHED_MAIN)
-                    else {}
-                ),
-                **self._memory(),
-                **({"repeats": self._options.repeats} if self._options.repeats > 1 else {}),
-            },
+                tokens,
+            ),
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
         )
         return BoundNieh(workload, prepared, open_answerer, model.video_input)
@@ -99,9 +91,20 @@ class NiehEvaluation:
             return self._options.tokens_per_frame
         return _measure_frame(measured.data, model)
 
+    def _config(self, tasks: dict[str, NiehTaskConfig], tokens_per_frame: int | None) -> NiehConfig:
+        options = self._options
+        return NiehConfig(
+            tasks=tasks,
+            k_tokens=options.k_tokens,
+            tokens_per_frame=tokens_per_frame,
+            frames=options.frames,
+            prompt=None if options.prompt == PUBLISHED_MAIN else options.prompt,
+            repeats=options.repeats,
+            **self._memory(),
+        )
+
     def _memory(self) -> dict[str, Any]:
-        """Return the options of the memory, as far as there are any, so that other runs are what
-        they were."""
+        """Return the options of the memory, as far as there are any."""
         names = ("memory", "memory_args", "budget")
         return {
             name: value for name in names if (value := getattr(self._options, name)) is not None

@@ -8,6 +8,7 @@ from msgspec import Meta
 
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.question_forms import type_of
+from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.runs.counts import Count
 from infthor_eval.runs.journals.records import RecordTypes
 
@@ -173,5 +174,5 @@ class NiehVerdict(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", t
 
 
 RECORDS: RecordTypes[NiehAnswer] = RecordTypes(
-    unit=NiehAnswer, artifact=NiehNote | NiehRecall | NiehVerdict
+    unit=NiehAnswer, artifact=NiehNote | NiehRecall | NiehVerdict, config=NiehConfig
 )

@@ -4,11 +4,12 @@ import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.memory import parse_options, read_budget
+from infthor_eval.nieh.config import MetricsConfig, NiehTaskConfig, SkippedSample
 from infthor_eval.nieh.contexts import CONTEXTS, MEMORY, ContextSettings, Sample, check_prompt
 from infthor_eval.nieh.metrics import PUBLISHED, Metrics, metrics_of
 from infthor_eval.nieh.options import NiehOptions
@@ -127,8 +128,8 @@ class NiehTask:
             return prepared.task_samples.samples
         return find_samples(self._config | {"tokens_per_frame": tokens_per_frame}).samples
 
-    def config(self, prepared: PreparedTask, video_input: bool | None) -> dict[str, Any]:
-        """Return everything that the numbers of the task depend on, as JSON values.
+    def config(self, prepared: PreparedTask, video_input: bool | None) -> NiehTaskConfig:
+        """Return everything that the numbers of the task depend on.
 
         Args:
             prepared: the task, prepared for a model.
@@ -136,27 +137,23 @@ class NiehTask:
                 sees nothing.
         """
         samples = prepared.task_samples
-        names = prepared.metrics.names
-        skipped = [
-            {"question_id": i.question.id, "variant": i.variant, "reason": i.reason}
-            for i in samples.skipped
-        ]
-        film = (
-            {}
-            if video_input is None or not samples.shows_films
-            else {"film": "video" if video_input else "images"}
+        film: Literal["video", "images"] | None = None
+        if samples.shows_films and video_input is not None:
+            film = "video" if video_input else "images"
+        return NiehTaskConfig(
+            settings=dict(self.settings),
+            decoding=prepared.decoding.document(),
+            metrics=MetricsConfig(names=prepared.metrics.names, **prepared.metrics.code),
+            data=samples.data.fingerprint,
+            simulator=samples.data.simulator,
+            sources=dict(samples.sources),
+            n_samples=len(samples.samples),
+            skipped=tuple(
+                SkippedSample(question_id=it.question.id, variant=it.variant, reason=it.reason)
+                for it in samples.skipped
+            ),
+            film=film,
         )
-        return {
-            "config": dict(self.settings),
-            "decoding": prepared.decoding.document(),
-            "metrics": {"names": list(names), **prepared.metrics.code},
-            "data": samples.data.fingerprint,
-            "simulator": samples.data.simulator,
-            "sources": dict(samples.sources),
-            "n_samples": len(samples.samples),
-            "skipped": skipped,
-            **film,
-        }
 
 
 def check_task_file(file: TaskFile) -> None:

@@ -9,6 +9,7 @@ from infthor_eval.episodes.evaluation import BoundEpisodes, EpisodeEvaluation, E
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.episodes.running import EpisodeResult
 from infthor_eval.plans.actors.factory import ActorFactory, actor_factory
+from infthor_eval.plans.config import PlansConfig
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
 from infthor_eval.plans.published.final_protocol import FinalForm
@@ -41,6 +42,11 @@ class PlansEvaluation(EpisodeEvaluation[PlansOptions, PlansTask, PlanUnit]):
             for plan in task.plans(trajectory)
         ]
 
+    @property
+    def config(self) -> PlansConfig:
+        """See `EpisodeEvaluation`."""
+        return PlansConfig(**self._shared_config, constrained=self.options.constrained)
+
     def bind(self, subject: Subject) -> "BoundPlans":
         """See `infthor_eval.runs.Evaluation.bind`."""
         return BoundPlans(self, actor_factory(subject, self.trajectories))
@@ -60,9 +66,7 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         # A trajectory is a group: its plans share the expert's history, in the simulator and in the
         # prefix cache.
         groups = groupby(evaluation.units, lambda unit: (unit.key.task, unit.cluster))
-        workload = evaluation.workload(
-            (same for _, same in groups), constrained=evaluation.options.constrained
-        )
+        workload = evaluation.workload(same for _, same in groups)
         workload = replace(
             workload, warnings=_warnings(factory.trained_words, self._tasks.values())
         )

@@ -4,6 +4,7 @@ did."""
 import msgspec
 
 from infthor_eval.episodes.records import EpisodeRecord
+from infthor_eval.plans.config import PlansConfig
 from infthor_eval.runs.counts import Count, Total
 from infthor_eval.runs.journals.records import RecordTypes
 
@@ -69,4 +70,4 @@ class PlanRecord(
     clue_tokens: Count | None = None
 
 
-RECORDS = RecordTypes(unit=PlanRecord)
+RECORDS = RecordTypes(unit=PlanRecord, config=PlansConfig)

@@ -12,6 +12,7 @@ from infthor_eval.episodes.summary import (
     success_rate,
     summarise_episodes,
 )
+from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.published.log import log_rows
 from infthor_eval.plans.records import PlanRecord
@@ -77,14 +78,14 @@ class PlanTaskSummary(EpisodeTaskSummary, frozen=True, kw_only=True):
 PlansSummary = EpisodesSummary[PlanTaskSummary]
 
 
-def summarise_plans(config: Mapping[str, Any], records: Sequence[Record]) -> PlansSummary:
+def summarise_plans(config: PlansConfig, records: Sequence[Record]) -> PlansSummary:
     """Summarise a run, given its config and the records of all its plans."""
     return summarise_episodes(config, records, _summarise_task)
 
 
-def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> PlanTaskSummary:
+def _summarise_task(config: PlansTaskConfig, records: Sequence[Record]) -> PlanTaskSummary:
     counted = counted_records(records)
-    has_steps = config["rewards"] is not None  # which imported counts have not
+    has_steps = config.rewards is not None  # which imported counts have not
     acted = counted if has_steps else []
     return PlanTaskSummary(
         **common_results(config, records),
@@ -109,7 +110,7 @@ def _summarise_task(config: Mapping[str, Any], records: Sequence[Record]) -> Pla
         by_distance=_by_class(acted, _distance, (*DISTANCES, NEVER)),
         by_tokens=_by_class(acted, _clue_tokens, LENGTHS),
         n_actions=sum(len(record.payload.steps) for record in acted) if has_steps else None,
-        rules=_rules(config["rewards"]),
+        rules=_rules(config.rewards),
         logged=_logged(acted),
     )
 

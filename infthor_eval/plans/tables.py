@@ -6,6 +6,7 @@ from typing import Any
 from infthor_eval.distances import DISTANCES, LENGTHS
 from infthor_eval.episodes.tables import NAME_COLUMNS, endings_table, named_tasks, result_notes
 from infthor_eval.formats.published import published_tables
+from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.summary import FINAL_COLUMNS, NEVER, PlanTaskSummary
 from infthor_eval.rates import Rate, format_number, format_percent
 from infthor_eval.runs import RunSummary
@@ -122,9 +123,7 @@ def _rate_and_n(rate: Rate | None) -> str:
 def _conduct_notes(runs: Sequence[RunSummary]) -> list[str]:
     """Return how the runs went on after a failed plan; Algorithm 2 of the paper and its script
     differ in it."""
-    ways = {
-        task.get("after_failure") for run in runs for task in run.header.config["tasks"].values()
-    }
+    ways = {task.after_failure for run in runs for task in run.header.config.tasks.values()}
     return [text for way, text in _AFTER_FAILURE.items() if way in ways]
 
 
@@ -173,18 +172,19 @@ def _sizes(task: PlanTaskSummary) -> tuple[str, ...]:
 
 
 def _has_final_task(run: RunSummary) -> bool:
-    tasks = run.header.config["tasks"].values()
-    return any(task["config"]["dataset_kwargs"].get("plans") == "final" for task in tasks)
+    tasks = run.header.config.tasks.values()
+    return any(task.dataset_kwargs.get("plans") == "final" for task in tasks)
 
 
 def _is_comparable(run: RunSummary) -> bool:
     """Return whether a run has a task that was run as the published final tasks were, or comes from
     their logs."""
-    tasks = run.header.config["tasks"].values()
-    return any(
-        task["rewards"] is None or _as_published(task) for task in tasks
-    ) and _has_final_task(run)
+    comparable = any(
+        task.rewards is None or _is_published(task, task.rewards)
+        for task in run.header.config.tasks.values()
+    )
+    return comparable and _has_final_task(run)
 
 
-def _as_published(task: Mapping[str, Any]) -> bool:
-    return task.get("protocol") == "published" and task["rewards"].get("scoring") == "published"
+def _is_published(task: PlansTaskConfig, rewards: Mapping[str, Any]) -> bool:
+    return task.protocol == "published" and rewards.get("scoring") == "published"

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from infthor_eval.episodes.task_settings import task_settings
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.actors.model import AgentConfig
+from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.environment import MAX_STEPS
 from infthor_eval.plans.history.forms import history_named
 from infthor_eval.plans.history.recalled import MemoryChoice, RecalledHistory
@@ -167,20 +167,13 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
             blank=self._options.frames == "blank",
         )
 
-    def _recalling(self) -> dict[str, Any]:
-        """Return the identity of a memory of one's own choice; the published forms have theirs in
-        their name."""
-        return (
-            {"recall": self.history.identity()} if isinstance(self.history, RecalledHistory) else {}
-        )
-
-    def config(self) -> dict[str, Any]:
+    def config(self) -> PlansTaskConfig:
         """See `EpisodeTask`."""
-        return self._config(
-            self.evaluated_trajectories,
-            words=self.settings.words,
+        return PlansTaskConfig(
+            **self._shared_config(self.evaluated_trajectories),
+            words=self.words,
             history=self.settings.history,
-            **self._recalling(),
+            recall=self.history.identity() if isinstance(self.history, RecalledHistory) else None,
             protocol=self.settings.protocol,
             after_failure=self.settings.after_failure,
             rewards=self.rules.document(),

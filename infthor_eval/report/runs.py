@@ -10,7 +10,7 @@ import msgspec
 
 from infthor_eval.errors import UsageError
 from infthor_eval.runs import RunHeader, RunSummary, Suite, UnitKey, UnitRecord, Usage, read_header
-from infthor_eval.runs.journals.shards import read_shards
+from infthor_eval.runs.journals.shards import read_run_log
 from infthor_eval.runs.stored.command import read_stored_command
 from infthor_eval.runs.stored.labels import label_runs
 from infthor_eval.runs.stored.search import read_results
@@ -63,25 +63,15 @@ class ReportRun:
 
     @property
     def tasks(self) -> Mapping[str, Any]:
-        """Settings of the tasks in the run's config, by name."""
-        tasks: Mapping[str, Any] = self.header.config.get("tasks", {})
+        """Configs of the tasks by name, of the suite's type (`RecordTypes.config`)."""
+        tasks: Mapping[str, Any] = self.header.config.tasks
         return tasks
 
     @property
     def simulator(self) -> str:
         """Name of the simulator that the frames are from, or names separated by commas; empty if it
         is not known."""
-        of_tasks = {
-            about.get("simulator") for about in self.tasks.values() if isinstance(about, Mapping)
-        }
-        return str(
-            self.header.config.get("simulator", "") or ", ".join(sorted(filter(None, of_tasks)))
-        )
-
-    def dataset(self, task: str) -> Mapping[str, Any]:
-        """Return the settings of a task's data (`dataset_kwargs` of its file)."""
-        settings = self.tasks[task].get("config", {}).get("dataset_kwargs", {})
-        return settings if isinstance(settings, Mapping) else {}
+        return ", ".join(self.header.config.simulators)
 
     def main_score(self, record: UnitRecord[Any]) -> float:
         """Return the score that decides whether a unit is right, 1 being right."""
@@ -117,17 +107,15 @@ def read_report_runs(
         raise UsageError("one run is given twice; give each once")
     headers = [read_header(folder) for folder in folders]
     return [
-        _read(folder, header, name, find_suite(header.suite), find_presenter(header.suite))
+        _read(folder, name, find_suite(header.suite), find_presenter(header.suite))
         for folder, header, name in zip(
             folders, headers, _distinct_names(folders, headers), strict=True
         )
     ]
 
 
-def _read(
-    folder: Path, header: RunHeader, name: str, suite: Suite, presenter: "Presenter"
-) -> ReportRun:
-    log = read_shards(folder, suite.records.decoder())
+def _read(folder: Path, name: str, suite: Suite, presenter: "Presenter") -> ReportRun:
+    header, log = read_run_log(folder, suite.records)
     results = read_results(folder)
     command = read_stored_command(folder)
     return ReportRun(
@@ -161,11 +149,9 @@ def label_report_runs(folders: Sequence[Path], headers: Sequence[RunHeader]) -> 
 def _distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> list[str]:
     """Return a name per run; the frames are not part of it, since tables add them to the name."""
     names = label_runs(list(zip(folders, headers, strict=True)), ignore={"frames"})
-    tasks = [
-        "+".join(sorted(header.config.get("tasks", {})))[:_LONGEST_TASKS] for header in headers
-    ]
+    tasks = ["+".join(sorted(header.config.tasks))[:_LONGEST_TASKS] for header in headers]
     keys = [
-        (name, header.suite, header.config.get("frames"))
+        (name, header.suite, header.config.frames)
         for name, header in zip(names, headers, strict=True)
     ]
     with_tasks = list(zip(keys, tasks, strict=True))
@@ -177,8 +163,8 @@ def _distinct_names(folders: Sequence[Path], headers: Sequence[RunHeader]) -> li
 
 
 def _with_frames(name: str, header: RunHeader) -> str:
-    frames = header.config.get("frames", "shown")
-    return name if frames == "shown" else f"{name}, {frames} frames"
+    frames = header.config.frames
+    return name if frames in ("", "shown") else f"{name}, {frames} frames"
 
 
 def choose_evenly(items: Sequence[T], n: int) -> list[T]:

@@ -1,7 +1,7 @@
 """One run of any suite: its config, its journal, and the order of its work."""
 
 from infthor_eval.runs.catalog import Catalog, TaskFile
-from infthor_eval.runs.config_form import check_config
+from infthor_eval.runs.config import RunConfig, TaskConfig
 from infthor_eval.runs.journals.records import (
     RecordTypes,
     RunHeader,
@@ -41,6 +41,7 @@ __all__ = [
     "Observer",
     "PreparedRun",
     "RecordTypes",
+    "RunConfig",
     "RunHeader",
     "RunOutcome",
     "RunRequest",
@@ -50,6 +51,7 @@ __all__ = [
     "Skipped",
     "StoredCommand",
     "Suite",
+    "TaskConfig",
     "TaskEstimate",
     "TaskFile",
     "TaskRequest",
@@ -60,7 +62,6 @@ __all__ = [
     "UnitSample",
     "Usage",
     "Workload",
-    "check_config",
     "estimate_run",
     "execute",
     "prepare",

@@ -8,7 +8,6 @@ from typing import Any, Generic
 from infthor_eval.errors import UsageError, unknown_name
 from infthor_eval.runs.journals.records import P, RunHeader, U
 from infthor_eval.runs.suite import Evaluation, Suite, TaskRequest
-from infthor_eval.storage.digests import fingerprint
 from infthor_eval.storage.files import require_writable
 from infthor_eval.workers import WorkerSettings
 from model_adapters import check_options, is_known, label, names
@@ -59,7 +58,7 @@ class RunRequest:
 
 def run_folder(output: Path, header: RunHeader, tasks: Iterable[str]) -> Path:
     """Return the folder of a run of these tasks, `<output>/<name>/<tasks>-<config hash>`."""
-    return output / header.name / f"{'+'.join(tasks)[:80]}-{fingerprint(header.config)}"
+    return output / header.name / f"{'+'.join(tasks)[:80]}-{header.config.hash}"
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ import msgspec
 
 from infthor_eval.rates import Rate
 from infthor_eval.runs.catalog import TaskFile
+from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.records import (
     A,
     P,
@@ -111,7 +112,8 @@ class Workload(Generic[U_co]):
     Attributes:
         groups: the groups in the order of work, which depends on the request alone.
         skipped: units that cannot be evaluated.
-        config: everything beside subject and seed that the numbers depend on, as JSON values.
+        config: everything beside subject, limit and seed that the numbers depend on; of the
+            suite's type (`RecordTypes.config`).
         costs: costs of the tasks, where they are known.
         warnings: what people should know before the first unit, such as a checkpoint that was
             trained otherwise.
@@ -119,7 +121,7 @@ class Workload(Generic[U_co]):
 
     groups: Sequence[Group[U_co]]
     skipped: Sequence[Skipped] = ()
-    config: Mapping[str, Any] = field(default_factory=dict)
+    config: RunConfig[Any] = field(default_factory=RunConfig)
     costs: Sequence[Cost] = ()
     warnings: Sequence[str] = ()
 

@@ -161,7 +161,7 @@ def _row(label: str, run: StoredRun) -> Row:
 
 def _numbers(run: StoredRun) -> str:
     """The tasks with their primary metrics, as many as fit into a row."""
-    tasks = list(run.header.config.get("tasks", {}))
+    tasks = list(run.header.config.tasks)
     numbers = [
         f"{task} {100 * run.primary_metrics[task].mean:.1f}"
         if task in run.primary_metrics

@@ -135,7 +135,8 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
         config = run.config.tasks[record.task]
         problem = f"{run.label}: settings of {record.task} that this version does not know"
         with wrap_errors(problem, "run the evaluation again", catch=msgspec.ValidationError):
-            return replace(msgspec.convert(config.settings, ArmTaskSettings), radius=config.radius)
+            settings = msgspec.convert(config.dataset_kwargs, ArmTaskSettings)
+        return replace(settings, radius=config.radius)
 
     def _environment(self, settings: ArmTaskSettings) -> ArmEnvironment:
         """Return the environment whose frames are like the run's."""

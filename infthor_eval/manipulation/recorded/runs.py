@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from infthor_eval.episodes.recorded_runs import RecordedRun, TaskConfig
+from infthor_eval.episodes.recorded_runs import RecordedRun
 from infthor_eval.episodes.shared_units import (
     SharedUnits,
     difference_notes,
@@ -12,33 +12,19 @@ from infthor_eval.episodes.shared_units import (
     shared_units,
 )
 from infthor_eval.errors import UsageError
+from infthor_eval.manipulation.config import ArmTaskConfig, ManipulationConfig
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
 
-__all__ = ["ArmRun", "ArmTaskConfig", "label_by_radius", "shared_episodes", "task_kinds"]
+__all__ = ["ArmRun", "label_by_radius", "shared_episodes", "task_kinds"]
 
 _COMPARED_ELSEWHERE = {"reward", "radius"}  # settings that have an error and a note of their own
 
 
-class ArmTaskConfig(TaskConfig, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need.
-
-    Attributes:
-        radius: radius of the hand's sphere, metres.
-        instruction: instruction of a policy; None for the default.
-    """
-
-    kind: ManipulationKind
-    radius: float
-    instruction: str | None = None
-
-
-class ArmRun(RecordedRun[ArmRecord, ArmTaskConfig]):
+class ArmRun(RecordedRun[ArmRecord, ManipulationConfig]):
     """The journal of a run of manipulation."""
 
-    suite = "manipulation"
     record_types = RECORDS
-    task_config = ArmTaskConfig
     planner = "planner-arm"
 
 
@@ -124,8 +110,6 @@ def _differences(runs: Sequence[ArmRun], tasks: Sequence[str], one_radius: bool)
 
 def _settings(task: ArmTaskConfig) -> Mapping[str, Any]:
     """Return the settings of a task; an instruction of the command line wins."""
-    return (
-        task.settings
-        if task.instruction is None
-        else {**task.settings, "instruction": task.instruction}
-    )
+    if task.instruction is None:
+        return task.dataset_kwargs
+    return {**task.dataset_kwargs, "instruction": task.instruction}

@@ -11,13 +11,13 @@ from infthor_eval.errors import UsageError
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question, SkippedQuestion
 from infthor_eval.formats.reply_logs import LoggedReply, UnreadRow, read_reply_log
+from infthor_eval.nieh.config import MetricsConfig, NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.guessing.guesses import find_guesses, visible_knowledge
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.published.asked_prompt import asked_prompt
 from infthor_eval.nieh.records import Guess, NiehAnswer, ShownClues
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.runs import Catalog, RunHeader, Session, Tokens, Unit, UnitKey, UnitRecord
-from infthor_eval.runs.run_config import run_config
 from infthor_eval.storage.digests import digest_of_file, fingerprint
 
 __all__ = ["ImportedRun", "Refusal", "import_logs"]
@@ -85,26 +85,21 @@ class ImportedRun:
         """Return the records, see `store_run`."""
         return self.records
 
-    def header(self, data: NiehSet) -> RunHeader:
+    def header(self, data: NiehSet) -> RunHeader[NiehConfig]:
         """Return the header of the run: the model's name, the mode, and the digests of the logs."""
-        task = {
-            "config": {"task": self.task, "dataset_kwargs": dict(self.settings)},
-            "decoding": {"max_new_tokens": None},
-            "metrics": {"names": list(SCORERS)},
-            "data": data.fingerprint,
-            "simulator": data.simulator,
-            "sources": {"logs": {log.name: digest_of_file(log) for log in self.logs}},
-            "n_samples": len(self.question_ids),
-            "skipped": [],
-        }
-        workload = {
-            "tasks": {self.task: task},
-            "k_tokens": None,
-            "tokens_per_frame": None,
-            "frames": SHOWN,
-        }
-        config = run_config("nieh", {"name": self.model, "imported": True}, {}, workload)
-        return RunHeader(suite="nieh", name=self.model, config=config)
+        task = NiehTaskConfig(
+            settings={"task": self.task, "dataset_kwargs": dict(self.settings)},
+            decoding={"max_new_tokens": None},
+            metrics=MetricsConfig(names=SCORERS),
+            data=data.fingerprint,
+            simulator=data.simulator,
+            sources={"logs": {log.name: digest_of_file(log) for log in self.logs}},
+            n_samples=len(self.question_ids),
+            skipped=(),
+        )
+        config = NiehConfig(tasks={self.task: task}, frames=SHOWN)
+        model = {"name": self.model, "imported": True}
+        return RunHeader(suite="nieh", name=self.model, config=config.complete("nieh", model))
 
 
 def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -> list[ImportedRun]:

@@ -24,7 +24,6 @@ from infthor_eval.nieh.rescoring.unsure import KnownAnswers
 from infthor_eval.nieh.results.summary import is_open_ended
 from infthor_eval.runs import Session, Unit, UnitKey, UnitRecord, Usage
 from infthor_eval.runs.limiting import limit_items
-from infthor_eval.runs.run_config import as_json_values
 from infthor_eval.storage.digests import fingerprint
 from model_adapters import (
     Decoding,
@@ -123,7 +122,9 @@ class Judge:
         self._form = JUDGE_PROMPTS[prompt]
         self._model = model
         self._decoding = Decoding(max_new_tokens=max_new_tokens)
-        self._identity = as_json_values({"name": model.name, **model.identity(), "adapter": code})
+        self._identity = msgspec.to_builtins(
+            {"name": model.name, **model.identity(), "adapter": code}, str_keys=True
+        )
         self._conversation = model.conversation()
         if self._form.system:
             self._conversation.append(self._form.system, role="system")

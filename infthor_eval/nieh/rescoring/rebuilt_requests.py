@@ -13,6 +13,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.answering import request_fingerprint
 from infthor_eval.nieh.asking.recalling import apply_recall
+from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.contexts import MEMORY, ContextPart, ContextSettings, Sample, context_named
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.frame_ablations import FrameAblation
@@ -24,7 +25,7 @@ __all__ = ["RebuiltRequest", "RequestRebuilder"]
 
 _RETRIEVED = "clip_retrieval"
 # Settings of contexts that a run gives to all its tasks.
-_OF_RUN = ("k_tokens", "tokens_per_frame", "frames", "prompt", "seed")
+_RUN_SETTINGS = ("k_tokens", "tokens_per_frame", "frames", "prompt", "seed")
 
 
 class RebuiltRequest(NamedTuple):
@@ -44,23 +45,22 @@ class RebuiltRequest(NamedTuple):
 class RequestRebuilder:
     """Makes the requests of one task of a stored run again."""
 
-    def __init__(self, header: RunHeader, task: str, data: NiehSet) -> None:
+    def __init__(self, header: RunHeader[NiehConfig], task: str, data: NiehSet) -> None:
         """Take the run's header, the name of the task, and its set, unchanged since the run.
 
         Raises:
             UsageError: a setting of the task is not valid.
         """
-        about: Mapping[str, Any] = header.config["tasks"][task]
-        dataset = about["config"]["dataset_kwargs"]
-        given = {name: header.config.get(name) for name in _OF_RUN}
-        self._settings = ContextSettings.read(given | dataset)
-        self._context = context_named(dataset["context"])
+        config = header.config.tasks[task]
+        of_run = {name: getattr(header.config, name) for name in _RUN_SETTINGS}
+        self._settings = ContextSettings.read(of_run | dict(config.dataset_kwargs))
+        self._context = context_named(config.context)
         ablation = FrameAblation(self._settings.frames, self._settings.seed)
         self._samples = TaskSamples(
-            data, dataset["context"], self._context, (), (), {}, ablation, self._settings.prompt
+            data, config.context, self._context, (), (), {}, ablation, self._settings.prompt
         )
-        self._decoding: Mapping[str, Any] = about["decoding"]
-        self._shows_images = about.get("film") == "images"
+        self._decoding: Mapping[str, Any] = config.decoding
+        self._shows_images = config.film == "images"
 
     def rebuild(self, record: UnitRecord[NiehAnswer]) -> RebuiltRequest:
         """Return the request of a record.

@@ -2,10 +2,10 @@
 and tables."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import msgspec
 
+from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.rescoring.judging import JUDGED, Agreement, Verdicts
 from infthor_eval.nieh.scoring import SCORERS
@@ -113,16 +113,15 @@ def _mean(scores: Sequence[float]) -> float | None:
     return sum(scores) / len(scores) if scores else None
 
 
-def sources_of(config: Mapping[str, Any]) -> dict[str, str]:
-    """Return for each metric of a rescored run's config by whom it is, in words; {} for any other
-    run."""
-    if "rescored" not in config:
+def sources_of(config: NiehConfig) -> dict[str, str]:
+    """Return for each metric of a rescored run's config by whom it is, in words; else {}."""
+    if config.rescored is None:
         return {}
     by: dict[str, str] = dict(
         zip(SCORERS, ("the published scorer", "our strict scorer"), strict=True)
     )
-    scorer = config["rescored"]["scorer"]
-    judge = config["rescored"]["judge"]
+    scorer = config.rescored.scorer
+    judge = config.rescored.judge
     if scorer:
         by |= {
             name: f"{scorer['name']} in {scorer.get('file') or scorer['package']}"

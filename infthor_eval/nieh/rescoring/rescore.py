@@ -10,10 +10,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import msgspec
+from msgspec.structs import replace
 
 import infthor_eval
 from infthor_eval.errors import UsageError
+from infthor_eval.nieh.config import MetricsConfig, NiehConfig, RescoredConfig, SourceRun
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.own_scorers import OwnScorer, OwnScores
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
@@ -23,9 +24,7 @@ from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.runs import NOTHING, RunHeader, Session, Unit, UnitRecord, read_header, read_run
 from infthor_eval.runs.results import write_document
-from infthor_eval.runs.run_config import as_json_values
 from infthor_eval.runs.stored.writing import Stored, store_run
-from infthor_eval.storage.digests import fingerprint
 
 __all__ = ["RESCORED", "Rescored", "Rescoring", "Source", "read_source", "score_again"]
 
@@ -40,15 +39,14 @@ Record = UnitRecord[NiehAnswer]
 class Source:
     """A run whose replies are scored again: its header, and the latest record of each unit."""
 
-    header: RunHeader
+    header: RunHeader[NiehConfig]
     records: Sequence[Record]
 
     @property
     def n_missing(self) -> int:
         """Number of units without a record."""
-        return sum(task["n_samples"] for task in self.header.config["tasks"].values()) - len(
-            self.records
-        )
+        tasks = self.header.config.tasks.values()
+        return sum(task.n_samples for task in tasks) - len(self.records)
 
     @property
     def replied(self) -> list[Record]:
@@ -95,21 +93,23 @@ class Rescoring:
         return (*SCORERS, *(self.own.names if self.own else ()), *((JUDGED,) if self.judge else ()))
 
     @cached_property
-    def header(self) -> RunHeader:
+    def header(self) -> RunHeader[NiehConfig]:
         """The header of the run: that of its source, with what it comes from and who scores it."""
         source = self.source.header
-        tasks = source.config["tasks"].items()
-        config = source.config | {
-            "infthor_eval": infthor_eval.__version__,
-            "tasks": {task: about | {"metrics": {"names": self.names}} for task, about in tasks},
-            "rescored": {
-                "from": {"name": source.name, "config": fingerprint(source.config)},
-                "scorer": self._scorer_config(),
-                "judge": self.judge.config() if self.judge else None,
-            },
-        }
+        metrics = MetricsConfig(names=self.names)
+        tasks = {name: replace(task, metrics=metrics) for name, task in source.config.tasks.items()}
+        config = replace(
+            source.config,
+            infthor_eval=infthor_eval.__version__,
+            tasks=tasks,
+            rescored=RescoredConfig(
+                source=SourceRun(source.name, source.config.hash),
+                scorer=self._scorer_config(),
+                judge=self.judge.config() if self.judge else None,
+            ),
+        )
         name = f"{source.name.removesuffix(_SUFFIX)}{_SUFFIX}"
-        return RunHeader(suite=source.suite, name=name, config=as_json_values(config))
+        return RunHeader(suite=source.suite, name=name, config=config)
 
     def store(self, output: Path, track: Track = list) -> Rescored:
         """Score the replies and store the run below a folder, with `rescored.json`.
@@ -146,7 +146,7 @@ class Rescoring:
     def _score(self, record: Record, session: Session[NiehAnswer]) -> Record:
         """Return a record with today's scores by rule; failed without a reply, or if the own scorer
         fails on it."""
-        today = msgspec.structs.replace(record, usage=NOTHING, attempt=1)
+        today = replace(record, usage=NOTHING, attempt=1)
         if record.payload.reply is None:
             return today
         own = self.own.by_unit[record.key] if self.own else {}
@@ -154,16 +154,16 @@ class Rescoring:
             failure = session.describe_failure(
                 Unit(record.key, record.cluster, record.payload), own
             )
-            return msgspec.structs.replace(_with_scores(today, {}), failure=failure)
+            return replace(_with_scores(today, {}), failure=failure)
         by_rule = scores(record.payload.reply, record.payload.answers)
-        return msgspec.structs.replace(_with_scores(today, by_rule | own), failure=None)
+        return replace(_with_scores(today, by_rule | own), failure=None)
 
     def _report(self, records: Sequence[Record], judgement: Judgement | None) -> RescoringReport:
         before = {record.key: record.payload.scores for record in self.source.records}
-        tasks = self.source.header.config["tasks"]
+        tasks = self.source.header.config.tasks
         left_out = {
-            task: [n for n in tasks[task]["metrics"]["names"] if n not in self.names]
-            for task in tasks
+            name: [metric for metric in task.metrics.names if metric not in self.names]
+            for name, task in tasks.items()
         }
         n_scored = sum(bool(record.payload.scores) for record in records)
         return RescoringReport(
@@ -216,6 +216,4 @@ def _with_verdict(record: Record, judgement: Judgement) -> Record:
 
 
 def _with_scores(record: Record, by_metric: dict[str, float]) -> Record:
-    return msgspec.structs.replace(
-        record, payload=msgspec.structs.replace(record.payload, scores=by_metric)
-    )
+    return replace(record, payload=replace(record.payload, scores=by_metric))

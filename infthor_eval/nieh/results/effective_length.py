@@ -103,9 +103,8 @@ def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
     for run in runs:
         assert isinstance(run.summary, NiehSummary)
         for name, task in run.summary.tasks.items():
-            subject = repr(
-                (run.header.config["model"], run.header.config["frames"], _about(run, name)["data"])
-            )
+            config = run.header.config
+            subject = repr((config.model, config.frames, config.tasks[name].data))
             by_subject.setdefault(subject, []).append((run, name, task))
     for items in by_subject.values():
         base = next(
@@ -128,11 +127,6 @@ def find_series(runs: Sequence[RunSummary]) -> Iterator[Series]:
                     )
 
 
-def _about(run: RunSummary, task: str) -> Mapping[str, object]:
-    about: Mapping[str, object] = run.header.config["tasks"][task]
-    return about
-
-
 def _lengths(
     items: Sequence[tuple[RunSummary, str, TaskSummary]],
 ) -> dict[str, list[tuple[float, TaskSummary]]]:
@@ -140,9 +134,9 @@ def _lengths(
     ascending."""
     chosen: dict[str, list[tuple[float, TaskSummary]]] = {}
     for run, name, task in items:
-        config = run.header.config["tasks"][name]["config"]["dataset_kwargs"]
-        if task.context in _SIZED and config.get("ctx_size"):
-            chosen.setdefault(task.context, []).append((float(config["ctx_size"]), task))
+        size = run.header.config.tasks[name].dataset_kwargs.get("ctx_size")
+        if task.context in _SIZED and size:
+            chosen.setdefault(task.context, []).append((float(size), task))
         elif task.context == "trajectory":
             chosen.setdefault(task.context, []).append((0.0, task))
     return {context: sorted(tasks, key=lambda item: item[0]) for context, tasks in chosen.items()}

@@ -3,8 +3,10 @@ alone."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from msgspec.structs import replace
+
+from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.options import SHOWN
 from infthor_eval.nieh.results.summary import TaskSummary
 from infthor_eval.runs import RunSummary
@@ -68,7 +70,7 @@ def find_gains(runs: Sequence[RunSummary]) -> Iterator[Gain]:
 
 def frames_of(run: RunSummary) -> str:
     """Return the frame ablation of a run."""
-    return str(run.header.config["frames"])
+    return str(run.header.config.frames)
 
 
 def name_of(run: RunSummary) -> str:
@@ -77,10 +79,9 @@ def name_of(run: RunSummary) -> str:
     return run.header.name if frames == SHOWN else f"{run.header.name}, {frames} frames"
 
 
-def _without_frames(run: RunSummary) -> dict[str, Any]:
-    config = {name: value for name, value in run.header.config.items() if name != "frames"}
-    if "rescored" in config:  # from runs that differ in their frames
-        config["rescored"] = {
-            name: value for name, value in config["rescored"].items() if name != "from"
-        }
-    return config
+def _without_frames(run: RunSummary) -> NiehConfig:
+    config: NiehConfig = run.header.config
+    rescored = config.rescored
+    if rescored is not None:  # from runs that differ in their frames
+        rescored = replace(rescored, source=None)
+    return replace(config, frames="", rescored=rescored)

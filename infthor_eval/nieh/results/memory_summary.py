@@ -1,13 +1,13 @@
 """What a run's memory recalled, at which cost."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from statistics import fmean
-from typing import Any
 
 import msgspec
 
 from infthor_eval.memory import read_budget
+from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.runs import UnitRecord
 
@@ -52,20 +52,18 @@ def subject_of(label: str) -> str:
 
 
 def summarise_memory(
-    config: Mapping[str, Any], about: Mapping[str, Any], records: Sequence[Record]
+    config: NiehConfig, task: NiehTaskConfig, records: Sequence[Record]
 ) -> MemorySummary | None:
-    """Return the summary of a task's memory, given the run's config and the task's; None if it has
-    none."""
+    """Return the summary of a task's memory; None if it has none."""
     recalls = [record.payload.recall for record in records if record.payload.recall is not None]
-    memory = about.get("sources", {}).get("memory")
+    memory = task.memory
     if memory is None or not recalls:
         return None
     tokens = [record.tokens.context for record in records if record.tokens.context is not None]
-    budget = about["config"]["dataset_kwargs"].get("budget")
     return MemorySummary(
-        name=memory["name"],
-        privileged=memory["privileged"],
-        budget=read_budget(config.get("budget")) if budget is None else budget,
+        name=memory.name,
+        privileged=memory.privileged,
+        budget=read_budget(config.budget) if task.budget is None else task.budget,
         n_frames=fmean(
             sum(isinstance(item, int) for item in recall.recalled) for recall in recalls
         ),

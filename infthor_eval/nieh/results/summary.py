@@ -6,13 +6,13 @@ a field of its own, `took`, which results.json leaves out.
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import msgspec
 
 from infthor_eval.distances import DISTANCES, LENGTHS, distance_class, length_class
 from infthor_eval.formats.question import ABSENCE
+from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig, SkippedSample
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.results.above_guessing import AboveGuessing, above_guessing
 from infthor_eval.nieh.results.answer_form import YesNo, format_failures, yes_no
@@ -52,9 +52,7 @@ __all__ = [
 ]
 
 CLUE_COLUMNS = ("1", "2", ">=3", "total")  # the columns of the paper's Table 4
-OPEN_ENDED = (
-    "open-ended"  # column of questions whose answer is neither yes, no nor a number, as published
-)
+OPEN_ENDED = "open-ended"  # column of questions whose answer is neither yes, no nor a number
 
 SHOWN_CLUES = ("all", "some", "none")
 
@@ -183,21 +181,22 @@ class NiehSummary(msgspec.Struct, frozen=True, omit_defaults=True):
     repeats: dict[str, RepeatSummary] = {}
 
 
-def summarise(config: Mapping[str, Any], records: Sequence[Record]) -> NiehSummary:
+def summarise(config: NiehConfig, records: Sequence[Record]) -> NiehSummary:
     """Summarise the run of a config by the records of its units; their order does not matter."""
     in_order = sorted(records, key=lambda record: record.key)
-    tasks = config["tasks"].items()
-    by_task = {task: [record for record in in_order if record.task == task] for task, _ in tasks}
-    times = {task: time_memory(of_task) for task, of_task in by_task.items()}
-    repeats = {
-        task: summarise_repeats(by_question(by_task[task]), _main_metric(about["metrics"]["names"]))
-        for task, about in tasks
-    }
-    return NiehSummary(
-        {task: _task(by_task[task], about, config) for task, about in tasks},
-        {task: took for task, took in times.items() if took is not None},
-        {task: compared for task, compared in repeats.items() if compared is not None},
-    )
+    tasks: dict[str, TaskSummary] = {}
+    took: dict[str, MemoryTimes] = {}
+    repeats: dict[str, RepeatSummary] = {}
+    for name, task in config.tasks.items():
+        replies = [record for record in in_order if record.task == name]
+        tasks[name] = _task(replies, task, config)
+        times = time_memory(replies)
+        if times is not None:
+            took[name] = times
+        compared = summarise_repeats(by_question(replies), _main_metric(task.metrics.names))
+        if compared is not None:
+            repeats[name] = compared
+    return NiehSummary(tasks, took, repeats)
 
 
 def main_metric(task: TaskSummary) -> str:
@@ -211,66 +210,80 @@ def _main_metric(metrics: Sequence[str]) -> str:
 
 def primary_metrics(summary: NiehSummary) -> dict[str, Rate]:
     """Return the mean of all samples under the main metric, for each task with any."""
-    totals = {
-        name: (task.by_clues["total"], main_metric(task)) for name, task in summary.tasks.items()
-    }
-    scores = {
-        name: (cell.scores[metric], cell.n) for name, (cell, metric) in totals.items() if cell.n
-    }
-    return {name: Rate(score.mean, score.low, score.high, n) for name, (score, n) in scores.items()}
+    rates = {}
+    for name, task in summary.tasks.items():
+        total = task.by_clues["total"]
+        if total.n:
+            score = total.scores[main_metric(task)]
+            rates[name] = Rate(score.mean, score.low, score.high, total.n)
+    return rates
 
 
-def _task(
-    replies: Sequence[Record], about: Mapping[str, Any], config: Mapping[str, Any]
-) -> TaskSummary:
-    metrics = list(about["metrics"]["names"])
+def _task(replies: Sequence[Record], task: NiehTaskConfig, config: NiehConfig) -> TaskSummary:
+    metrics = list(task.metrics.names)
     records = [mean_record(same) for same in by_question(replies)]
-    names = sorted({record.payload.file for record in records} - {""})
-    files = {name: [record for record in records if record.payload.file == name] for name in names}
+    files = _by_file(records)
     return TaskSummary(
         n=len(records),
-        context=about["config"]["dataset_kwargs"]["context"],
-        simulator=about["simulator"],
+        context=task.context,
+        simulator=task.simulator,
         metrics=metrics,
         by_clues=_by_clues(records, metrics),
-        by_question_type=_group(
-            records, metrics, lambda record: record.payload.question_type or "untyped"
-        ),
+        by_question_type=_group(records, metrics, _question_type),
         by_variant=_group(records, metrics, lambda record: record.variant or "-"),
-        by_file={name: _cell(of_file, metrics) for name, of_file in files.items()},
+        by_file={name: _cell(chosen, metrics) for name, chosen in files.items()},
         evidence={
-            name: _evidence(of_file, metrics)
-            for name, of_file in {"total": records, **files}.items()
+            name: _evidence(chosen, metrics) for name, chosen in {"total": records, **files}.items()
         },
         by_length=_by_length(records, metrics),
         above_guessing=_above_guessing(records, metrics),
-        skipped=_summarise_skipped(records, metrics, about["skipped"]),
+        skipped=_summarise_skipped(records, metrics, task.skipped),
         yes_no=yes_no(replies),
-        format_failures=format_failures(replies, about["decoding"]["max_new_tokens"]),
+        format_failures=format_failures(replies, task.decoding["max_new_tokens"]),
         n_thought=sum(record.payload.thinking is not None for record in replies),
         tokens_per_right=_tokens_per_right(replies, _main_metric(metrics)),
-        below_full_marks={
-            name: [str(record.key) for record in records if _score(record, name) < 1.0]
-            for name in metrics
-        },
+        below_full_marks={name: _below_full_marks(records, name) for name in metrics},
         scores={name: _by_trajectory(records, name) for name in metrics},
-        failures=[
-            Failure(str(record.key), record.failure)
-            for record in replies
-            if record.failure is not None
-        ],
-        memory=summarise_memory(config, about, records),
+        failures=_failures(replies),
+        memory=summarise_memory(config, task, records),
     )
+
+
+def _by_file(records: Sequence[Record]) -> dict[str, list[Record]]:
+    """Return the records by question file, in the order of the files' names."""
+    files: dict[str, list[Record]] = {}
+    for record in records:
+        if record.payload.file:
+            files.setdefault(record.payload.file, []).append(record)
+    return dict(sorted(files.items()))
+
+
+def _question_type(record: Record) -> str:
+    return record.payload.question_type or "untyped"
+
+
+def _below_full_marks(records: Sequence[Record], metric: str) -> list[str]:
+    return [str(record.key) for record in records if _score(record, metric) < 1.0]
+
+
+def _failures(replies: Sequence[Record]) -> list[Failure]:
+    return [
+        Failure(str(record.key), record.failure) for record in replies if record.failure is not None
+    ]
 
 
 def _tokens_per_right(replies: Sequence[Record], metric: str) -> float | None:
     counts = [record.tokens.reply for record in replies if record.tokens.reply is not None]
-    right = math.fsum(_score(record, metric) for record in replies)
+    right = _sum(replies, metric)
     return sum(counts) / right if counts and right else None
 
 
 def _score(record: Record, metric: str) -> float:
     return record.payload.scores.get(metric, 0.0)  # 0 if the model failed
+
+
+def _sum(records: Sequence[Record], metric: str) -> float:
+    return math.fsum(_score(record, metric) for record in records)
 
 
 def _by_trajectory(records: Sequence[Record], metric: str) -> dict[str, list[float]]:
@@ -281,13 +294,13 @@ def _by_trajectory(records: Sequence[Record], metric: str) -> dict[str, list[flo
 
 
 def _by_clues(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, Cell]:
-    chosen = {
-        name: [r for r in records if r.payload.clue_column == name]
-        for name in (*CLUE_COLUMNS, ABSENCE)
-    }
-    chosen["total"] = list(records)
-    chosen[OPEN_ENDED] = [record for record in records if is_open_ended(record)]
-    return {name: _cell(of_column, metrics) for name, of_column in chosen.items()}
+    columns: dict[str, list[Record]] = {name: [] for name in (*CLUE_COLUMNS, ABSENCE)}
+    for record in records:
+        if record.payload.clue_column in columns:
+            columns[record.payload.clue_column].append(record)
+    columns["total"] = list(records)
+    columns[OPEN_ENDED] = [record for record in records if is_open_ended(record)]
+    return {name: _cell(chosen, metrics) for name, chosen in columns.items()}
 
 
 def is_open_ended(record: Record) -> bool:
@@ -300,8 +313,10 @@ def is_open_ended(record: Record) -> bool:
 def _group(
     records: Sequence[Record], metrics: Sequence[str], name_of: Callable[[Record], str]
 ) -> dict[str, Cell]:
-    names = sorted({name_of(record) for record in records})
-    return {name: _cell([r for r in records if name_of(r) == name], metrics) for name in names}
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(name_of(record), []).append(record)
+    return {name: _cell(chosen, metrics) for name, chosen in sorted(groups.items())}
 
 
 def _evidence(records: Sequence[Record], metrics: Sequence[str]) -> EvidenceCells:
@@ -319,17 +334,20 @@ def _in_order(
 ) -> dict[str, Cell]:
     """Return the cells of the groups that have samples, in the order of their names; some samples
     are in none."""
-    chosen = {name: [record for record in records if name_of(record) == name] for name in names}
-    return {name: _cell(of_group, metrics) for name, of_group in chosen.items() if of_group}
+    cells = {}
+    for name in names:
+        chosen = [record for record in records if name_of(record) == name]
+        if chosen:
+            cells[name] = _cell(chosen, metrics)
+    return cells
 
 
 def _by_length(records: Sequence[Record], metrics: Sequence[str]) -> dict[str, LengthCell]:
     cells = {}
     for name, cell in _in_order(records, metrics, _length, LENGTHS).items():
         chosen = [record for record in records if _length(record) == name]
-        cells[name] = LengthCell(
-            cell, {name: item.mean for name, item in _above_guessing(chosen, metrics).items()}
-        )
+        shares = _above_guessing(chosen, metrics)
+        cells[name] = LengthCell(cell, {metric: share.mean for metric, share in shares.items()})
     return cells
 
 
@@ -374,12 +392,9 @@ def _mean(records: Sequence[Record], metric: str) -> Score:
 
 
 def _summarise_skipped(
-    records: Sequence[Record], metrics: Sequence[str], skipped: Sequence[Mapping[str, str]]
+    records: Sequence[Record], metrics: Sequence[str], skipped: Sequence[SkippedSample]
 ) -> SkippedSummary:
     n = len(records) + len(skipped)
-    means = {
-        name: math.fsum(_score(record, name) for record in records) / n if n else None
-        for name in metrics
-    }
-    reasons = Counter(item["reason"] for item in skipped)
+    means = {name: _sum(records, name) / n if n else None for name in metrics}
+    reasons = Counter(sample.reason for sample in skipped)
     return SkippedSummary(len(skipped), dict(sorted(reasons.items())), means)

@@ -228,7 +228,7 @@ def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterat
 def _differences(run: RunSummary, row: PublishedRow, table: PublishedTable) -> Iterator[Row]:
     """Yield the differences of a run of the published model from its row; = if its interval has the
     published value."""
-    if not row.matches(run.header.config["model"]) or frames_of(run) != SHOWN:
+    if not row.matches(run.header.config.model) or frames_of(run) != SHOWN:
         return
     for _, name, task in _tasks([run]):
         # Frames that a simulator of ours rendered are another data set.

@@ -12,10 +12,10 @@ from infthor_eval.episodes.records import DONE
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.plan_logs import LoggedPlans, PlanCount, PlanLog
 from infthor_eval.formats.reply_logs import UnreadRow
+from infthor_eval.plans.config import PlansConfig, PlansTaskConfig
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.records import PlanRecord
 from infthor_eval.runs import RunHeader, Session, UnitRecord
-from infthor_eval.runs.run_config import run_config
 from infthor_eval.storage.digests import fingerprint
 
 __all__ = ["ImportedCounts", "import_counts"]
@@ -78,22 +78,17 @@ def import_counts(log: PlanLog, model: str | None = None) -> ImportedCounts:
 def _header(
     name: str, log: PlanLog, without: list[str], refused: tuple[UnreadRow, ...]
 ) -> RunHeader:
-    skipped = [
-        *([traj_id, _NO_SET_UP] for traj_id in without),
-        *([f"line {it.line}", it.reason] for it in refused),
-    ]
-    task = {
-        "config": {"task": _TASK, "dataset_kwargs": {"plans": "final"}},
-        "sources": {"logs": {log.path.name: log.digest}},
-        "trajectories": {},
-        "broken": skipped,
-        "words": None,
-        "after_failure": None,
-        "rewards": None,
-    }
-    workload = {"tasks": {_TASK: task}, "simulator": "unity", "frames": "shown"}
-    config = run_config("plans", {"name": name, "imported": True}, {}, workload)
-    return RunHeader(suite="plans", name=name, config=config)
+    broken = [(traj_id, _NO_SET_UP) for traj_id in without]
+    broken += [(f"line {row.line}", row.reason) for row in refused]
+    task = PlansTaskConfig(
+        settings={"task": _TASK, "dataset_kwargs": {"plans": "final"}},
+        sources={"logs": {log.path.name: log.digest}},
+        broken=tuple(broken),
+        rewards=None,
+    )
+    config = PlansConfig(tasks={_TASK: task}, simulator="unity", frames="shown")
+    model = {"name": name, "imported": True}
+    return RunHeader(suite="plans", name=name, config=config.complete("plans", model))
 
 
 def _records(row: LoggedPlans) -> Iterator[UnitRecord[PlanRecord]]:

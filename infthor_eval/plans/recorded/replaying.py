@@ -18,6 +18,7 @@ from infthor_eval.episodes.shared_units import only_name
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.formats.object_ids import Words, object_type_of
 from infthor_eval.household.scout import reachable_grid
+from infthor_eval.plans.config import PlansTaskConfig
 from infthor_eval.plans.environment import MAX_STEPS, PlanEnvironment, StepOutcome
 from infthor_eval.plans.plan import PlanKind
 from infthor_eval.plans.recorded.replay_frames import (
@@ -30,7 +31,7 @@ from infthor_eval.plans.recorded.replay_frames import (
     Point,
     RoomMap,
 )
-from infthor_eval.plans.recorded.runs import PlansRun, PlanTaskConfig
+from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.plans.reward_rules import RewardRules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
@@ -115,7 +116,7 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
         problem = f"{run.label}: rewards that this version does not know"
         with wrap_errors(problem, "run the evaluation again", catch=msgspec.ValidationError):
             rules = msgspec.convert(config.rewards, RewardRules)
-            max_steps = msgspec.convert(config.settings.get("max_steps", MAX_STEPS), int)
+            max_steps = msgspec.convert(config.dataset_kwargs.get("max_steps", MAX_STEPS), int)
         simulator = self._start_simulator()
         data = self._trajectory.data
         words = _words(config)
@@ -229,7 +230,7 @@ class _PlanInReplay:
         )
 
 
-def _words(config: PlanTaskConfig) -> Words:
+def _words(config: PlansTaskConfig) -> Words:
     assert config.words is not None  # only imported counts have none, and they are refused before
     return config.words
 

@@ -1,10 +1,8 @@
 """Recorded runs of plans, and the plans that several of them have in common."""
 
 from collections.abc import Sequence
-from functools import cached_property
-from typing import Any
 
-from infthor_eval.episodes.recorded_runs import RecordedRun, RunConfig, TaskConfig
+from infthor_eval.episodes.recorded_runs import RecordedRun
 from infthor_eval.episodes.shared_units import (
     SharedUnits,
     difference_notes,
@@ -12,35 +10,21 @@ from infthor_eval.episodes.shared_units import (
     shared_units,
 )
 from infthor_eval.errors import UsageError
-from infthor_eval.formats.object_ids import Words
+from infthor_eval.plans.config import PlansConfig
 from infthor_eval.plans.records import RECORDS, PlanRecord
 
-__all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
+__all__ = ["PlansRun", "shared_plans"]
 
 
-class PlanTaskConfig(TaskConfig, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules`
-    decodes it.
-
-    All of these are None for imported counts.
-    """
-
-    rewards: Any
-    words: Words | None
-    after_failure: str | None
-
-
-class PlansRun(RecordedRun[PlanRecord, PlanTaskConfig]):
+class PlansRun(RecordedRun[PlanRecord, PlansConfig]):
     """The journal of a run of plans."""
 
-    suite = "plans"
     record_types = RECORDS
-    task_config = PlanTaskConfig
     planner = "planner"
 
-    @cached_property
-    def config(self) -> RunConfig[PlanTaskConfig]:
-        """See `RecordedRun.config`; raises UsageError if the run has counts alone."""
+    @property
+    def config(self) -> PlansConfig:
+        """The run's config; raises UsageError if the run has counts alone."""
         config = super().config
         if any(task.rewards is None for task in config.tasks.values()):
             raise UsageError(

@@ -243,7 +243,7 @@ def _heat_map(run: ReportRun) -> Chart | None:
     """Draw accuracy by depth of the needle and size of the context; None if no task of the run has
     depths."""
     tasks = {
-        int(run.dataset(name).get("ctx_size") or 0): task
+        int(run.tasks[name].dataset_kwargs.get("ctx_size") or 0): task
         for name, task in run.summary.summary.tasks.items()
         if any(variant.startswith(_DEPTH) for variant in task.by_variant)
     }

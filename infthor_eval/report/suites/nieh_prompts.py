@@ -29,8 +29,8 @@ def find_prompts(run: ReportRun, data: Path | None) -> Mapping[UnitKey, Prompt]:
     rebuilders: dict[str, RequestRebuilder | str] = {
         task: _rebuilder(run, task, sets) for task in run.tasks
     }
-    note = _OF_BASELINES if "baseline" in run.header.config["model"] else ""
-    ablation = run.header.config["frames"]
+    note = _OF_BASELINES if "baseline" in run.header.config.model else ""
+    ablation = run.header.config.frames
     kept: dict[Prompt, Prompt] = {}
     prompts = {}
     for record in run.records:

@@ -51,13 +51,13 @@ class RunSets:
         try:
             opened = find_set(
                 str(folder) if folder else None,
-                run.dataset(task).get("bundled"),
+                run.tasks[task].dataset_kwargs.get("bundled"),
                 options.get("trajectories"),
             )
         except (UsageError, DataError) as error:
             self.problems[task] = f"{error}; give the set's folder with --data"
             return
-        if opened.fingerprint != run.tasks[task].get("data"):
+        if opened.fingerprint != run.tasks[task].data:
             self.problems[task] = f"{opened.root} has changed since {run.label} was run"
             return
         self._sets[task] = opened, {question.id: question for question in opened.questions}

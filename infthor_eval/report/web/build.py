@@ -160,13 +160,13 @@ def _about(run: ReportRun) -> About:
     config = run.header.config
     facts = {
         "suite": run.suite.name,
-        "model": str(config.get("model", {}).get("name", "")),
-        "checkpoint": str(config.get("model", {}).get("checkpoint", "")),
+        "model": str(config.model.get("name", "")),
+        "checkpoint": str(config.model.get("checkpoint", "")),
         "tasks": ", ".join(run.tasks),
         "simulator": run.simulator,
-        "seed": str(config.get("seed", "")),
-        "limit": str(config["limit"]) if config.get("limit") is not None else "",
-        "infthor-eval": str(config.get("infthor_eval", "")),
+        "seed": "" if config.seed is None else str(config.seed),
+        "limit": "" if config.limit is None else str(config.limit),
+        "infthor-eval": config.infthor_eval,
         "samples": f"{len(run.records):,}",
         "folder": str(run.folder),
     }
@@ -175,5 +175,5 @@ def _about(run: ReportRun) -> About:
         run.label,
         known,
         run.command,
-        json.dumps(config, indent=1, ensure_ascii=False, sort_keys=True),
+        json.dumps(config.document, indent=1, ensure_ascii=False, sort_keys=True),
     )

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from infthor_eval.rates import Rate
 from infthor_eval.reasons import count_reasons
 from infthor_eval.report.runs import ReportRun
+from infthor_eval.runs import TaskConfig
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
 __all__ = ["costs_table", "left_out_table", "primary_metrics_table"]
@@ -80,8 +81,6 @@ def _left_out(run: ReportRun) -> Iterator[tuple[tuple[str, str], str]]:
             yield (record.task, "excluded"), record.excluded
         for fault in record.faults:
             yield (record.task, "retried"), fault
-    for task, about in run.tasks.items():
-        for item in about.get("skipped", ()):
-            yield (task, "skipped"), item["reason"]
-        for _, reason in about.get("broken", ()):
-            yield (task, "skipped"), reason
+    for name, task in run.tasks.items():
+        for reason in task.skip_reasons if isinstance(task, TaskConfig) else ():
+            yield (name, "skipped"), reason

@@ -103,11 +103,10 @@ class FollowedJournal:
 
     def _add_line(self, path: Path, number: int, line: bytes) -> None:
         if number == 1:
-            self.log.header = parse_header(path, line)
-        if self._decoder is None:
-            assert self.header is not None  # the first line of the first shard
-            self.suite = self._find_suite(self.header.suite)
+            self.suite = self._find_suite(parse_header(path, line).suite)
             self._decoder = self.suite.records.decoder()
+            self.log.header = parse_header(path, line, self.suite.records)
+        assert self._decoder is not None  # the first line of a shard is its header
         if number > 1:
             record = parse_record(path, number, line, self._decoder)
             self.log.add(record)

@@ -44,7 +44,6 @@ from infthor_eval.runs.journals.shards import (
     read_shards,
 )
 from infthor_eval.runs.usage import NOTHING, Usage
-from infthor_eval.storage.digests import canonical_json
 from infthor_eval.storage.files import write_atomically
 
 __all__ = ["Journal", "recover", "set_aside"]
@@ -92,8 +91,8 @@ class Journal(Generic[P]):
         self._writing = Lock()
         try:
             _lock(self._file, path, wait_s)
-            self._decoder = types.decoder()
-            self._log: RunLog[P] = read_shards(run, self._decoder)
+            self._types = types
+            self._log: RunLog[P] = read_shards(run, types)
             self._start_shard()
         except (DataError, UsageError):
             self._file.close()
@@ -148,7 +147,7 @@ class Journal(Generic[P]):
         """Read the shard of another worker, for records that it wrote but did not send."""
         path = self._path.parent / _SHARD.format(worker)
         if path.exists():
-            read_shard(path, self._decoder, self._log)
+            read_shard(path, self._types, self._log)
 
     def holds(self, record: UnitRecord[P]) -> bool:
         """Return whether this very object is in the journal: a record that the suite found there
@@ -191,7 +190,7 @@ class Journal(Generic[P]):
     def _start_shard(self) -> None:
         """Check the run, cut off an unfinished line, and write the header if there is none."""
         other = self._log.header
-        if other is not None and canonical_json(other.config) != canonical_json(self.header.config):
+        if other is not None and other.config != self.header.config:
             raise DataError(f"{self.folder}: is the journal of another run; give another --output")
         content = self._path.read_bytes()
         end = content.rfind(b"\n") + 1

@@ -11,6 +11,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import msgspec
 
 from infthor_eval.errors import InfthorError, describe_exception
+from infthor_eval.runs.config import Config, RunConfig
 from infthor_eval.runs.counts import Count
 from infthor_eval.runs.usage import NOTHING, Usage
 
@@ -27,7 +28,6 @@ __all__ = [
 ]
 
 FORMAT = 3
-_CONFIG_FORMS: dict[str, type] = {"tasks": dict, "model": dict, "frames": str}
 
 A = TypeVar("A")  # an artifact
 P = TypeVar("P")  # the payload of a suite's records
@@ -70,28 +70,25 @@ class Tokens(msgspec.Struct, frozen=True, omit_defaults=True):
     reply: Count | None = None
 
 
-class RunHeader(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", tag="run"):
+class RunHeader(
+    msgspec.Struct, Generic[Config], frozen=True, kw_only=True, tag_field="type", tag="run"
+):
     """The header of a run: the first line of each shard.
 
     Attributes:
         suite: name of the suite, which knows the payloads.
         name: name of the run in tables and folders.
-        config: everything that can change a number, as JSON values.
+        config: everything that can change a number; of the suite's own type where the suite is
+            known, else with the configs of tasks as JSON values.
         n_units: number of units of the run; None where its records were made without a driver.
         format: format of the journal.
     """
 
     suite: str
     name: str
-    config: dict[str, Any]
+    config: Config
     n_units: Count | None = None
     format: int = FORMAT
-
-    def __post_init__(self) -> None:
-        """Check the form of what every suite's config has; msgspec turns the error into its own."""
-        for key, form in _CONFIG_FORMS.items():
-            if not isinstance(self.config.get(key, form()), form):
-                raise TypeError(f"`config.{key}` is no {form.__name__}")
 
 
 class UnitRecord(
@@ -166,21 +163,28 @@ class ArtifactRecord(
 
 @dataclass(frozen=True)
 class RecordTypes(Generic[P_co]):
-    """The payloads of a suite's records: msgspec structs with a tag.
+    """The types of what a suite writes into a journal; payloads are msgspec structs with a tag.
 
     Attributes:
         unit: payload of its units.
         artifact: payload of its cached artifacts, a union if there are several kinds; None where it
             caches none.
+        config: config of its runs.
     """
 
     unit: type[P_co]
     artifact: type[Any] | UnionType | None = None
+    config: type[RunConfig[Any]] = RunConfig[dict[str, Any]]
 
     def decoder(self) -> msgspec.json.Decoder[Any]:
         """Return the decoder of a journal's lines."""
-        lines: Any = RunHeader | UnitRecord[self.unit] | ArtifactRecord[self.artifact]  # type: ignore[name-defined]
-        return msgspec.json.Decoder(lines)
+        header: Any = RunHeader[self.config]  # type: ignore[name-defined]
+        records: Any = UnitRecord[self.unit] | ArtifactRecord[self.artifact]  # type: ignore[name-defined]
+        return msgspec.json.Decoder(header | records)
+
+    def header_decoder(self) -> msgspec.json.Decoder[RunHeader[Any]]:
+        """Return the decoder of a journal's first line."""
+        return msgspec.json.Decoder(RunHeader[self.config])  # type: ignore[name-defined]
 
 
 def describe_failure(error: Exception) -> str:

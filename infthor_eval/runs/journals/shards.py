@@ -18,7 +18,6 @@ from infthor_eval.runs.journals.records import (
     UnitRecord,
 )
 from infthor_eval.runs.usage import Usage
-from infthor_eval.storage.digests import canonical_json
 
 __all__ = [
     "FOLDER",
@@ -32,6 +31,7 @@ __all__ = [
     "read_header",
     "read_lines",
     "read_run",
+    "read_run_log",
     "read_shard",
     "read_shards",
 ]
@@ -105,10 +105,21 @@ def read_run(run: Path, types: RecordTypes[P]) -> tuple[RunHeader, list[UnitReco
     """Read the header of the run in a folder, and the latest record of each unit of all shards.
 
     Raises:
-        DataError: there is no journal, or one with a bad line, or of another format.
+        DataError: there is no journal, or one with a bad line, of another format or suite.
     """
-    header = read_header(run)
-    return header, read_shards(run, types.decoder()).records
+    header, log = read_run_log(run, types)
+    return header, log.records
+
+
+def read_run_log(run: Path, types: RecordTypes[P]) -> tuple[RunHeader, RunLog[P]]:
+    """Read the header of the run in a folder, and the contents of all its shards.
+
+    Raises:
+        DataError: there is no journal, or one with a bad line, of another format or suite.
+    """
+    any_header = read_header(run)  # or says that there is no journal
+    log = read_shards(run, types)
+    return log.header or any_header, log
 
 
 class _UnitOutcome(msgspec.Struct, tag_field="type", tag="unit"):
@@ -126,13 +137,17 @@ class _AnyArtifact(msgspec.Struct, tag_field="type", tag="artifact"):
     """An artifact; no field of it is read."""
 
 
+class _AnyHeader(msgspec.Struct, tag_field="type", tag="run"):
+    """A header; no field of it is read."""
+
+
 def read_failures(run: Path) -> dict[UnitKey, bool]:
     """Return for each unit with a record whether its latest attempt failed; needs no suite.
 
     Raises:
         DataError: a line is bad.
     """
-    decoder = msgspec.json.Decoder(_UnitOutcome | _AnyArtifact | RunHeader)
+    decoder = msgspec.json.Decoder(_UnitOutcome | _AnyArtifact | _AnyHeader)
     latest: dict[UnitKey, tuple[int, bool]] = {}
     for path in find_shards(run):
         for number, line in enumerate(read_lines(path), 1):
@@ -159,31 +174,30 @@ def find_shards(run: Path) -> list[Path]:
     return shards
 
 
-def read_shards(run: Path, decoder: Decoder) -> RunLog[Any]:
+def read_shards(run: Path, types: RecordTypes[P]) -> RunLog[P]:
     """Read all shards of a run; an empty log if there is none.
 
     Raises:
         DataError: a shard has a bad line, is of another format, or of another run than the others.
     """
-    log: RunLog[Any] = RunLog()
+    log: RunLog[P] = RunLog()
     for path in find_shards(run):
-        read_shard(path, decoder, log)
+        read_shard(path, types, log)
     return log
 
 
-def read_shard(path: Path, decoder: Decoder, log: RunLog[Any]) -> None:
+def read_shard(path: Path, types: RecordTypes[P], log: RunLog[P]) -> None:
     """Add the contents of a shard to a log."""
     lines = read_lines(path)
     if not lines:
         return  # created by a worker that was killed before it wrote the header
-    header = parse_header(path, lines[0])
-    if log.header is not None and canonical_json(header.config) != canonical_json(
-        log.header.config
-    ):
+    header = parse_header(path, lines[0], types)
+    if log.header is not None and header.config != log.header.config:
         raise DataError(
             f"{path}: belongs to another run than the shards beside it; take it out of the folder"
         )
     log.header = header
+    decoder = types.decoder()
     for number, line in enumerate(lines[1:], 2):
         log.add(parse_record(path, number, line, decoder))
 
@@ -234,12 +248,20 @@ def check_format(path: Path, line: bytes) -> None:
         )
 
 
-def parse_header(path: Path, line: bytes) -> RunHeader:
-    """Return the header in the first line of a shard.
+_ANY_SUITE: RecordTypes[Any] = RecordTypes(unit=Any)  # configs of tasks as JSON values
+
+
+def parse_header(path: Path, line: bytes, types: RecordTypes[Any] | None = None) -> RunHeader[Any]:
+    """Return the header in the first line of a shard; with the config of a suite given its types.
 
     Raises:
-        DataError: the line is no header, or that of another format.
+        DataError: the line is no header, or that of another format or suite.
     """
     check_format(path, line)
     with wrap_errors(f"{path}, line 1: not the first line of a journal", _HINT, catch=NOT_JSON):
-        return msgspec.json.decode(line, type=RunHeader)
+        header = _ANY_SUITE.header_decoder().decode(line)
+    if types is None:
+        return header
+    problem = f"{path}, line 1: not the config of a run of {header.suite}"
+    with wrap_errors(problem, "run the evaluation again", catch=msgspec.ValidationError):
+        return types.header_decoder().decode(line)

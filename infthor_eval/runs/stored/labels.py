@@ -57,7 +57,7 @@ def _label_alike(runs: Sequence[tuple[Path, RunHeader]], ignore: Collection[str]
     shown = {name: _shorten(given) for name, given in values.items() if len(set(given)) > 1}
     # A run that differs in nothing but ignored options is another row of the same label.
     keys = [
-        (given, sorted(header.config.get("tasks", {})))
+        (given, sorted(header.config.tasks))
         for given, (_, header) in zip(options, runs, strict=True)
     ]
     for given, key, (folder, header) in zip(options, keys, runs, strict=True):

@@ -47,7 +47,7 @@ def store_run(
         UsageError: another process writes the run.
         DataError: the journal has a bad line, or something cannot be written.
     """
-    folder = run_folder(output, header, header.config["tasks"])
+    folder = run_folder(output, header, header.config.tasks)
     with Journal(folder, header, suite.records) as journal:
         records = make_records(JournalSession(journal))
         for record in records:

@@ -7,9 +7,8 @@ from typing import Generic
 from infthor_eval.errors import UsageError
 from infthor_eval.runs.journals.records import P, RunHeader, U
 from infthor_eval.runs.request import PreparedRun
-from infthor_eval.runs.run_config import header_of
-from infthor_eval.runs.suite import BoundEvaluation, Need, Suite
-from model_adapters import Model, Policy, Subject, load
+from infthor_eval.runs.suite import BoundEvaluation, Need, Suite, Workload
+from model_adapters import Model, Policy, Subject, adapter_identity, load
 
 __all__ = ["BoundRun", "bind_run", "require_capability"]
 
@@ -48,9 +47,26 @@ def bind_run(run: PreparedRun[U, P]) -> BoundRun[U, P]:
         stack.callback(subject.close)
         evaluation = run.evaluation.bind(subject)
         stack.callback(evaluation.close)
-        bound = BoundRun(subject, evaluation, header_of(run, subject, evaluation.workload))
+        bound = BoundRun(subject, evaluation, _header(run, subject, evaluation.workload))
         stack.pop_all()
     return bound
+
+
+def _header(run: PreparedRun[U, P], subject: Subject, workload: Workload[U]) -> RunHeader:
+    """Return the header of a run's journal."""
+    request = run.request
+    is_baseline = request.model in run.suite.baselines
+    config = workload.config.complete(
+        run.suite.name,
+        {"name": subject.name, **subject.identity()},
+        adapter={} if is_baseline else adapter_identity(request.model),
+        suite_code=request.suite_code,
+        limit=request.tasks.limit,
+        seed=request.tasks.seed,
+    )
+    return RunHeader(
+        suite=run.suite.name, name=request.label, config=config, n_units=workload.n_units
+    )
 
 
 def _load_subject(run: PreparedRun[U, P]) -> Subject:

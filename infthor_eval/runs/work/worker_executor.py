@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from infthor_eval.errors import UsageError
+from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.journals.records import P, RunHeader, U, Unit, UnitKey, UnitRecord
 from infthor_eval.runs.journals.session import JournalSession
@@ -18,7 +19,6 @@ from infthor_eval.runs.request import PreparedRun
 from infthor_eval.runs.suite import Group, UnitSample, Workload
 from infthor_eval.runs.work.binding import bind_run
 from infthor_eval.runs.work.groups import group_records
-from infthor_eval.storage.digests import canonical_json
 from infthor_eval.workers import (
     Event,
     JobFailed,
@@ -158,7 +158,7 @@ class WorkerPoolExecutor(Generic[U, P]):
             InfthorError: no worker can be started; the reason of the last one.
         """
         self._report = report
-        self._expected: dict[str, Any] | None = None
+        self._expected: RunConfig[Any] | None = None
         settings = run.request.worker_settings
         self._n_workers = settings.workers
         self._pool = Pool(
@@ -260,14 +260,10 @@ class WorkerPoolExecutor(Generic[U, P]):
         theirs = greeting.header.config
         if self._expected is None:
             self._expected = theirs
-        elif canonical_json(self._expected) != canonical_json(theirs):
-            names = {*self._expected, *theirs}
-            differing = sorted(
-                name for name in names if self._expected.get(name) != theirs.get(name)
-            )
+        elif self._expected != theirs:
+            fields = ", ".join(self._expected.differing(theirs))
             raise UsageError(
-                f"the workers differ in {', '.join(differing)}; give all nodes the same versions "
-                "and data"
+                f"the workers differ in {fields}; give all nodes the same versions and data"
             )
 
     def _report_loss(self, event: Event) -> None:

@@ -1,0 +1,28 @@
+"""The config of a run of manipulation."""
+
+from infthor_eval.episodes.config import EpisodesConfig, EpisodeTaskConfig
+from infthor_eval.manipulation.kinds import ManipulationKind
+
+__all__ = ["ArmTaskConfig", "ManipulationConfig"]
+
+
+class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=True):
+    """The config of a task.
+
+    Attributes:
+        radius: radius of the hand's sphere, metres.
+        instruction: instruction of a policy by the command line; None for the task's own.
+        stand: where the agent stands at the start, see `Stand`; None in runs of older versions.
+        hand: height of its arm at the start, see `Hand`; likewise.
+        closing: when a policy's hand closes, see `Closing`; likewise.
+    """
+
+    kind: ManipulationKind
+    radius: float
+    instruction: str | None = None
+    stand: str | None = None
+    hand: str | None = None
+    closing: str | None = None
+
+
+ManipulationConfig = EpisodesConfig[ArmTaskConfig]
