@@ -18,11 +18,11 @@ from infthor_eval.report.runs import read_report_runs
 from infthor_eval.report.sample_table import ENVELOPE, encode_samples, sample_table
 from infthor_eval.report.suites.episode_columns import ARM_COLUMNS, PLAN_COLUMNS
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
-from infthor_eval.runs import RunHeader, UnitRecord
+from infthor_eval.runs import UnitRecord
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.stored.search import read_results
 from infthor_eval.suites import find_presenter, find_suite
-from tests.nieh.made import identity, record
+from tests.nieh.made import header, identity, record
 
 ROOT = Path(__file__).parents[1]
 TASKS = {
@@ -106,9 +106,7 @@ def make_run(tmp_path: Path):
 
     def make_run(*records: UnitRecord) -> Path:
         config = identity(model="m", checkpoint=None, n_parameters=None)
-        with Journal(
-            tmp_path / "run", RunHeader(suite="nieh", name="m", config=config), RECORDS
-        ) as journal:
+        with Journal(tmp_path / "run", header(config, "m"), RECORDS) as journal:
             for item in records:
                 journal.append(item)
         return tmp_path / "run"

@@ -92,7 +92,8 @@ class RunConfig(
             limit=limit,
             seed=seed,
         )
-        return msgspec.json.decode(msgspec.json.encode(whole), type=type(self))
+        values = msgspec.to_builtins(whole, str_keys=True, enc_hook=_plain_text)
+        return msgspec.convert(values, type(self))
 
     @property
     def simulators(self) -> list[str]:
@@ -102,7 +103,7 @@ class RunConfig(
     @property
     def document(self) -> dict[str, Any]:
         """The config as JSON values."""
-        document: dict[str, Any] = msgspec.to_builtins(self, str_keys=True)
+        document: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
         return document
 
     @property
@@ -115,6 +116,13 @@ class RunConfig(
         mine = self.document
         theirs = other.document
         return sorted(name for name in {*mine, *theirs} if mine.get(name) != theirs.get(name))
+
+
+def _plain_text(value: Any) -> str:
+    """Return a text of a type of its own, such as torch's version, as a plain one."""
+    if isinstance(value, str):
+        return str(value)
+    raise TypeError(f"{type(value).__name__} cannot be written into a run's config")
 
 
 Config = TypeVar("Config", bound=RunConfig[Any])

@@ -13,6 +13,7 @@ __all__ = [
     "digest_of_file",
     "digest_of_files",
     "fingerprint",
+    "json_values",
     "seed_of",
 ]
 
@@ -59,6 +60,11 @@ def canonical_json(value: object) -> str:
     return json.dumps(
         value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
     )
+
+
+def json_values(value: object) -> Any:
+    """Return a value as it is read back from JSON: tuples become lists, keys strings."""
+    return json.loads(json.dumps(value))
 
 
 def fingerprint(value: Mapping[str, Any]) -> str:

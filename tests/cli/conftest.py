@@ -3,14 +3,15 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
-from infthor_eval.runs import RunHeader, UnitRecord, read_run
+from infthor_eval.runs import UnitRecord, read_run
 from infthor_eval.runs.journals.journal import Journal
 
-from ..nieh.made import identity
+from ..nieh.made import header, identity
 from .commands.rescored import REPLIES
 
 
@@ -39,7 +40,8 @@ def source(tmp_path: Path) -> Callable[..., Path]:
         config = identity(model="m", checkpoint=None, n_parameters=None, metrics=metrics) | changes
         config["tasks"]["nieh_gt"]["n_samples"] = n_samples
         folder = tmp_path / "elsewhere" / "a run"
-        with Journal(folder, RunHeader(suite=suite, name="m", config=config), RECORDS) as journal:
+        head = msgspec.structs.replace(header(config, "m"), suite=suite)
+        with Journal(folder, head, RECORDS) as journal:
             for item in records:
                 journal.append(item)
         return folder

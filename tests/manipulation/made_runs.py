@@ -4,6 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
+from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.recorded.runs import ArmRun
 from infthor_eval.manipulation.records import RECORDS, ArmRecord
@@ -77,7 +80,8 @@ def made_run(
         "frames": "shown",
         "tasks": tasks,
     }
-    return ArmRun(label, RunHeader(suite="manipulation", name=label, config=identity), records)
+    config = msgspec.convert(identity, ManipulationConfig)
+    return ArmRun(label, RunHeader(suite="manipulation", name=label, config=config), records)
 
 
 def planner_run(

@@ -89,7 +89,7 @@ def test_the_journal_reads_back(prepared):
 def test_the_limit_is_of_episodes(prepared):
     outcome = execute(prepared("still", limit=1))
     assert sorted(by_key(outcome)) == [(PICK, MUG, 9), (PUT, MUG, 21)]
-    assert outcome.summary.header.config["limit"] == 1
+    assert outcome.summary.header.config.limit == 1
 
 
 def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, task_file, tmp_path):

@@ -1,7 +1,9 @@
 """Numbers and tables of runs made by hand: no simulator, no model."""
 
+import msgspec
 import pytest
 
+from infthor_eval.manipulation.config import ManipulationConfig
 from infthor_eval.manipulation.records import ArmRecord, ArmStep
 from infthor_eval.manipulation.suite import ManipulationSuite
 from infthor_eval.manipulation.summary import summarise_manipulation
@@ -22,6 +24,10 @@ def about(kind, radius=0.5, broken=()):
 def identity(simulator="embedded", frames="shown", radius=0.5, broken=(), tasks=None):
     both = {PICK: about("pickup", radius, broken), PUT: about("put", radius, broken)}
     return {"simulator": simulator, "frames": frames, "tasks": both if tasks is None else tasks}
+
+
+def config(**changes):
+    return msgspec.convert(identity(**changes), ManipulationConfig)
 
 
 def step(distance=1.0, *refusals):
@@ -69,11 +75,11 @@ RECORDS = [
 
 
 def summed(records=RECORDS, **changes):
-    return summarise_manipulation(identity(**changes), records)
+    return summarise_manipulation(config(**changes), records)
 
 
 def run(name="a policy", records=RECORDS, **changes):
-    header = RunHeader(suite="manipulation", name=name, config=identity(**changes))
+    header = RunHeader(suite="manipulation", name=name, config=config(**changes))
     return RunSummary(header, ManipulationSuite().summarise(header, records))
 
 

@@ -2,9 +2,12 @@
 
 from typing import Any
 
+import msgspec
+
 from infthor_eval.formats.question import Question
+from infthor_eval.nieh.config import NiehConfig
 from infthor_eval.nieh.records import NiehAnswer
-from infthor_eval.nieh.results.summary import NiehSummary, summarise
+from infthor_eval.nieh.results.summary import summarise
 from infthor_eval.nieh.scoring import SCORERS, scores
 from infthor_eval.runs import RunHeader, RunSummary, Tokens, UnitRecord
 
@@ -59,6 +62,7 @@ def identity(
         "metrics": {"names": list(metrics)},
         "data": "d",
         "simulator": simulator,
+        "n_samples": 0,
         "skipped": [
             {"question_id": f"x{i}", "variant": "", "reason": reason}
             for i, reason in enumerate(skipped)
@@ -69,9 +73,14 @@ def identity(
     return {"model": model_identity, "tasks": {"nieh_gt": about}, "frames": frames}
 
 
+def header(config: dict[str, Any], name: str = "a run") -> RunHeader[NiehConfig]:
+    """The header of a run of a config as JSON values."""
+    return RunHeader(suite="nieh", name=name, config=msgspec.convert(config, NiehConfig))
+
+
 def run_of(
     about: dict[str, Any], records: list[UnitRecord[NiehAnswer]], name: str = "a run"
 ) -> RunSummary:
     """The run with these records, summed up."""
-    found: NiehSummary = summarise(about, records)
-    return RunSummary(RunHeader(suite="nieh", name=name, config=about), found)
+    head = header(about, name)
+    return RunSummary(head, summarise(head.config, records))

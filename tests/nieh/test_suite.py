@@ -70,7 +70,7 @@ def test_the_results_file_says_what_the_summary_says(prepared):
         "usage",
     }
     assert (document["suite"], document["name"]) == ("nieh", "mine")
-    assert document["config"] == outcome.summary.header.config
+    assert document["config"] == outcome.summary.header.config.document
     strict = document["summary"]["tasks"]["nieh_gt"]["by_clues"]["total"]["scores"]["strict"]
     assert strict.keys() == {"mean", "stderr", "low", "high", "bootstrap", "n_trajectories"}
     assert (

@@ -4,7 +4,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from infthor_eval.episodes.records import DONE
+from infthor_eval.plans.config import PlansConfig
 from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import RECORDS, PlanRecord, StepRecord
 from infthor_eval.runs import RunHeader, Tokens, UnitRecord
@@ -85,7 +88,8 @@ def plan(
 
 def made_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
     names = list(dict.fromkeys(record.cluster for record in records))
-    header = RunHeader(suite="plans", name=label, config=identity(names, **about))
+    config = msgspec.convert(identity(names, **about), PlansConfig)
+    header = RunHeader(suite="plans", name=label, config=config)
     return PlansRun(label, header, records)
 
 

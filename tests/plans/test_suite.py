@@ -122,7 +122,7 @@ def test_the_limit_is_of_trajectories(prepared, tmp_path):
     data = write(tmp_path / "two", cut(FORK, 1), cut(MUG, 1))
     outcome = execute(prepared("scripted", data=data, limit=1))
     assert [record.cluster for record in outcome.records] == [MUG]  # the first by name
-    assert outcome.summary.header.config["limit"] == 1
+    assert outcome.summary.header.config.limit == 1
 
 
 def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, tmp_path):

@@ -35,7 +35,7 @@ class Sums:
         ]
         skipped = [runs.Skipped(runs.UnitKey("sums", "0+0"), "nothing to add")]
         groups = [runs.Group(units[:2]), runs.Group(units[2:])]
-        self.workload = runs.Workload(groups, skipped, {"tasks": {"sums": {}}})
+        self.workload = runs.Workload(groups, skipped, runs.RunConfig(tasks={"sums": {}}))
 
     def run(self, group, session):
         for unit in group.units:

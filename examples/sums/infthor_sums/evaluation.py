@@ -23,7 +23,7 @@ from infthor_eval.runs import (
 from infthor_eval.runs.generation_kwargs import decoding_of
 from infthor_eval.runs.limiting import limit_items
 from infthor_eval.storage.digests import fingerprint
-from infthor_sums.suite import Calculator, Sum
+from infthor_sums.suite import Calculator, Sum, SumsConfig
 from model_adapters import Decoding, Reply, Subject, wrap_request_errors
 
 __all__ = ["SumsEvaluation"]
@@ -80,10 +80,10 @@ class BoundSums:
             for _, units in groupby(evaluation.units, key=lambda unit: unit.cluster)
         ]
         # What the numbers depend on besides the model: another config is another run.
-        config = {
-            "question": evaluation.question,
-            "tasks": {name: dict(it) for name, it in evaluation.settings.items()},
-        }
+        config = SumsConfig(
+            question=evaluation.question,
+            tasks={name: dict(it) for name, it in evaluation.settings.items()},
+        )
         self.workload = Workload(groups, config=config)
 
     def run(self, group: Group[Unit[Sum]], session: Session[Sum]) -> Iterator[UnitRecord[Sum]]:

@@ -7,16 +7,24 @@ is imported here.
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import msgspec
 
 from infthor_eval.rates import Rate, clustered_rate, format_percent
-from infthor_eval.runs import RecordTypes, RunHeader, RunSummary, TaskFile, TaskRequest, UnitRecord
+from infthor_eval.runs import (
+    RecordTypes,
+    RunConfig,
+    RunHeader,
+    RunSummary,
+    TaskFile,
+    TaskRequest,
+    UnitRecord,
+)
 from infthor_eval.runs.baseline import BaselineSubject
 from infthor_eval.tables import Column, Row, Table
 
-__all__ = ["Calculator", "Sum", "SumsOptions", "SumsSuite", "SumsSummary"]
+__all__ = ["Calculator", "Sum", "SumsConfig", "SumsOptions", "SumsSuite", "SumsSummary"]
 
 KINDS = ("without carry", "with carry")
 
@@ -44,6 +52,16 @@ class Sum(msgspec.Struct, frozen=True, tag_field="type", tag="sum"):
         """Whether the first number of the reply is the sum."""
         number = re.search(r"-?\d+", self.reply or "")
         return number is not None and int(number[0]) == self.a + self.b
+
+
+class SumsConfig(RunConfig[dict[str, Any]], frozen=True, kw_only=True, omit_defaults=True):
+    """What the numbers of a run depend on, in the header of its journal.
+
+    Attributes:
+        question: text of the question.
+    """
+
+    question: str = ""
 
 
 class SumsSummary(msgspec.Struct, frozen=True):
@@ -83,7 +101,7 @@ class SumsSuite:
     needs: ClassVar[str] = "conversation"
     options: ClassVar[type] = SumsOptions
     baselines: ClassVar[Mapping[str, type]] = {"calculator": Calculator}
-    records: ClassVar[RecordTypes] = RecordTypes(Sum)
+    records: ClassVar[RecordTypes] = RecordTypes(Sum, config=SumsConfig)
 
     def check_task(self, task: TaskFile) -> None:
         """See `Suite.check_task`."""
@@ -100,7 +118,7 @@ class SumsSuite:
     def summarise(self, header: RunHeader, records: Sequence[UnitRecord[Sum]]) -> SumsSummary:
         """See `Suite.summarise`."""
         tasks = {}
-        for task in header.config["tasks"]:
+        for task in header.config.tasks:
             chosen = [
                 record for record in records if record.task == task and record.excluded is None
             ]

@@ -24,7 +24,7 @@ from infthor_eval.nieh.rescoring.unsure import KnownAnswers
 from infthor_eval.nieh.results.summary import is_open_ended
 from infthor_eval.runs import Session, Unit, UnitKey, UnitRecord, Usage
 from infthor_eval.runs.limiting import limit_items
-from infthor_eval.storage.digests import fingerprint
+from infthor_eval.storage.digests import fingerprint, json_values
 from model_adapters import (
     Decoding,
     Model,
@@ -122,9 +122,7 @@ class Judge:
         self._form = JUDGE_PROMPTS[prompt]
         self._model = model
         self._decoding = Decoding(max_new_tokens=max_new_tokens)
-        self._identity = msgspec.to_builtins(
-            {"name": model.name, **model.identity(), "adapter": code}, str_keys=True
-        )
+        self._identity = json_values({"name": model.name, **model.identity(), "adapter": code})
         self._conversation = model.conversation()
         if self._form.system:
             self._conversation.append(self._form.system, role="system")

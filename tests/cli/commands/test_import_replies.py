@@ -93,7 +93,7 @@ def test_a_published_log_becomes_a_run(import_log, tmp_path, run, name):
     code, said, read = import_log(ROWS, name)
     assert (code, "4 replies imported, 0 of 4 questions without one" in said) == (0, True)
     header, records = read
-    assert (header.name, list(header.config["tasks"])) == ("Some-VL-7B", ["nieh_full"])
+    assert (header.name, list(header.config.tasks)) == ("Some-VL-7B", ["nieh_full"])
     assert replies_in(read) == {f"qsingle{number}": reply for number, reply in enumerate(REPLIES)}
     assert [record.payload.scores["reference"] for record in records] == [1.0, 1.0, 0.0, 1.0]
     assert {record.tokens.context for record in records} == {726}
@@ -157,8 +157,8 @@ def test_two_logs_on_the_same_questions_count_them_once(data, tmp_path, run):
 )
 def test_the_mode_is_part_of_the_run(import_log, more, task, setting):
     _, _, (header, _) = import_log([{**one, **more} for one in ROWS])
-    assert list(header.config["tasks"]) == [task]
-    assert header.config["tasks"][task]["config"]["dataset_kwargs"][setting[0]] == setting[1]
+    assert list(header.config.tasks) == [task]
+    assert header.config.tasks[task].dataset_kwargs[setting[0]] == setting[1]
 
 
 def test_half_a_log_is_a_run_with_the_rest_missing(import_log, tmp_path):
@@ -253,7 +253,7 @@ def test_the_neutral_form(import_log):
         {"question_id": "q?", "reply": "no"},
     ]
     code, said, (header, records) = import_log(rows, "mine.jsonl", "--model", "a person")
-    assert (code, header.name, list(header.config["tasks"])) == (1, "a person", ["imported"])
+    assert (code, header.name, list(header.config.tasks)) == (1, "a person", ["imported"])
     assert "2 replies imported, 3 of 5 questions without one" in said
     assert "mine.jsonl, line 3: answers 'q?', which is not in the set" in said
     assert [(record.id, record.payload.scores["strict"]) for record in records] == [

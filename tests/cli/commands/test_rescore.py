@@ -6,9 +6,9 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
+from infthor_eval.nieh.config import RescoredConfig, SourceRun
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
-from infthor_eval.storage.digests import fingerprint
 
 from ...nieh.made import record
 from .rescored import REPLIES, lines_of, row, scores_in
@@ -31,14 +31,12 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run):
     assert row(said, "nieh_gt", "strict", "our", "strict", "scorer") == ["7", "40.00", "54.29", "1"]
     header, records = read_run(new, RECORDS)
     assert (header.name, new.parent.name, new.name) == ("m-rescored",) * 2 + (
-        f"nieh_gt-{fingerprint(header.config)}",
+        f"nieh_gt-{header.config.hash}",
     )
-    assert header.config["rescored"] == {
-        "from": {"name": "m", "config": fingerprint(read_run(folder, RECORDS)[0].config)},
-        "scorer": None,
-        "judge": None,
-    }
-    assert header.config["model"] == {"name": "m"}
+    assert header.config.rescored == RescoredConfig(
+        source=SourceRun("m", read_run(folder, RECORDS)[0].config.hash), scorer=None, judge=None
+    )
+    assert header.config.model == {"name": "m"}
     assert {name: scores_in(new, "strict")[name] for name in FOUR} == FOUR
     assert scores_in(new, "strict")["q7"] == pytest.approx(0.8)
     assert {one.id: one.failure for one in records if one.failure} == {"q6": "m fails"}
@@ -161,7 +159,7 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
         "q7": 12,
     }
     assert row(said, "nieh_gt", "length", "length", "in", "own.py") == ["7", "-", "742.86", "-"]
-    scorer = read_run(new, RECORDS)[0].config["rescored"]["scorer"]
+    scorer = read_run(new, RECORDS)[0].config.rescored.scorer
     assert (scorer["name"], scorer["metrics"], scorer["file"]) == ("length", ["length"], "own.py")
     own(LENGTH + "# edited\n")
     assert rescore(new.parents[2] / "elsewhere" / "a run", "--scorer", "own.py:length")[2] != new
@@ -170,12 +168,12 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
 def test_a_mapping_is_several_metrics(source, rescore, own):
     own("def both(reply, answers):\n    return {'b': True, 'a': reply == answers[0]}\n")
     _, said, new = rescore(source(), "--scorer", "./own.py:both")
-    assert read_run(new, RECORDS)[0].config["tasks"]["nieh_gt"]["metrics"]["names"] == [
+    assert read_run(new, RECORDS)[0].config.tasks["nieh_gt"].metrics.names == (
         "reference",
         "strict",
         "b",
         "a",
-    ]
+    )
     assert scores_in(new, "a")["q0"] == scores_in(new, "b")["q1"] == 1.0
     assert "a: both in own.py." in said
 
@@ -264,6 +262,6 @@ def test_a_scorer_of_another_package_is_found_by_its_entry_point(source, rescore
     )
     code, _, new = rescore(source(REPLIES[:1]), "--scorer", "loud")
     assert (code, scores_in(new, "loud")) == (0, {"q0": 0.0})
-    scorer = read_run(new, RECORDS)[0].config["rescored"]["scorer"]
+    scorer = read_run(new, RECORDS)[0].config.rescored.scorer
     assert (scorer["name"], scorer["package"]) == ("loud", "tests")
     assert "there are loud)" in rescore(source(REPLIES[:1]), "--scorer", "quiet")[1]

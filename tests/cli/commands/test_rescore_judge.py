@@ -113,7 +113,7 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
     assert row(said, "nieh_gt", "judged", *by.split()) == ["7", "-", "68.57", "-"]
     assert f"judged: {by}." in run("show", new)[1]
     assert json.loads((new / "results.json").read_text())["usage"]["requests"] == 5
-    judge = read_run(new, RECORDS)[0].config["rescored"]["judge"]
+    judge = read_run(new, RECORDS)[0].config.rescored.judge
     assert (judge["label"], judge["soft"], judge["adapter"]["file"]) == ("Judge", "yes", "judge.py")
 
 
@@ -211,7 +211,7 @@ def test_the_published_prompt_asks_for_a_score_and_a_share_counts(
         "0",
         "0",
     ]
-    assert read_run(new, RECORDS)[0].config["rescored"]["judge"]["prompt"] == "published"
+    assert read_run(new, RECORDS)[0].config.rescored.judge["prompt"] == "published"
 
 
 def test_a_no_leaves_the_share_of_several_answers(source, rescore, requests):

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.runs import read_header
+from infthor_eval.nieh.records import RECORDS
+from infthor_eval.runs import read_run
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
 ONE = [Question("t", "Is there a mug?", (40,), ("yes",))]
@@ -72,7 +73,7 @@ def test_the_tokens_of_a_frame_can_be_given(make_nieh_set, tmp_path, run, model)
     assert code == 0, err
     assert [set(n_frames(out, task)) for task in tasks] == [{8000 // 390}, {8192 // 390}]
     (folder,) = (path.parent for path in out.rglob("journal"))
-    assert read_header(folder).config["tokens_per_frame"] == 390
+    assert read_run(folder, RECORDS)[0].config.tokens_per_frame == 390
 
 
 def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(make_nieh_set, tmp_path, run):
@@ -93,9 +94,9 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(make_nieh_s
             )[0]
             == 0
         )
-    configs = [read_header(path.parent).config for path in sorted(out.rglob("journal"))]
+    configs = [read_run(path.parent, RECORDS)[0].config for path in sorted(out.rglob("journal"))]
     limits = {
-        (each["k_tokens"], each["model"]["rope"]["rope_type"], each["model"]["max_tokens"])
+        (each.k_tokens, each.model["rope"]["rope_type"], each.model["max_tokens"])
         for each in configs
     }
     assert limits == {

@@ -57,9 +57,9 @@ def test_retrieval_runs_through_and_the_retriever_is_part_of_the_run(
     assert run(*arguments, "--retriever", second)[0] == 0
     identities = [read_header(path.parent).config for path in out.rglob("journal")]
     retrievers = {
-        each["tasks"][task]["sources"]["retriever"]["fingerprint"]
+        task["sources"]["retriever"]["fingerprint"]
         for each in identities
-        for task in each["tasks"]
+        for task in each.tasks.values()
     }
     assert (len(identities), len(retrievers)) == (2, 2)
 
@@ -184,7 +184,7 @@ def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
     assert code == 0, err
     assert said in err
     (folder,) = {path.parent for path in out.rglob("results.json")}
-    assert read_header(folder).config["tasks"]["nieh_video"]["film"] == film
+    assert read_header(folder).config.tasks["nieh_video"]["film"] == film
     sample = json.loads(only(out, "samples_nieh_video_*.jsonl").read_text())
     assert sample["arguments"]["gen_args_0"]["arg_0"].startswith(
         f"{placeholder}\nAnswer the question given the video"

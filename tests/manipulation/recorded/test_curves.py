@@ -1,11 +1,15 @@
 """Curves of arms, with numbers made by hand."""
 
+import msgspec
 import pytest
 
 from infthor_eval.episodes.curves import AT_MOST
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.manipulation.recorded.curves import ALL, arm_curves
-from infthor_eval.manipulation.recorded.runs import label_by_radius
+from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
+from infthor_eval.manipulation.records import RECORDS
+from infthor_eval.runs import RunConfig
+from infthor_eval.runs.journals.journal import Journal
 
 from ..made_runs import episode, made_run, planner_run
 
@@ -131,8 +135,8 @@ def test_runs_differ_in_simulator_and_settings_in_a_note():
 
 def other_digest():
     run = made_run("n", EPISODES)
-    for about in run.header.config["tasks"].values():
-        about["trajectories"] = dict.fromkeys(about["trajectories"], "other")
+    for task in run.config.tasks.values():
+        task.trajectories.update(dict.fromkeys(task.trajectories, "other"))
     return run
 
 
@@ -157,8 +161,11 @@ def test_what_cannot_be_drawn_together_is_refused(case):
         arm_curves([made_run("m", EPISODES), other])
 
 
-def test_an_identity_of_another_form_is_refused():
+def test_a_journal_of_another_form_is_refused(tmp_path):
     run = made_run("m", EPISODES)
-    run.header.config["tasks"] = []
-    with pytest.raises(DataError, match="m: not the config of a run of manipulation"):
-        arm_curves([run])
+    config = RunConfig(tasks={task: {} for task in run.config.tasks})
+    header = msgspec.structs.replace(run.header, config=config)
+    with Journal(tmp_path, header, RECORDS):
+        pass
+    with pytest.raises(DataError, match="line 1: not the config of a run of manipulation"):
+        ArmRun.read(tmp_path)

@@ -122,7 +122,7 @@ def test_the_option_sets_the_words_and_the_runs_identity(prepared, data):
     assert other == question_text("", QUESTIONS[0], "published-logs")
     assert named.folder == without.folder != logs.folder
     config = logs.summary.header.config
-    assert config["prompt"] == "published-logs" and "prompt" not in without.summary.header.config
+    assert config.prompt == "published-logs" and without.summary.header.config.prompt is None
     record = logs.records[0]
     rebuilt = RequestRebuilder(logs.summary.header, record.task, open_set(str(data))).rebuild(
         record

@@ -45,7 +45,7 @@ def ask(run, tmp_path):
 
 def rebuilt(header, records):
     rebuilders = {
-        task: RequestRebuilder(header, task, open_set(str(DATA))) for task in header.config["tasks"]
+        task: RequestRebuilder(header, task, open_set(str(DATA))) for task in header.config.tasks
     }
     return [(record, rebuilders[record.task].rebuild(record)) for record in records]
 
@@ -95,6 +95,6 @@ def test_another_request_than_the_one_sent_is_refused(ask):
 
 def test_frames_that_a_model_retrieved_are_not_guessed(ask):
     header, records = ask("nieh_mini_gt")
-    header.config["tasks"]["nieh_mini_gt"]["config"]["dataset_kwargs"]["context"] = "clip_retrieval"
+    header.config.tasks["nieh_mini_gt"].settings["dataset_kwargs"]["context"] = "clip_retrieval"
     with pytest.raises(DataError, match="the journal does not have them"):
         RequestRebuilder(header, "nieh_mini_gt", open_set(str(DATA))).rebuild(records[0])

@@ -8,10 +8,10 @@ import pytest
 from infthor_eval.nieh.records import NiehRecall, ShownClues
 from infthor_eval.nieh.results.memory_summary import MemorySummary, MemoryTimes, subject_of
 from infthor_eval.nieh.results.memory_tables import memory_tables
-from infthor_eval.nieh.results.summary import summarise
 from infthor_eval.nieh.results.tables import overview, tables
-from infthor_eval.runs import RunHeader, RunSummary, Tokens
+from infthor_eval.runs import Tokens
 
+from .. import made
 from ..made import identity, record
 
 
@@ -42,7 +42,7 @@ def run_of(
         )
         for number, score in enumerate(scores)
     ]
-    return RunSummary(RunHeader(suite="nieh", name=name, config=config), summarise(config, records))
+    return made.run_of(config, records, name)
 
 
 def test_a_run_is_summed_up_with_its_memory_and_what_that_took():
@@ -51,7 +51,7 @@ def test_a_run_is_summed_up_with_its_memory_and_what_that_took():
         name="last", privileged=False, budget=1000, n_frames=1.5, n_tokens=150.0
     )
     assert summary.took == {"nieh_gt": MemoryTimes(build_s=2.5, recall_s=0.5)}
-    without = summarise(identity(), [record(1, "mug")])
+    without = made.run_of(identity(), [record(1, "mug")]).summary
     assert without.took == {}
     assert without.tasks["nieh_gt"].memory is None
 
@@ -80,8 +80,7 @@ def test_the_table_has_what_was_right_recalled_and_spent():
 def test_it_is_among_all_tables_only_where_there_is_a_memory():
     for of_runs in (overview, tables):
         assert "Memories" in [table.title for table in of_runs([run_of()])]
-        header = RunHeader(suite="nieh", name="x", config=identity())
-        plain = RunSummary(header, summarise(identity(), [record(1, "mug")]))
+        plain = made.run_of(identity(), [record(1, "mug")], "x")
         assert "Memories" not in [table.title for table in of_runs([plain])]
 
 

@@ -7,7 +7,6 @@ import math
 import pytest
 
 from infthor_eval.nieh.results.repeat_summary import by_question, summarise_repeats
-from infthor_eval.nieh.results.summary import summarise
 from infthor_eval.nieh.results.tables import tables
 from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.report.comparison import compare, comparison_table
@@ -118,7 +117,7 @@ def test_the_figures_are_those_of_a_calculation_by_hand():
         *asked(2, "cup", "cup", "bowl"),
         record(2, None, repeat=4, failure="out of memory"),
     ]
-    summary = summarise(identity(), records)
+    summary = run_of(identity(), records).summary
     task, repeats = summary.tasks["nieh_gt"], summary.repeats["nieh_gt"]
     assert (task.n, task.by_clues["total"].n, task.by_clues["total"].n_failed) == (3, 3, 1)
     assert task.by_clues["total"].scores["strict"].mean == repeats.mean == 0.5

@@ -8,7 +8,11 @@ from infthor_eval.nieh.records import Guess, ShownClues
 from infthor_eval.nieh.results.summary import NiehSummary, summarise
 from infthor_eval.runs import Tokens
 
-from ..made import identity, record
+from ..made import header, identity, record
+
+
+def summarised(config, records):
+    return summarise(header(config).config, records)
 
 
 def test_the_same_records_in_another_order_give_the_same_summary():
@@ -16,8 +20,8 @@ def test_the_same_records_in_another_order_give_the_same_summary():
         record(number, "mug" if number % 3 else "cup", n_clues=1 + number % 4)
         for number in range(20)
     ]
-    summary = summarise(identity(), records)
-    assert summary == summarise(identity(), records[::-1])
+    summary = summarised(identity(), records)
+    assert summary == summarised(identity(), records[::-1])
     assert msgspec.json.decode(msgspec.json.encode(summary), type=NiehSummary) == summary
 
 
@@ -29,7 +33,7 @@ def test_columns_are_those_of_table_4_and_both_denominators_are_told():
         record(3, "mug", n_clues=7),
     ]
     records.append(record(4, "no", answers=("no",), n_clues=0))
-    result = summarise(identity(skipped=("no clue frame", "no clue frame")), records).tasks[
+    result = summarised(identity(skipped=("no clue frame", "no clue frame")), records).tasks[
         "nieh_gt"
     ]
     by_clues = {
@@ -52,11 +56,11 @@ def test_columns_are_those_of_table_4_and_both_denominators_are_told():
 def test_open_ended_is_what_begins_with_a_text_that_is_neither_yes_nor_no():
     golds = [("mug",), ("Mug", "yes"), ("3",), ("yes",), ("No",), (3,), (2, "mug")]
     records = [record(number, "?", answers=answers) for number, answers in enumerate(golds)]
-    assert summarise(identity(), records).tasks["nieh_gt"].by_clues["open-ended"].n == 3
+    assert summarised(identity(), records).tasks["nieh_gt"].by_clues["open-ended"].n == 3
 
 
 def test_a_column_without_a_question_has_no_score():
-    result = summarise(identity(), [record(0, "mug")]).tasks["nieh_gt"]
+    result = summarised(identity(), [record(0, "mug")]).tasks["nieh_gt"]
     assert (result.by_clues["2"].n, result.by_clues["2"].scores) == (0, {})
     alone = result.by_clues["total"].scores["strict"]
     assert (alone.mean, alone.n_trajectories) == (1.0, 1)
@@ -64,7 +68,7 @@ def test_a_column_without_a_question_has_no_score():
 
 
 def test_a_failed_question_counts_as_wrong_and_is_named():
-    result = summarise(identity(), [record(0, "mug"), record(1, None, failure="too long")]).tasks[
+    result = summarised(identity(), [record(0, "mug"), record(1, None, failure="too long")]).tasks[
         "nieh_gt"
     ]
     assert result.by_clues["total"].scores["strict"].mean == 0.5
@@ -76,14 +80,14 @@ def test_a_failed_question_counts_as_wrong_and_is_named():
 
 def test_an_interval_is_not_zero_wide_where_all_are_right():
     records = [record(number, "mug") for number in range(40)]
-    strict = summarise(identity(), records).tasks["nieh_gt"].by_clues["total"].scores["strict"]
+    strict = summarised(identity(), records).tasks["nieh_gt"].by_clues["total"].scores["strict"]
     assert (strict.mean, strict.stderr, strict.high) == (1.0, 0.0, 1.0)
     assert strict.low < 0.9
 
 
 def test_scores_are_those_of_the_tasks_own_metrics():
     records = [record(0, "mug", scores={"length": 3.0}), record(1, "cups", scores={"length": 4.0})]
-    result = summarise(identity(metrics=("length",)), records).tasks["nieh_gt"]
+    result = summarised(identity(metrics=("length",)), records).tasks["nieh_gt"]
     assert {name: score.mean for name, score in result.by_clues["total"].scores.items()} == {
         "length": 3.5
     }
@@ -95,7 +99,7 @@ def test_types_and_variants_are_apart():
         record(0, "mug", question_type="", variant="depth=0"),
         record(1, "cup", variant="depth=0.2"),
     ]
-    result = summarise(identity(), records).tasks["nieh_gt"]
+    result = summarised(identity(), records).tasks["nieh_gt"]
     assert {name: cell.n for name, cell in result.by_question_type.items()} == {
         "put_action": 1,
         "untyped": 1,
@@ -112,7 +116,7 @@ def test_a_leaning_to_yes_and_a_reply_that_is_neither_show():
     records = [
         record(i, reply, answers=("yes",) if i < 1 else ("no",)) for i, reply in enumerate(replies)
     ]
-    found = summarise(identity(), [*records, record(9, "mug")]).tasks["nieh_gt"].yes_no
+    found = summarised(identity(), [*records, record(9, "mug")]).tasks["nieh_gt"].yes_no
     assert msgspec.to_builtins(found) == {
         "n": 4,
         "share_gold_yes": 0.25,
@@ -132,7 +136,7 @@ def test_replies_that_are_not_of_the_form_asked_for_are_counted_by_reason(shuffl
         record(5, " \n", answers=("no",)),
         record(6, None, answers=("no",), failure="too long"),
     ]
-    assert summarise(identity(), records[::shuffled]).tasks["nieh_gt"].format_failures == {
+    assert summarised(identity(), records[::shuffled]).tasks["nieh_gt"].format_failures == {
         "cut off at the token limit": 1,
         "empty": 1,
         "neither yes nor no": 1,
@@ -144,7 +148,7 @@ def test_replies_that_are_not_of_the_form_asked_for_are_counted_by_reason(shuffl
 
 
 def task_of(records):
-    return summarise(identity(), records).tasks["nieh_gt"]
+    return summarised(identity(), records).tasks["nieh_gt"]
 
 
 def shown(n_shown, n_clues=2, n_after=None):

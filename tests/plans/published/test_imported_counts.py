@@ -52,7 +52,7 @@ def test_a_log_becomes_a_run_of_its_plans(import_log, run, name):
     assert (code, folder.parent.name) == (0, "some-model-hf_yarn_4.0")
     assert "7 plans of 2 trajectories imported; the set-up of 1 more failed" in said
     header, records = read_run(folder, RECORDS)
-    assert list(header.config["tasks"]) == ["infthor_final"]
+    assert list(header.config.tasks) == ["infthor_final"]
     assert [(record.id, record.payload.kind, record.payload.ended) for record in records] == [
         ("t0/0000", "GotoLocation", "done"),
         ("t0/0001", "GotoLocation", "not done"),

@@ -1,5 +1,7 @@
 """Curves of reward, with numbers made by hand."""
 
+from dataclasses import replace
+
 import msgspec
 import pytest
 
@@ -7,8 +9,10 @@ from infthor_eval.episodes.curves import AT_MOST, StepFunction
 from infthor_eval.episodes.records import NOT_ATTEMPTED
 from infthor_eval.errors import DataError, UsageError
 from infthor_eval.plans.recorded.curves import Axis, plan_curves
+from infthor_eval.plans.recorded.runs import PlansRun
+from infthor_eval.runs import RunConfig
 
-from ..made_runs import TASK, made_run, plan, planner_run
+from ..made_runs import TASK, made_run, plan, planner_run, write_run
 
 T = 12.7062  # quantile of the t interval over two trajectories
 # Two trajectories: one of two plans that ends at step 20, one of a plan that ends at step 30.
@@ -208,7 +212,7 @@ def test_what_cannot_be_drawn_together_is_refused(case):
 
 def test_of_several_shared_tasks_one_is_to_be_named():
     run = made_run("m", PLANS)
-    run.header.config["tasks"]["other"] = run.header.config["tasks"][TASK]
+    run.config.tasks["other"] = run.config.tasks[TASK]
     with pytest.raises(UsageError, match=f"--task: {TASK}, other"):
         plan_curves([run])
     assert plan_curves([run], TASK).task == TASK
@@ -216,8 +220,9 @@ def test_of_several_shared_tasks_one_is_to_be_named():
         plan_curves([run], "x")
 
 
-def test_an_identity_of_another_form_is_refused():
+def test_a_journal_of_another_form_is_refused(tmp_path):
     run = made_run("m", PLANS)
-    run.header.config["tasks"] = []
-    with pytest.raises(DataError, match="m: not the config of a run of plans"):
-        plan_curves([run])
+    other = msgspec.structs.replace(run.header, config=RunConfig(tasks={TASK: {}}))
+    folder = write_run(replace(run, header=other), tmp_path)
+    with pytest.raises(DataError, match="line 1: not the config of a run of plans"):
+        PlansRun.read(folder)

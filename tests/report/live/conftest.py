@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
@@ -10,7 +11,7 @@ from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs import RunHeader
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.suites import find_presenter, find_suite
-from tests.nieh.made import identity
+from tests.nieh.made import header, identity
 
 N_UNITS = 8
 
@@ -19,7 +20,7 @@ def header_of(name: str = "m") -> RunHeader:
     """The header of a run of as many questions."""
     config = identity(model=name, checkpoint=None, n_parameters=None, simulator="embedded")
     config["tasks"]["nieh_gt"]["n_samples"] = N_UNITS
-    return RunHeader(suite="nieh", name=name, config=config, n_units=N_UNITS)
+    return msgspec.structs.replace(header(config, name), n_units=N_UNITS)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.build import PageRequest, build_page
-from infthor_eval.runs import NOTHING, RunHeader, UnitRecord
+from infthor_eval.runs import NOTHING, RunConfig, RunHeader, UnitRecord
 
 from ...runs.toy import Sum, ToySuite
 
@@ -26,7 +26,7 @@ def record(a, b, answer, **more):
 
 def run(name, *records):
     header = RunHeader(
-        suite="toy", name=name, config={"model": {"name": name}, "tasks": {"sums": {}}}
+        suite="toy", name=name, config=RunConfig(model={"name": name}, tasks={"sums": {}})
     )
     return ReportRun(
         Path(name), name, name, ToySuite(), PlainPresenter(), header, records, NOTHING, 0

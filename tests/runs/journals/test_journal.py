@@ -6,7 +6,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.errors import DataError, UsageError
-from infthor_eval.runs import RecordTypes, RunHeader, UnitKey, UnitRecord, read_header, read_run
+from infthor_eval.runs import (
+    RecordTypes,
+    RunConfig,
+    RunHeader,
+    UnitKey,
+    UnitRecord,
+    read_header,
+    read_run,
+)
 from infthor_eval.runs.journals.journal import Journal, recover, set_aside
 
 
@@ -19,7 +27,7 @@ class Note(msgspec.Struct, frozen=True, tag_field="type", tag="note"):
 
 
 TYPES = RecordTypes(Answer, Note)
-HEADER = RunHeader(suite="toy", name="m", config={"model": {"name": "m"}, "seed": 0})
+HEADER = RunHeader(suite="toy", name="m", config=RunConfig(model={"name": "m"}, seed=0))
 KEY = UnitKey("t", "q1")
 
 
@@ -110,7 +118,7 @@ def test_two_processes_cannot_write_one_shard(tmp_path):
 
 def test_the_journal_of_another_run_is_refused(tmp_path):
     opened(tmp_path).__exit__(None, None, None)
-    other = RunHeader(suite="toy", name="m", config={"seed": 1})
+    other = RunHeader(suite="toy", name="m", config=RunConfig(seed=1))
     for worker in (0, 1):
         with pytest.raises(DataError, match="journal of another run"):
             opened(tmp_path, other, worker)

@@ -3,7 +3,7 @@
 import pytest
 import yaml
 
-from infthor_eval.runs import RunHeader
+from infthor_eval.runs import RunConfig, RunHeader
 from infthor_eval.runs.stored.labels import label_runs
 
 
@@ -18,7 +18,7 @@ def stored(tmp_path):
             yaml.safe_dump({"model": "m", "output": folder, "workers": 1, **options})
         )
         return place, RunHeader(
-            suite=suite, name=name, config={"tasks": {task: {} for task in tasks}}
+            suite=suite, name=name, config=RunConfig(tasks={task: {} for task in tasks})
         )
 
     return stored

@@ -7,7 +7,7 @@ from dataclasses import astuple
 import pytest
 
 from infthor_eval.errors import ModelError
-from infthor_eval.runs import Group, Unit, UnitKey, Usage, Workload, estimate_run
+from infthor_eval.runs import Group, RunConfig, Unit, UnitKey, Usage, Workload, estimate_run
 from infthor_eval.runs.work.estimate import Quantities, _MeasuredGroup, estimate_tasks
 
 from ..toy import Sum, Sums, ToySuite, suite_of
@@ -66,7 +66,7 @@ class Costly(Sums):
 
     def __init__(self):
         self.workload = Workload(
-            [group("sums", f"{a}.", 5, 10 * a) for a in range(1, 7)], (), {"tasks": {}}
+            [group("sums", f"{a}.", 5, 10 * a) for a in range(1, 7)], (), RunConfig()
         )
 
     def run(self, asked, session):

@@ -69,7 +69,7 @@ class Deadly(Sums):
             )
             for a in range(6)
         ]
-        return runs.Workload(groups, (), {"tasks": {}})
+        return runs.Workload(groups, (), runs.RunConfig())
 
     def run(self, group, session):
         for unit in group.units:
