@@ -25,4 +25,7 @@ class ArmTaskConfig(EpisodeTaskConfig, frozen=True, kw_only=True, omit_defaults=
     closing: str | None = None
 
 
-ManipulationConfig = EpisodesConfig[ArmTaskConfig]
+class ManipulationConfig(
+    EpisodesConfig[ArmTaskConfig], frozen=True, kw_only=True, omit_defaults=True
+):
+    """The config of a run."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from infthor_eval.errors import DataError, UsageError
+from infthor_eval.plans.config import PlansConfig
 from infthor_eval.plans.recorded.replaying import recorded_plans, replay_plans
 from infthor_eval.plans.recorded.runs import PlansRun
 from infthor_eval.plans.records import RECORDS, StepRecord
@@ -36,9 +37,10 @@ def changed(record, **fields):
 
 def with_identity(recorded, change):
     """The same recording of a run with another identity."""
-    identity = msgspec.json.decode(msgspec.json.encode(recorded.run.header.config))
+    identity = recorded.run.header.config.document
     change(identity)
-    header = msgspec.structs.replace(recorded.run.header, config=identity)
+    config = msgspec.convert(identity, PlansConfig)
+    header = msgspec.structs.replace(recorded.run.header, config=config)
     return replace(recorded, run=PlansRun("scripted", header, recorded.run.records))
 
 
