@@ -6,9 +6,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from infthor_eval.report.runs import read_report_runs
+from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.sample_table import sample_table
-from infthor_eval.suites import find_presenter, find_suite
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -19,4 +18,4 @@ __all__ = ["load_run"]
 def load_run(folder: str | os.PathLike[str]) -> DataFrame:
     """Return the samples of the run in a folder, a row each; `infthor_eval.load_run` documents
     it."""
-    return sample_table(read_report_runs([Path(folder)], find_suite, find_presenter)).to_pandas()
+    return sample_table(read_report_runs([Path(folder)])).to_pandas()

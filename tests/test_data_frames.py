@@ -14,14 +14,14 @@ import infthor_eval
 from infthor_eval.cli import main
 from infthor_eval.errors import DataError
 from infthor_eval.nieh.records import RECORDS
-from infthor_eval.report.runs import read_report_runs
-from infthor_eval.report.sample_table import ENVELOPE, encode_samples, sample_table
+from infthor_eval.report.presented import read_report_runs
+from infthor_eval.report.sample_columns import ENVELOPE
+from infthor_eval.report.sample_table import encode_samples, sample_table
 from infthor_eval.report.suites.episode_columns import ARM_COLUMNS, PLAN_COLUMNS
 from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.runs import UnitRecord
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.runs.stored.search import read_results
-from infthor_eval.suites import find_presenter, find_suite
 from tests.nieh.made import header, identity, record
 
 ROOT = Path(__file__).parents[1]
@@ -145,7 +145,7 @@ def test_csv_is_safe_to_open_and_parquet_is_exact(make_run) -> None:
         "naïve ∞",
     ]
     folder = make_run(*(record(place, reply, ("Bed",)) for place, reply in enumerate(replies)))
-    table = sample_table(read_report_runs([folder], find_suite, find_presenter))
+    table = sample_table(read_report_runs([folder]))
     exact = pandas.read_parquet(io.BytesIO(encode_samples(table, "parquet")))
     assert sorted(exact["reply"]) == sorted(replies)
     text = encode_samples(table, "csv")

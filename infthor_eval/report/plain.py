@@ -9,7 +9,7 @@ import msgspec
 
 from infthor_eval.report.presenter import Description, Figure, Replay, Timelines
 from infthor_eval.report.runs import ReportRun
-from infthor_eval.report.sample_table import SampleColumn
+from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import Prompt, StepRow
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 from PIL import Image
 
 from infthor_eval.report.runs import ReportRun
-from infthor_eval.report.sample_table import SampleColumn
+from infthor_eval.report.sample_columns import SampleColumn
 from infthor_eval.report.web.samples import FrameFacts, Prompt, StepRow, Timeline
 from infthor_eval.report.web.sections import Chart, Section
 from infthor_eval.report.web.thumbnails import ThumbnailStore
@@ -225,7 +225,7 @@ class Presenter(Protocol):
             by disagreement.
         replay: replays recorded episodes; None if the suite has no episodes.
         figures: figures by name, as `report --figure` takes it.
-        columns: columns of the suite in the table of samples (`infthor_eval.report.sample_table`).
+        columns: columns of the suite in the table of samples (`report.sample_columns`).
     """
 
     title: str

@@ -6,9 +6,8 @@ import json
 import pytest
 
 from infthor_eval.cli import main
-from infthor_eval.report.runs import read_report_runs
+from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
-from infthor_eval.suites import find_presenter, find_suite
 
 MODELS = ("calculator", "qwen2.5-vl-tiny")
 
@@ -39,7 +38,7 @@ def folders(install, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def page(folders):
-    return build_page(read_report_runs(folders, find_suite, find_presenter), PageRequest())
+    return build_page(read_report_runs(folders), PageRequest())
 
 
 def test_its_results_are_shown_and_exported(folders, run):

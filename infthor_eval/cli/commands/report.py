@@ -101,17 +101,16 @@ def command(
 
 def _write_page(folders: tuple[Path, ...], request: PageRequest, out: Path) -> None:
     from infthor_eval.errors import UsageError
-    from infthor_eval.report.runs import read_report_runs
+    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.web.build import build_page
     from infthor_eval.report.web.page import write_page
     from infthor_eval.storage.files import prepare_file
-    from infthor_eval.suites import find_presenter, find_suite
     from infthor_eval.terminal import error_console, print_line, progress_bar
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise UsageError(f"--out {out}: the page is an .html file; name one")
     path = prepare_file(out)
-    runs = read_report_runs(folders, find_suite, find_presenter)
+    runs = read_report_runs(folders)
     with progress_bar(error_console()) as progress:
         page = build_page(runs, request, _PageBars(progress))
     size = write_page(page, path)
@@ -139,10 +138,10 @@ class _PageBars:
 
 def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Path) -> None:
     from infthor_eval.errors import UsageError
-    from infthor_eval.report.runs import read_report_runs
+    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.terminal import print_table, table_console
     from infthor_eval.storage.files import prepare_folder, require_writable
-    from infthor_eval.suites import find_presenter, find_suite, suite_names
+    from infthor_eval.suites import find_presenter, suite_names
     from infthor_eval.terminal import print_line
 
     owners: dict[str, Mapping[str, Figure]] = {
@@ -157,7 +156,7 @@ def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Pat
         raise UsageError(
             f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}"
         )
-    runs = read_report_runs(folders, find_suite, find_presenter)
+    runs = read_report_runs(folders)
     figure = _require_figure(runs, name, owners)
     if request.panels is not None and not figure.has_panels:
         raise UsageError(f"--panels: figure {name} has panels of its own; leave it out")

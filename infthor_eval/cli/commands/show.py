@@ -37,9 +37,8 @@ def command(folders: tuple[Path, ...], per_sample: bool, **given: Any) -> None:
 
 def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
     from infthor_eval.errors import UsageError
-    from infthor_eval.report.runs import read_report_runs
+    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.sample_table import FORMS, encode_samples, sample_table
-    from infthor_eval.suites import find_presenter, find_suite
 
     if options.form not in FORMS or options.full:
         raise UsageError(
@@ -50,5 +49,5 @@ def _print_samples(folders: tuple[Path, ...], options: ShowOptions) -> None:
         raise UsageError(
             "--format parquet: is not for a terminal; write it into a file, `> samples.parquet`"
         )
-    table = sample_table(read_report_runs(folders, find_suite, find_presenter))
+    table = sample_table(read_report_runs(folders))
     sys.stdout.buffer.write(encode_samples(table, options.form))

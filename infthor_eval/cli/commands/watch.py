@@ -15,8 +15,8 @@ from infthor_eval.cli.options.values import PATH, FiniteFloat
 if TYPE_CHECKING:
     from PIL import Image
 
+    from infthor_eval.report.presented import PresentedRun
     from infthor_eval.report.presenter import Recording, Replay
-    from infthor_eval.report.runs import ReportRun
     from infthor_eval.terminal import PlainConsole
 
 __all__ = ["command"]
@@ -85,16 +85,15 @@ def command(
     """
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.animations import require_animation_name
+    from infthor_eval.report.presented import read_report_runs
     from infthor_eval.report.presenter import EpisodeSelection
-    from infthor_eval.report.runs import read_report_runs
     from infthor_eval.storage.files import prepare_file
-    from infthor_eval.suites import find_presenter, find_suite
 
     if out is not None:
         require_animation_name(out)
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise UsageError(f"--sheet {sheet}: a sheet is a PNG; give a file whose name ends in .png")
-    (recorded,) = read_report_runs([run], find_suite, find_presenter)
+    (recorded,) = read_report_runs([run])
     replay = _require_replay(recorded)
     _refuse_options(recorded, replay, {"--plans": plans, "--episode": episode, "--sheet": sheet})
     if sheet is not None and out is not None:
@@ -109,7 +108,7 @@ def command(
     )
 
 
-def _require_replay(run: ReportRun) -> Replay:
+def _require_replay(run: PresentedRun) -> Replay:
     from infthor_eval.errors import UsageError
     from infthor_eval.suites import find_presenter, suite_names
 
@@ -125,7 +124,7 @@ def _require_replay(run: ReportRun) -> Replay:
     return run.presenter.replay
 
 
-def _refuse_options(run: ReportRun, replay: Replay, options: Mapping[str, object]) -> None:
+def _refuse_options(run: PresentedRun, replay: Replay, options: Mapping[str, object]) -> None:
     """Refuse options that are given and that the suite of a run does not have."""
     from infthor_eval.errors import UsageError
 
@@ -144,7 +143,7 @@ def _default_file(parts: Sequence[str]) -> Path:
 
 
 def _write(
-    run: ReportRun,
+    run: PresentedRun,
     recording: Recording,
     path: Path,
     *,

@@ -33,14 +33,13 @@ def command(run: Path, port: int) -> None:
     from infthor_eval.pages.server import require_page_extra, serve_pages
     from infthor_eval.report.live.page import live_routes
     from infthor_eval.report.live.state import LiveRun
-    from infthor_eval.suites import find_presenter, find_suite
     from infthor_eval.terminal import print_line
 
     if run.exists() and not run.is_dir():
         raise UsageError(f"{run}: is a file; give the folder of a run, or one above it")
     require_page_extra()
     with (
-        serve_pages(live_routes(LiveRun(run, find_suite, find_presenter)), port=port) as server,
+        serve_pages(live_routes(LiveRun(run)), port=port) as server,
         suppress(KeyboardInterrupt),
     ):
         print_line(f"{run}: {server.address}")

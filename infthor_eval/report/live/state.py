@@ -3,7 +3,7 @@ as it grows."""
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from threading import Lock
 from typing import Any, Literal
@@ -12,12 +12,12 @@ import msgspec
 
 from infthor_eval.errors import InfthorError, wrap_errors
 from infthor_eval.rates import Rate
-from infthor_eval.report.presenter import Presenter
-from infthor_eval.report.runs import ReportRun
-from infthor_eval.runs import NOTHING, Suite, UnitRecord, Usage
+from infthor_eval.report.presented import PresentedRun
+from infthor_eval.runs import NOTHING, UnitRecord, Usage
 from infthor_eval.runs.journals.following import FollowedJournal, is_written
 from infthor_eval.runs.journals.shards import FOLDER
 from infthor_eval.runs.stored.search import Results, read_results, run_folders
+from infthor_eval.suites import find_presenter, find_suite
 
 __all__ = ["LiveRun", "LiveSample", "LiveState", "Totals"]
 
@@ -34,7 +34,7 @@ class LiveSample(msgspec.Struct, frozen=True):
     """A sample: texts as they are in the journal, cut if they are very long; times in seconds.
 
     Attributes:
-        outcome: see `ReportRun.outcome`.
+        outcome: see `PresentedRun.outcome`.
         reason: why it failed or does not count.
         tokens: of the contexts and of the replies; None if they are not counted.
     """
@@ -105,31 +105,20 @@ class LiveState(msgspec.Struct, frozen=True, kw_only=True):
 class LiveRun:
     """A run that is watched; several threads may ask for its state."""
 
-    def __init__(
-        self,
-        folder: Path,
-        find_suite: Callable[[str], Suite[Any, Any]],
-        find_presenter: Callable[[str], Presenter],
-    ) -> None:
+    def __init__(self, folder: Path) -> None:
         """Read nothing yet.
 
         Args:
             folder: folder of the run, or one above it: the run below it that was written last, once
                 there is one.
-            find_suite: returns the suite of a name.
-            find_presenter: returns the presenter of a suite.
         """
         self._folder = folder
-        self._find_suite = find_suite
-        self._find_presenter = find_presenter
         self._asking = Lock()
         self._run: Path | None = None
         self._journal: FollowedJournal | None = None
-        self._totals, self._metrics, self._failures = (
-            Totals(),
-            dict[str, Rate](),
-            tuple[LiveSample, ...](),
-        )
+        self._totals = Totals()
+        self._metrics: Mapping[str, Rate] = {}
+        self._failures: tuple[LiveSample, ...] = ()
         self._has_new_metrics = False
         self._metrics_due = 0.0
 
@@ -150,7 +139,7 @@ class LiveRun:
         if self._run is None:
             return LiveState(status="waiting", folder=str(self._folder))
         if self._journal is None:
-            self._journal = FollowedJournal(self._run, self._find_suite, _N_NEWEST)
+            self._journal = FollowedJournal(self._run, find_suite, _N_NEWEST)
         # Before the journal is read: a process that ends meanwhile has written all that is read.
         held = is_written(self._run)
         results = read_results(self._run)
@@ -159,8 +148,8 @@ class LiveRun:
         suite = self._journal.suite
         if header is None or suite is None:
             return LiveState(status="waiting", folder=str(self._run))
-        presenter = self._find_presenter(header.suite)
-        run = ReportRun(
+        presenter = find_presenter(header.suite)
+        run = PresentedRun(
             folder=self._run,
             label=header.name,
             model=header.name,
@@ -192,7 +181,7 @@ class LiveRun:
             newest=tuple(_sample(run, record) for record in reversed(self._journal.newest)),
         )
 
-    def _sum_up(self, run: ReportRun, journal: FollowedJournal) -> None:
+    def _sum_up(self, run: PresentedRun, journal: FollowedJournal) -> None:
         records = list(journal.log.units.values())
         failed = [record for record in records if record.failure is not None]
         reasons = Counter(_cut(record.failure or "") for record in failed)
@@ -207,7 +196,7 @@ class LiveRun:
         self._failures = tuple(_sample(run, record) for record in reversed(failed[-_N_FAILURES:]))
         self._has_new_metrics = True
 
-    def _update_metrics(self, run: ReportRun, journal: FollowedJournal) -> None:
+    def _update_metrics(self, run: PresentedRun, journal: FollowedJournal) -> None:
         """Work the primary metrics out as `show` does, unless that was done a moment ago."""
         started = time.monotonic()
         if not self._has_new_metrics or started < self._metrics_due:
@@ -243,7 +232,7 @@ def _n_units(results: Results | None, n_done: int) -> int | None:
     return None if results is None else results.n_missing + n_done
 
 
-def _sample(run: ReportRun, record: UnitRecord[Any]) -> LiveSample:
+def _sample(run: PresentedRun, record: UnitRecord[Any]) -> LiveSample:
     description = run.presenter.describe(record)
     return LiveSample(
         task=record.task,

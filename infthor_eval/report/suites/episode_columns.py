@@ -2,7 +2,7 @@
 
 from operator import attrgetter
 
-from infthor_eval.report.sample_table import SampleColumn, payload_column
+from infthor_eval.report.sample_columns import SampleColumn, payload_column
 
 __all__ = ["ARM_COLUMNS", "PLAN_COLUMNS"]
 

@@ -5,7 +5,7 @@ from functools import partial
 from infthor_eval.nieh.records import NiehAnswer
 from infthor_eval.nieh.results.above_guessing import score_above_guessing
 from infthor_eval.nieh.scoring import SCORERS
-from infthor_eval.report.sample_table import SampleColumn, payload_column
+from infthor_eval.report.sample_columns import SampleColumn, payload_column
 from infthor_eval.runs import UnitRecord
 
 __all__ = ["NIEH_COLUMNS"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import infthor_eval
 from infthor_eval.errors import DataError
 from infthor_eval.report.comparison import compare, comparison_table
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.web.page import About, Page, SuiteLabels
 from infthor_eval.report.web.progress import PageProgress, Silent
 from infthor_eval.report.web.replays import EpisodeReplays
@@ -44,7 +44,7 @@ class PageRequest:
 
 
 def build_page(
-    runs: Sequence[ReportRun], request: PageRequest, progress: PageProgress | None = None
+    runs: Sequence[PresentedRun], request: PageRequest, progress: PageProgress | None = None
 ) -> Page:
     """Build the page of some runs, of one suite or of several; `progress` observes what takes long.
 
@@ -52,7 +52,7 @@ def build_page(
         DataError: a run's header is not one of its suite.
     """
     progress = progress or Silent()
-    by_suite: dict[str, list[ReportRun]] = {}
+    by_suite: dict[str, list[PresentedRun]] = {}
     progress.begin(_SUMMARIES, len(runs))
     for run in runs:
         by_suite.setdefault(run.suite.name, []).append(run)
@@ -99,12 +99,12 @@ def build_page(
     )
 
 
-def _title(runs: Sequence[ReportRun]) -> str:
+def _title(runs: Sequence[PresentedRun]) -> str:
     names = ", ".join(run.label for run in runs)
     return names if len(names) <= 60 else f"{len(runs)} runs"
 
 
-def _suite_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
+def _suite_sections(runs: Sequence[PresentedRun]) -> Iterator[Section]:
     suite = runs[0].suite
     presenter = runs[0].presenter
     title = presenter.title or suite.name.replace("_", " ").capitalize()
@@ -114,7 +114,7 @@ def _suite_sections(runs: Sequence[ReportRun]) -> Iterator[Section]:
         yield replace(section, is_linked=False)
 
 
-def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
+def _comparisons(suites: Iterable[Sequence[PresentedRun]]) -> Iterator[Section]:
     """Each run against each before it, of its suite; if there are many, each against the first."""
     tables = []
     notes = []
@@ -135,7 +135,7 @@ def _comparisons(suites: Iterable[Sequence[ReportRun]]) -> Iterator[Section]:
         yield Section("comparison", "Comparison", (), tuple(tables), tuple(notes))
 
 
-def _labels(runs: Sequence[ReportRun], same: Sequence[ReportRun]) -> SuiteLabels:
+def _labels(runs: Sequence[PresentedRun], same: Sequence[PresentedRun]) -> SuiteLabels:
     presenter = same[0].presenter
     places = tuple(runs.index(run) for run in same)
     return SuiteLabels(
@@ -143,7 +143,7 @@ def _labels(runs: Sequence[ReportRun], same: Sequence[ReportRun]) -> SuiteLabels
     )
 
 
-def _metrics(runs: Sequence[ReportRun], samples: Sequence[PageSample]) -> list[str]:
+def _metrics(runs: Sequence[PresentedRun], samples: Sequence[PageSample]) -> list[str]:
     """Names of all metrics; those that decide the outcome first."""
     main = {run.presenter.main_metric for run in runs}
     names = dict.fromkeys(
@@ -156,7 +156,7 @@ def _metrics(runs: Sequence[ReportRun], samples: Sequence[PageSample]) -> list[s
     return sorted(names, key=lambda name: name not in main)
 
 
-def _about(run: ReportRun) -> About:
+def _about(run: PresentedRun) -> About:
     config = run.header.config
     facts = {
         "suite": run.suite.name,

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 from PIL import Image
 
 from infthor_eval.errors import InfthorError
+from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.presenter import EpisodeSelection, OpenReplay, Replay
-from infthor_eval.report.runs import ReportRun, choose_evenly
+from infthor_eval.report.runs import choose_evenly
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.thumbnails import ThumbnailStore
 from infthor_eval.runs import UnitKey, UnitRecord
@@ -44,7 +45,7 @@ class EpisodeReplays:
 
     def __init__(
         self,
-        runs: Sequence[ReportRun],
+        runs: Sequence[PresentedRun],
         most: int,
         folders: tuple[Path | None, Path | None],
         thumbnails: ThumbnailStore,
@@ -69,7 +70,7 @@ class EpisodeReplays:
         if n_episodes:
             progress.begin(_WORK, n_episodes)
 
-    def replay(self, run: ReportRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
+    def replay(self, run: PresentedRun) -> tuple[Mapping[UnitKey, EpisodePictures], list[str]]:
         """Replay the chosen episodes of a run; return their pictures, and why a trajectory could
         not be replayed."""
         pictures: dict[UnitKey, EpisodePictures] = {}
@@ -98,11 +99,11 @@ class EpisodeReplays:
                     self._count(run, trajectory)
         return pictures, notes
 
-    def _count(self, run: ReportRun, trajectory: str) -> None:
+    def _count(self, run: PresentedRun, trajectory: str) -> None:
         self._progress.advance(_WORK, f"{run.label}, {trajectory}")
 
     def _draw(
-        self, replay: Replay, session: OpenReplay, run: ReportRun, record: Record
+        self, replay: Replay, session: OpenReplay, run: PresentedRun, record: Record
     ) -> EpisodePictures:
         frames = list(session.frames([record]))
         seen = [frame.observation for frame in frames if frame.observation is not None]
@@ -121,7 +122,7 @@ class EpisodeReplays:
         )
 
 
-def _choose(run: ReportRun, most: int) -> list[Record]:
+def _choose(run: PresentedRun, most: int) -> list[Record]:
     """Two thirds of the room for episodes that went wrong, the rest for successes."""
     acted = [record for record in run.records if run.presenter.steps(record)]
     wrong = [record for record in acted if run.main_score(record) < 1]

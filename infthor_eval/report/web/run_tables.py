@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from infthor_eval.rates import Rate
 from infthor_eval.reasons import count_reasons
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.presented import PresentedRun
 from infthor_eval.runs import TaskConfig
 from infthor_eval.tables import Column, Row, Table, interval_cell
 
@@ -14,7 +14,7 @@ _NAMES = (Column("run", False), Column("task", False))
 _MEASURABLE_S = 0.05  # less is the clock's noise: baselines take microseconds
 
 
-def primary_metrics_table(runs: Sequence[ReportRun]) -> Table:
+def primary_metrics_table(runs: Sequence[PresentedRun]) -> Table:
     """Return the primary metric of each run and task, with a row for each."""
     rows = [
         Row((run.label, task, run.presenter.measure, *_cells(rate), str(rate.n)))
@@ -30,7 +30,7 @@ def _cells(rate: Rate) -> tuple[str, str]:
     return f"{100 * rate.mean:.1f}", interval_cell(low, high, pattern="{}–{}")
 
 
-def costs_table(runs: Sequence[ReportRun]) -> Table:
+def costs_table(runs: Sequence[PresentedRun]) -> Table:
     """Return speed and cost, with a row per run."""
     tokens = ("tokens read", "of them cached, %", "tokens written")
     columns = ("samples", "seconds", "samples / s", "requests", *tokens, "cost")
@@ -43,7 +43,7 @@ def costs_table(runs: Sequence[ReportRun]) -> Table:
     )
 
 
-def _cost_row(run: ReportRun) -> Row:
+def _cost_row(run: PresentedRun) -> Row:
     seconds = sum(record.seconds for record in run.records)
     rate = f"{len(run.records) / seconds:,.2f}" if seconds >= _MEASURABLE_S else "-"
     usage = run.usage
@@ -53,7 +53,7 @@ def _cost_row(run: ReportRun) -> Row:
     return Row((run.label, str(len(run.records)), f"{seconds:.1f}", rate, *counts, cost))
 
 
-def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
+def left_out_table(runs: Sequence[PresentedRun]) -> Table | None:
     """Return the numbers of failed, excluded, retried, skipped and missing units by reason; None if
     there are none."""
     rows = [
@@ -73,7 +73,7 @@ def left_out_table(runs: Sequence[ReportRun]) -> Table | None:
     return Table("", columns, tuple(rows))
 
 
-def _left_out(run: ReportRun) -> Iterator[tuple[tuple[str, str], str]]:
+def _left_out(run: PresentedRun) -> Iterator[tuple[tuple[str, str], str]]:
     for record in run.records:
         if record.failure is not None:
             yield (record.task, "failed"), record.failure

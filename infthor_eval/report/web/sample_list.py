@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from infthor_eval.report.runs import ReportRun, records_by_unit
+from infthor_eval.report.presented import PresentedRun
+from infthor_eval.report.runs import records_by_unit
 from infthor_eval.report.web.progress import PageProgress
 from infthor_eval.report.web.replays import EpisodePictures, EpisodeReplays
 from infthor_eval.report.web.samples import (
@@ -53,7 +54,7 @@ class SharedTexts:
 
 
 def build_samples(
-    runs: Sequence[ReportRun],
+    runs: Sequence[PresentedRun],
     data: Path | None,
     replays: EpisodeReplays,
     thumbnails: ThumbnailStore,
@@ -99,7 +100,7 @@ def build_samples(
 class _Source:
     """A run with what is known of its records beside them."""
 
-    run: ReportRun
+    run: PresentedRun
     prompts: Mapping[UnitKey, Prompt]
     tracebacks: StoredTracebacks
     texts: SharedTexts

@@ -14,9 +14,8 @@ import yaml
 from infthor_eval.cli import main
 from infthor_eval.cli.results import read_run_results
 from infthor_eval.generation.replay_set import replay_set, select
-from infthor_eval.report.runs import read_report_runs
+from infthor_eval.report.presented import read_report_runs
 from infthor_eval.runs.stored.search import StoredRun, find_runs
-from infthor_eval.suites import find_presenter, find_suite
 
 from ..damage import Form
 from ..reader import Reader
@@ -81,7 +80,7 @@ def _show(folder: Path) -> None:
 
 
 def _report(folder: Path) -> None:
-    runs = read_report_runs([folder / "damaged", folder / "sound"], find_suite, find_presenter)
+    runs = read_report_runs([folder / "damaged", folder / "sound"])
     presenter = runs[0].presenter
     list(presenter.sections(runs))
     list(presenter.charts(runs))

@@ -10,7 +10,6 @@ from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs import RunHeader
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.suites import find_presenter, find_suite
 from tests.nieh.made import header, identity
 
 N_UNITS = 8
@@ -36,4 +35,4 @@ def open_journal(tmp_path: Path) -> Callable[..., Journal[NiehAnswer]]:
 @pytest.fixture
 def live(tmp_path: Path) -> LiveRun:
     """The run below `results`, as it is watched."""
-    return LiveRun(tmp_path / "results", find_suite, find_presenter)
+    return LiveRun(tmp_path / "results")

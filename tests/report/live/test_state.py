@@ -9,7 +9,6 @@ import pytest
 from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs.journals import journal as journals
 from infthor_eval.runs.journals.following import is_written
-from infthor_eval.suites import find_presenter, find_suite
 from tests.nieh.made import record
 
 from .conftest import N_UNITS
@@ -67,7 +66,7 @@ def test_the_metrics_at_the_end_are_those_of_the_results(run, tmp_path, make_nie
         ]
         == 0
     )
-    state = LiveRun(tmp_path / "out", find_suite, find_presenter).state()
+    state = LiveRun(tmp_path / "out").state()
     (results,) = (tmp_path / "out").rglob("results.json")
     stored = msgspec.json.decode(results.read_bytes())["primary_metrics"]
     assert msgspec.to_builtins(state.metrics) == stored

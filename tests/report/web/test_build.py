@@ -8,10 +8,9 @@ from itertools import pairwise
 import pytest
 
 from infthor_eval.nieh.samples import open_set
-from infthor_eval.report.runs import read_report_runs
+from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.storage.packaged import packaged_folder
-from infthor_eval.suites import find_presenter, find_suite
 
 DATA = packaged_folder("sets/nieh_mini")
 
@@ -177,7 +176,7 @@ def test_what_takes_long_is_counted_to_its_end(nieh_runs, scripted_run, scripted
         def advance(self, what, detail=""):
             counted[what] += 1
 
-    runs = read_report_runs([*nieh_runs, scripted_run], find_suite, find_presenter)
+    runs = read_report_runs([*nieh_runs, scripted_run])
     build_page(runs, PageRequest(episodes=1), Watching())
     assert set(begun) == {
         "runs summarised",

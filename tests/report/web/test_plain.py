@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.report.plain import PlainPresenter
-from infthor_eval.report.runs import ReportRun
+from infthor_eval.report.presented import PresentedRun
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.runs import NOTHING, RunConfig, RunHeader, UnitRecord
 
@@ -28,8 +28,16 @@ def run(name, *records):
     header = RunHeader(
         suite="toy", name=name, config=RunConfig(model={"name": name}, tasks={"sums": {}})
     )
-    return ReportRun(
-        Path(name), name, name, ToySuite(), PlainPresenter(), header, records, NOTHING, 0
+    return PresentedRun(
+        folder=Path(name),
+        label=name,
+        model=name,
+        suite=ToySuite(),
+        presenter=PlainPresenter(),
+        header=header,
+        records=records,
+        usage=NOTHING,
+        n_missing=0,
     )
 
 
