@@ -64,6 +64,11 @@ class NiehRecall(msgspec.Struct, frozen=True, kw_only=True, tag_field="type", ta
     build_s: float
     recall_s: float
 
+    @property
+    def n_frames(self) -> int:
+        """Number of recalled frames."""
+        return sum(isinstance(position, int) for position in self.recalled)
+
 
 class NiehAnswer(
     msgspec.Struct,

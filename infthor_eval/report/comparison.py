@@ -1,12 +1,11 @@
-"""Two runs of one suite on the same units: the difference of their scores, with interval and p
-value.
+"""Two runs of one suite on the same units: how their scores differ, with interval and p value.
 
 A unit that was repeated counts with its mean scores, so that runs of different numbers of
 repetitions can be compared.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean, variance
 from typing import Any
@@ -20,7 +19,7 @@ from infthor_eval.tables import Column, Row, Table, interval_cell
 __all__ = ["Comparison", "compare", "comparison_table"]
 
 Record = UnitRecord[Any]
-_Pair = tuple[Sequence[Record], Sequence[Record]]  # the repetitions of a unit in two runs
+Scores = Mapping[str, float]
 _NORMAL_95 = 1.96
 
 
@@ -58,70 +57,21 @@ def compare(
     Raises:
         DataError: they share no unit.
     """
-    ours, theirs = map(_by_unit, (first, second))
-    shared = ours.keys() & theirs.keys()
+    firsts = _by_unit(first)
+    seconds = _by_unit(second)
+    shared = [key for key in firsts if key in seconds]
     if not shared:
         raise DataError(
             "the two runs share no unit of the same task; compare runs on the same data"
         )
     comparisons: list[Comparison] = []
     for task in sorted({key.task for key in shared}):
-        pairs = [(ours[key], theirs[key]) for key in ours if key in shared and key.task == task]
-        n_unshared = sum(key.task == task for key in ours.keys() ^ theirs.keys())
-        comparisons += _compare_task(suite, presenter, task, pairs, n_unshared)
+        units = [_PairedUnit(firsts[key], seconds[key]) for key in shared if key.task == task]
+        n_unshared = sum(key.task == task for key in firsts.keys() ^ seconds.keys())
+        compared = _TaskComparison(presenter, task, n_unshared)
+        comparisons += compared.by_scores(units, suite)
+        comparisons += compared.by_further_scores(units, suite)
     return comparisons
-
-
-def _compare_task(
-    suite: Suite, presenter: Presenter, task: str, pairs: Sequence[_Pair], n_unshared: int
-) -> Iterator[Comparison]:
-    scores = [
-        (list(map(suite.scores, ours)), list(map(suite.scores, theirs))) for ours, theirs in pairs
-    ]
-    clusters = [ours[0].cluster for ours, _ in pairs]
-    for metric in _shared_metrics(scores):
-        # A unit without results has no scores, and counts as 0.
-        both = [(_values(ours, metric), _values(theirs, metric)) for ours, theirs in scores]
-        yield _compare_metric(presenter, task, metric, both, clusters, n_unshared)
-    further = [
-        (list(map(presenter.further_scores, ours)), list(map(presenter.further_scores, theirs)))
-        for ours, theirs in pairs
-    ]
-    scored = [
-        pair for pair, (ours, theirs) in zip(further, scores, strict=True) if ours[0] and theirs[0]
-    ]
-    for metric in dict.fromkeys(
-        name for ours, theirs in scored or further for name in ours[0] if name in theirs[0]
-    ):
-        # Whether a unit has such a score depends on the unit, not on the reply.
-        chosen = [
-            place
-            for place, (ours, theirs) in enumerate(further)
-            if metric in ours[0] and metric in theirs[0]
-        ]
-        both = [
-            (_values(further[place][0], metric), _values(further[place][1], metric))
-            for place in chosen
-        ]
-        yield _compare_metric(
-            presenter, task, metric, both, [clusters[place] for place in chosen], n_unshared
-        )
-
-
-def _shared_metrics(
-    scores: Sequence[tuple[Sequence[Mapping[str, float]], Sequence[Mapping[str, float]]]],
-) -> list[str]:
-    """Return the metrics that both runs have; all of the other run's if one has no unit with a
-    result."""
-    first, second = (
-        dict.fromkeys(name for of_run in runs for one in of_run for name in one)
-        for runs in zip(*scores, strict=True)
-    )
-    return [
-        name
-        for name in first | second
-        if (not first or name in first) and (not second or name in second)
-    ]
 
 
 def _by_unit(records: Iterable[Record]) -> dict[UnitKey, list[Record]]:
@@ -132,35 +82,110 @@ def _by_unit(records: Iterable[Record]) -> dict[UnitKey, list[Record]]:
     return units
 
 
-def _values(scores: Sequence[Mapping[str, float]], metric: str) -> list[float]:
-    return [one.get(metric, 0.0) for one in scores]
+@dataclass(frozen=True)
+class _PairedUnit:
+    """The repetitions of a unit in two runs."""
+
+    first: Sequence[Record]
+    second: Sequence[Record]
+
+    def scores(self, scores_of: Callable[[Record], Scores]) -> "_PairedScores":
+        cluster = self.first[0].cluster
+        return _PairedScores(
+            cluster, list(map(scores_of, self.first)), list(map(scores_of, self.second))
+        )
 
 
-def _compare_metric(
-    presenter: Presenter,
-    task: str,
-    metric: str,
-    scores: Sequence[tuple[Sequence[float], Sequence[float]]],
-    clusters: Sequence[str],
-    n_unshared: int,
-) -> Comparison:
-    first, second = ([fmean(values) for values in of_run] for of_run in zip(*scores, strict=True))
-    is_share = presenter.is_share(metric, [*first, *second])
-    means = sum(first) / len(first), sum(second) / len(second)
-    difference = paired_difference(first, second, clusters)
-    return Comparison(task, metric, is_share, *means, difference, n_unshared, _drawing(scores))
+@dataclass(frozen=True)
+class _PairedScores:
+    """The scores of a unit's repetitions in two runs, and its cluster."""
+
+    cluster: str
+    first: Sequence[Scores]
+    second: Sequence[Scores]
+
+    @property
+    def shared_names(self) -> list[str]:
+        """Names of the scores that the unit has in both runs."""
+        return [name for name in self.first[0] if name in self.second[0]]
+
+    @property
+    def is_scored(self) -> bool:
+        """Whether the unit has a result in both runs."""
+        return bool(self.first[0] and self.second[0])
 
 
-def _drawing(scores: Sequence[tuple[Sequence[float], Sequence[float]]]) -> float | None:
-    """Return `Comparison.drawing` of the scores of repeated units in two runs."""
-    samples = [values for pair in scores for values in pair]
+@dataclass(frozen=True)
+class _TaskComparison:
+    """Compares two runs in a task, metric by metric."""
+
+    presenter: Presenter
+    task: str
+    n_unshared: int
+
+    def by_scores(self, units: Sequence[_PairedUnit], suite: Suite) -> Iterator[Comparison]:
+        """Compare in the suite's metrics; a unit without a result has no scores, and counts as
+        0."""
+        scores = [unit.scores(suite.scores) for unit in units]
+        for metric in _shared_metrics(scores):
+            yield self._compare(metric, scores)
+
+    def by_further_scores(self, units: Sequence[_PairedUnit], suite: Suite) -> Iterator[Comparison]:
+        """Compare in scores that not every unit has, whatever it was replied: in those of the units
+        with a result, if there are any."""
+        further = [unit.scores(self.presenter.further_scores) for unit in units]
+        scored = []
+        for unit, scores in zip(units, further, strict=True):
+            if unit.scores(suite.scores).is_scored:
+                scored.append(scores)
+        names: dict[str, None] = {}
+        for scores in scored or further:
+            names |= dict.fromkeys(scores.shared_names)
+        for metric in names:
+            yield self._compare(metric, [it for it in further if metric in it.shared_names])
+
+    def _compare(self, metric: str, scores: Sequence[_PairedScores]) -> Comparison:
+        firsts = [_values(unit.first, metric) for unit in scores]
+        seconds = [_values(unit.second, metric) for unit in scores]
+        first = list(map(fmean, firsts))
+        second = list(map(fmean, seconds))
+        return Comparison(
+            task=self.task,
+            metric=metric,
+            is_share=self.presenter.is_share(metric, [*first, *second]),
+            first=sum(first) / len(first),
+            second=sum(second) / len(second),
+            difference=paired_difference(first, second, [unit.cluster for unit in scores]),
+            n_unshared=self.n_unshared,
+            drawing=_drawing([*firsts, *seconds], len(scores)),
+        )
+
+
+def _shared_metrics(scores: Sequence[_PairedScores]) -> list[str]:
+    """Return the metrics that both runs have; all of the other run's if one has no unit with a
+    result."""
+    first: dict[str, None] = {}
+    second: dict[str, None] = {}
+    for unit in scores:
+        for repetition in unit.first:
+            first |= dict.fromkeys(repetition)
+        for repetition in unit.second:
+            second |= dict.fromkeys(repetition)
+    if not first or not second:
+        return list(first or second)
+    return [name for name in first if name in second]
+
+
+def _values(scores: Sequence[Scores], metric: str) -> list[float]:
+    return [of_repetition.get(metric, 0.0) for of_repetition in scores]
+
+
+def _drawing(samples: Sequence[Sequence[float]], n_units: int) -> float | None:
+    """Return `Comparison.drawing` of the scores of each unit in each run."""
     if any(len(values) < 2 for values in samples):
         return None
-    return (
-        _NORMAL_95
-        * math.sqrt(sum(variance(values) / len(values) for values in samples))
-        / len(scores)
-    )
+    spread = math.sqrt(sum(variance(values) / len(values) for values in samples))
+    return _NORMAL_95 * spread / n_units
 
 
 def comparison_table(comparisons: Sequence[Comparison], first: str, second: str) -> Table:
@@ -188,7 +213,8 @@ def _row(comparison: Comparison, *, repeated: bool) -> Row:
     unit, factor = ("%", 100.0) if comparison.is_share else ("points", 1.0)
     estimate = comparison.difference.estimate
     p = comparison.difference.p
-    low, high = (None if end is None else factor * end for end in (estimate.low, estimate.high))
+    low = None if estimate.low is None else factor * estimate.low
+    high = None if estimate.high is None else factor * estimate.high
     numbers = (
         f"{factor * comparison.first:.2f}",
         f"{factor * comparison.second:.2f}",

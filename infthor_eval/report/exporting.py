@@ -43,12 +43,9 @@ def _csv(table: Table, *, with_words: bool) -> str:
     text = io.StringIO()
     words = [word for word in (table.title, *table.notes) if word] if with_words else []
     text.writelines(f"# {_in_one_line(word)}\n" for word in words)
-    rows = _cells(table)
-    columns = [
-        lines
-        for place, column in enumerate(table.columns)
-        for lines in _csv_columns(column, [cells[place] for cells in rows])
-    ]
+    columns: list[list[str]] = []
+    for column, *cells in zip(table.columns, *_cells(table), strict=True):
+        columns += _csv_columns(column, cells)
     csv.writer(text, lineterminator="\n").writerows(zip(*columns, strict=True))
     return text.getvalue()
 

@@ -26,10 +26,10 @@ _HEADS = {
 def guessers_table(questions: Sequence[AuditedQuestion]) -> Table:
     """Return what each guesser gets on each file."""
     files = groups(questions, "file")
-    rows = [
-        Row((guesser.name, *(f"{100 * group.means()[place]:.2f}" for group in files)))
-        for place, guesser in enumerate(GUESSERS)
-    ]
+    rows = []
+    for number, guesser in enumerate(GUESSERS):
+        means = [f"{100 * group.means()[number]:.2f}" for group in files]
+        rows.append(Row((guesser.name, *means)))
     columns = (Column("guesser", False), *(Column(group.name) for group in files))
     note = (
         "Each question is guessed from questions on other trajectories in its file; nobody sees a "

@@ -66,10 +66,7 @@ def balance(questions: Sequence[Question]) -> Balanced:
     kept = {name: (after[name], n) for name, n in sorted(before.items())}
     if not left:
         return Balanced((), 0.0, "none", 0.0, kept)
-    means = [
-        sum(right[question.id][place] for question in left) / len(left)
-        for place in range(len(GUESSERS))
-    ]
+    means = [n_right / len(left) for n_right in _right_by_guesser(left, right)]
     best = max(range(len(means)), key=means.__getitem__)
     by_form = _by_form(left)
     chance = sum(_chance(group) * len(group) for group in by_form.values()) / len(left)
@@ -130,6 +127,14 @@ def _guess(questions: Sequence[Question]) -> dict[str, tuple[float, ...]]:
     return dict(zip(ids, score_guesses(questions) if questions else [], strict=True))
 
 
+def _right_by_guesser(
+    questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]
+) -> list[float]:
+    """Return how many of the questions each guesser gets right."""
+    scores = [right[question.id] for question in questions]
+    return [sum(of_guesser) for of_guesser in zip(*scores, strict=True)]
+
+
 def _surplus(
     questions: Sequence[Question], right: Mapping[str, tuple[float, ...]]
 ) -> dict[str, int]:
@@ -138,9 +143,7 @@ def _surplus(
     surplus = {}
     for form, group in _by_form(questions).items():
         chance = _chance(group)
-        best = max(
-            sum(right[question.id][place] for question in group) for place in range(len(GUESSERS))
-        )
+        best = max(_right_by_guesser(group, right))
         if best > (chance + MARGIN) * len(group):
             surplus[form] = max(1, round((best - chance * len(group)) / 2))
     return surplus

@@ -84,14 +84,11 @@ def _learn_guesses(data: NiehSet, knowledge: Knowledge) -> dict[str, Guess]:
     guesses: dict[str, Guess] = {}
     for questions in questions_by_file(data).values():
         samples = [sample_on_clues(question) for question in questions]
-        by_guesser = [
-            [
-                scores(reply, question.answers)
-                for reply, question in zip(guesser.guess(samples), questions, strict=True)
-            ]
-            for guesser in GUESSERS
-            if guesser.knows in knowledge
-        ]
+        by_guesser = []
+        for guesser in GUESSERS:
+            if guesser.knows in knowledge:
+                guessed = zip(guesser.guess(samples), questions, strict=True)
+                by_guesser.append([scores(reply, asked.answers) for reply, asked in guessed])
         guesses |= _best_by_form(questions, by_guesser)
     return guesses
 
@@ -111,10 +108,11 @@ def score_guesses(
     """Return for each question of a file the scores of all guessers, in their order."""
     samples = [sample_on_clues(question) for question in questions]
     by_guesser = [guesser.guess(samples) for guesser in GUESSERS]
-    return [
-        tuple(score(guess, question.answers, scorer) for guess in guesses)
-        for question, guesses in zip(questions, zip(*by_guesser, strict=True), strict=True)
-    ]
+    by_question = zip(*by_guesser, strict=True)
+    rows = []
+    for question, guesses in zip(questions, by_question, strict=True):
+        rows.append(tuple(score(guess, question.answers, scorer) for guess in guesses))
+    return rows
 
 
 def sample_on_clues(question: Question) -> Sample:

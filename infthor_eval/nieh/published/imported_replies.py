@@ -4,6 +4,7 @@ runs."""
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -118,10 +119,8 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
     """
     runs: dict[tuple[str, str, str], ImportedRun] = {}
     rows_of = {log: list(read_reply_log(log)) for log in dict.fromkeys(logs)}
-    replies_of = {
-        log: [row for row in rows if isinstance(row, LoggedReply)] for log, rows in rows_of.items()
-    }
-    n_frames = _trajectory_lengths(reply for replies in replies_of.values() for reply in replies)
+    replies_of = {log: _replies(rows) for log, rows in rows_of.items()}
+    n_frames = _trajectory_lengths(chain.from_iterable(replies_of.values()))
     for log in logs:
         name = _PUBLISHED_NAME.match(log.name)
         if model is None and name is None:
@@ -137,6 +136,10 @@ def import_logs(logs: Sequence[Path], data: NiehSet, model: str | None = None) -
         guesses = find_guesses(data, visible_knowledge(settings["context"]))
         _add_log(run, log, rows_of[log], _questions_of(data, name), _Known(guesses, n_frames))
     return list(runs.values())
+
+
+def _replies(rows: Sequence[LoggedReply | UnreadRow]) -> list[LoggedReply]:
+    return [row for row in rows if isinstance(row, LoggedReply)]
 
 
 def _trajectory_lengths(replies: Iterable[LoggedReply]) -> dict[str, int]:

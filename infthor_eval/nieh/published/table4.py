@@ -67,9 +67,10 @@ def derive_row(data: NiehSet, row: PublishedRow) -> dict[str, MeanEstimate]:
     Raises:
         DataError: a question lacks the score, or no question is in a column.
     """
-    chosen = {
-        name: [item for item in data.questions if item.clue_column == name] for name in CLUE_COLUMNS
-    }
+    chosen: dict[str, list[Question]] = {name: [] for name in CLUE_COLUMNS}
+    for question in data.questions:
+        if question.clue_column in chosen:
+            chosen[question.clue_column].append(question)
     chosen["total"] = list(data.questions)
     empty = next((name for name, questions in chosen.items() if not questions), None)
     if empty is not None:

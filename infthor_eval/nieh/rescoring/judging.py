@@ -243,18 +243,18 @@ def _sample(
     """Return replies to open-ended questions that are right, and that are plainly wrong, from all
     trajectories."""
     sure = [
-        r
-        for r in scored
-        if is_open_ended(r) and r.key not in unsure and last_line(r.payload.reply or "")
+        record
+        for record in scored
+        if is_open_ended(record)
+        and record.key not in unsure
+        and last_line(record.payload.reply or "")
     ]
-    of_score = [
-        [record for record in sure if record.payload.scores["strict"] == score]
-        for score in (1.0, 0.0)
-    ]
-    right, wrong = (
-        limit_items(items, lambda record: record.cluster, seed, _N_SAMPLED) for items in of_score
-    )
-    return right, wrong
+
+    def sample(score: float) -> list[Record]:
+        chosen = [record for record in sure if record.payload.scores["strict"] == score]
+        return limit_items(chosen, lambda record: record.cluster, seed, _N_SAMPLED)
+
+    return sample(1.0), sample(0.0)
 
 
 def _count(records: Sequence[Record], verdicts: Mapping[UnitKey, float | None]) -> Verdicts:

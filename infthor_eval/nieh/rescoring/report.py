@@ -83,27 +83,28 @@ def find_changes(
 ) -> dict[str, Change]:
     """Compare the scores of a task's records with those before, by unit: a change for each
     metric."""
-    return {
-        name: _change(before, [r for r in records if name in r.payload.scores], name)
-        for name in names
-    }
+    return {name: _change(before, records, name) for name in names}
 
 
 def _change(
     before: Mapping[UnitKey, Mapping[str, float]], records: Sequence[Record], name: str
 ) -> Change:
-    now = [record.payload.scores[name] for record in records]
-    both = [
-        (r, before[r.key][name], r.payload.scores[name]) for r in records if name in before[r.key]
-    ]
-    differing = [
-        ChangedScore(r.id, r.payload.reply or "", old, new) for r, old, new in both if old != new
-    ]
+    scored = [record for record in records if name in record.payload.scores]
+    old_scores = []
+    differing = []
+    for record in scored:
+        if name not in before[record.key]:
+            continue
+        old = before[record.key][name]
+        new = record.payload.scores[name]
+        old_scores.append(old)
+        if old != new:
+            differing.append(ChangedScore(record.id, record.payload.reply or "", old, new))
     return Change(
-        n=len(now),
-        mean=_mean(now),
-        n_before=len(both),
-        mean_before=_mean([old for _, old, _ in both]),
+        n=len(scored),
+        mean=_mean([record.payload.scores[name] for record in scored]),
+        n_before=len(old_scores),
+        mean_before=_mean(old_scores),
         n_differ=len(differing),
         examples=differing[:_N_EXAMPLES],
     )

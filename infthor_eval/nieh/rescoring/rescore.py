@@ -14,7 +14,13 @@ from msgspec.structs import replace
 
 import infthor_eval
 from infthor_eval.errors import UsageError
-from infthor_eval.nieh.config import MetricsConfig, NiehConfig, RescoredConfig, SourceRun
+from infthor_eval.nieh.config import (
+    MetricsConfig,
+    NiehConfig,
+    NiehTaskConfig,
+    RescoredConfig,
+    SourceRun,
+)
 from infthor_eval.nieh.metrics import MetricError
 from infthor_eval.nieh.own_scorers import OwnScorer, OwnScores
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
@@ -158,13 +164,16 @@ class Rescoring:
         by_rule = scores(record.payload.reply, record.payload.answers)
         return replace(_with_scores(today, by_rule | own), failure=None)
 
+    def _left_out(self, task: NiehTaskConfig) -> list[str]:
+        return [metric for metric in task.metrics.names if metric not in self.names]
+
     def _report(self, records: Sequence[Record], judgement: Judgement | None) -> RescoringReport:
         before = {record.key: record.payload.scores for record in self.source.records}
         tasks = self.source.header.config.tasks
-        left_out = {
-            name: [metric for metric in task.metrics.names if metric not in self.names]
-            for name, task in tasks.items()
-        }
+        left_out = {name: self._left_out(task) for name, task in tasks.items()}
+        by_task: dict[str, list[Record]] = {name: [] for name in tasks}
+        for record in records:
+            by_task[record.task].append(record)
         n_scored = sum(bool(record.payload.scores) for record in records)
         return RescoringReport(
             n_scored=n_scored,
@@ -172,10 +181,7 @@ class Rescoring:
             n_failed=len(self.source.replied) - n_scored,
             n_missing=self.source.n_missing,
             left_out={task: names for task, names in left_out.items() if names},
-            tasks={
-                task: find_changes(before, [r for r in records if r.task == task], self.names)
-                for task in tasks
-            },
+            tasks={name: find_changes(before, by_task[name], self.names) for name in tasks},
             judge=judgement.agreement if judgement else None,
         )
 

@@ -99,12 +99,11 @@ def _by_form(records: Sequence[UnitRecord[NiehAnswer]], scorer: str) -> dict[str
         assert record.payload.guess is not None
         pair = record.payload.scores.get(scorer, 0.0), record.payload.guess.scores[scorer]
         by_form.setdefault(_form(record), []).append(pair)
-    return {
-        form: FormScore(
-            len(pairs), *(sum(column) / len(pairs) for column in zip(*pairs, strict=True))
-        )
-        for form, pairs in sorted(by_form.items())
-    }
+    scores = {}
+    for form, pairs in sorted(by_form.items()):
+        replied, guessed = zip(*pairs, strict=True)
+        scores[form] = FormScore(len(pairs), sum(replied) / len(pairs), sum(guessed) / len(pairs))
+    return scores
 
 
 def _form(record: UnitRecord[NiehAnswer]) -> str:

@@ -45,13 +45,15 @@ class Gain:
         """
         seeing = self.seeing.scores[self.metric]
         blind = self.blind.scores[self.metric]
-        clusters = [trajectory for trajectory, scores in seeing.items() for _ in scores]
+        clusters: list[str] = []
+        ours: list[float] = []
+        theirs: list[float] = []
+        for trajectory, scores in seeing.items():
+            clusters += [trajectory] * len(scores)
+            ours += scores
+            theirs += blind[trajectory]
         if not clusters:
             return None
-        ours, theirs = (
-            [score for trajectory in seeing for score in scores[trajectory]]
-            for scores in (seeing, blind)
-        )
         return paired_difference(theirs, ours, clusters).estimate
 
 

@@ -64,9 +64,7 @@ def summarise_memory(
         name=memory.name,
         privileged=memory.privileged,
         budget=read_budget(config.budget) if task.budget is None else task.budget,
-        n_frames=fmean(
-            sum(isinstance(item, int) for item in recall.recalled) for recall in recalls
-        ),
+        n_frames=fmean(recall.n_frames for recall in recalls),
         n_tokens=fmean(tokens) if tokens else None,
     )
 

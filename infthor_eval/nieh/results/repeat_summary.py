@@ -69,13 +69,14 @@ def mean_record(records: Sequence[Record]) -> Record:
     if len(records) == 1:
         return records[0]
     names = {name for record in records for name in record.payload.scores}
-    scores = {
-        name: fmean(record.payload.scores.get(name, 0.0) for record in records)
-        for name in sorted(names)
-    }
+    scores = {name: fmean(_scores(records, name)) for name in sorted(names)}
     failure = next((record.failure for record in records if record.failure is not None), None)
     payload = msgspec.structs.replace(records[0].payload, scores=scores)
     return msgspec.structs.replace(records[0], payload=payload, failure=failure)
+
+
+def _scores(records: Sequence[Record], metric: str) -> list[float]:
+    return [record.payload.scores.get(metric, 0.0) for record in records]
 
 
 def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> RepeatSummary | None:
@@ -83,12 +84,16 @@ def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> Rep
     n_repeats = max(map(len, questions), default=0)
     if n_repeats < 2:
         return None
-    scores = [[record.payload.scores.get(metric, 0.0) for record in same] for same in questions]
-    means = [fmean(of_question) for of_question in scores]
-    within = [variance(of_question) if len(of_question) > 1 else 0.0 for of_question in scores]
-    noise = [spread / len(of_question) for spread, of_question in zip(within, scores, strict=True)]
-    right = [sum(score >= 1 for score in of_question) for of_question in scores]
-    always = [count == len(of_question) for count, of_question in zip(right, scores, strict=True)]
+    means: list[float] = []
+    within: list[float] = []
+    noise: list[float] = []
+    shares_right: list[float] = []
+    for same in questions:
+        scores = _scores(same, metric)
+        means.append(fmean(scores))
+        within.append(variance(scores) if len(scores) > 1 else 0.0)
+        noise.append(within[-1] / len(scores))
+        shares_right.append(sum(score >= 1 for score in scores) / len(scores))
     votes = [_vote(same, metric) for same in questions]
     return RepeatSummary(
         n_repeats=n_repeats,
@@ -97,11 +102,9 @@ def summarise_repeats(questions: Sequence[Sequence[Record]], metric: str) -> Rep
         drawing=_NORMAL_95 * math.sqrt(sum(noise)) / len(questions),
         consensus=fmean(score for score, _ in votes),
         agreement=fmean(share for _, share in votes),
-        always=fmean(always),
-        sometimes=fmean(
-            0 < count < len(of_question) for count, of_question in zip(right, scores, strict=True)
-        ),
-        never=fmean(count == 0 for count in right),
+        always=fmean(share == 1 for share in shares_right),
+        sometimes=fmean(0 < share < 1 for share in shares_right),
+        never=fmean(share == 0 for share in shares_right),
         variance_within=fmean(within),
         variance_between=max(0.0, variance(means) - fmean(noise)) if len(means) > 1 else 0.0,
     )

@@ -172,10 +172,8 @@ def _rows_of(run: RunSummary) -> list[Row]:
 
 def _cells(task: TaskSummary, metric: str) -> list[str]:
     total = task.by_clues["total"]
-    by_clues, apart = (
-        [_mean_of(task.by_clues[name], metric) for name in names]
-        for names in (CLUE_COLUMNS[:-1], (OPEN_ENDED, ABSENCE))
-    )
+    by_clues = [_mean_of(task.by_clues[name], metric) for name in CLUE_COLUMNS[:-1]]
+    apart = [_mean_of(task.by_clues[name], metric) for name in (OPEN_ENDED, ABSENCE)]
     above = above_guessing_cell(task.above_guessing.get(metric))
     return [
         *by_clues,
@@ -209,8 +207,11 @@ def _mean_of(cell: Cell | None, metric: str) -> TableCell:
 
 
 def _range(low: float | None, high: float | None) -> TableCell:
-    low, high = (None if end is None else 100 * end for end in (low, high))
-    return interval_cell(low, high, pattern="{}–{}")
+    return interval_cell(_in_percent(low), _in_percent(high), pattern="{}–{}")
+
+
+def _in_percent(share: float | None) -> float | None:
+    return None if share is None else 100 * share
 
 
 def _published_rows(table: PublishedTable, runs: Sequence[RunSummary]) -> Iterator[Row]:
@@ -315,18 +316,17 @@ def _gains_table(runs: Sequence[RunSummary]) -> list[Table]:
 
 
 def _gain_cells(gain: Gain) -> tuple[str, ...]:
-    gains = {name: gain.in_column(name) for name in (*CLUE_COLUMNS, OPEN_ENDED, ABSENCE)}
-    points = {
-        name: "-" if value is None else f"{100 * value:+.2f}" for name, value in gains.items()
-    }
-    by_clues, apart = (
-        tuple(points[name] for name in names) for names in (CLUE_COLUMNS, (OPEN_ENDED, ABSENCE))
-    )
+    by_clues = [_points(gain.in_column(name)) for name in CLUE_COLUMNS]
+    apart = [_points(gain.in_column(name)) for name in (OPEN_ENDED, ABSENCE)]
     total = gain.total()
     # One trajectory alone tells nothing about others, and has no interval.
-    ends = (None, None) if total is None else (total.low, total.high)
-    low, high = (None if end is None else 100 * end for end in ends)
+    low = None if total is None else _in_percent(total.low)
+    high = None if total is None else _in_percent(total.high)
     return *by_clues, interval_cell(low, high, "+.2f"), *apart
+
+
+def _points(gain: float | None) -> str:
+    return "-" if gain is None else f"{100 * gain:+.2f}"
 
 
 # -- by depth
@@ -338,14 +338,13 @@ def _depth_table(runs: Sequence[RunSummary]) -> list[Table]:
     depths = sorted(variant for variant in variants if variant.startswith("depth="))
     if not depths:
         return []
-    rows = [
-        Row(
-            (run, name, metric, *(_mean_of(task.by_variant.get(depth), metric) for depth in depths))
-        )
-        for run, name, task in _tasks(runs)
-        if set(depths) & set(task.by_variant)
-        for metric in task.metrics
-    ]
+    rows = []
+    for run, name, task in _tasks(runs):
+        if not set(depths) & set(task.by_variant):
+            continue
+        for metric in task.metrics:
+            means = [_mean_of(task.by_variant.get(depth), metric) for depth in depths]
+            rows.append(Row((run, name, metric, *means)))
     columns = (*_NAMES, _METRIC, *map(Column, depths))
     return [Table("Accuracy, % by depth of the needle (questions)", columns, tuple(rows))]
 

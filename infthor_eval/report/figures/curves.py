@@ -41,11 +41,8 @@ def draw_curves(
 def curves_figure(curves: RewardCurves, panels: Sequence[Panel]) -> Figure:
     """Return a figure with a row per panel, with the bound in each, and a column for each facet
     that some run has."""
-    facets = {
-        name: facet
-        for name, facet in curves.facets.items()
-        if any(name in run.curves for run in curves.runs)
-    }
+    drawn = set().union(*(run.curves for run in curves.runs))
+    facets = {name: facet for name, facet in curves.facets.items() if name in drawn}
     width = len(facets) * (_PANEL[0] if len(facets) < 3 else _NARROW) + LEGEND
     height = max(_PANEL[1], _LINE * (len(curves.runs) + 1))
     figure = Figure(figsize=(width, len(panels) * height + _MARGIN), layout="constrained")

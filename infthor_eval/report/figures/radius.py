@@ -67,7 +67,8 @@ def _row(
 
 def radii_figure(success: SuccessByRadius) -> Figure:
     """Return a figure with a panel per kind."""
-    kinds = [kind for kind in ManipulationKind if any(line.kind == kind for line in success.lines)]
+    drawn = {line.kind for line in success.lines}
+    kinds = [kind for kind in ManipulationKind if kind in drawn]
     labels = list(dict.fromkeys(line.label for line in success.lines if not line.is_bound))
     looks = looks_of(labels) | {line.label: BOUND for line in success.lines if line.is_bound}
     width = len(kinds) * _PANEL[0] + LEGEND

@@ -12,7 +12,7 @@ from infthor_eval.errors import UsageError
 from infthor_eval.manipulation.recorded.curves import arm_curves
 from infthor_eval.manipulation.recorded.radii import success_by_radius
 from infthor_eval.manipulation.recorded.runs import ArmRun, label_by_radius
-from infthor_eval.manipulation.records import ArmRecord
+from infthor_eval.manipulation.records import ArmRecord, ArmStep
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.report.presenter import (
     Description,
@@ -187,14 +187,15 @@ class ManipulationPresenter(PlainPresenter):
 
     def steps(self, record: Record) -> list[StepRow]:
         """See `Presenter.steps`."""
-        return [
-            StepRow(
-                action=", ".join(str(call.get("action", "")) for call in step.calls),
-                reply=""
-                if step.delta is None
-                else " ".join(f"{value:+.3f}" for value in step.delta),
-                error="; ".join(step.refusals),
-                note=f"{step.distance:.3f} m off",
-            )
-            for step in record.payload.steps
-        ]
+        return [_step_row(step) for step in record.payload.steps]
+
+
+def _step_row(step: ArmStep) -> StepRow:
+    actions = [str(call.get("action", "")) for call in step.calls]
+    delta = [] if step.delta is None else [f"{value:+.3f}" for value in step.delta]
+    return StepRow(
+        action=", ".join(actions),
+        reply=" ".join(delta),
+        error="; ".join(step.refusals),
+        note=f"{step.distance:.3f} m off",
+    )

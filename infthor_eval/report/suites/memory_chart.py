@@ -94,13 +94,13 @@ def _chart(task: str, curves: dict[str, list[_Point]]) -> Chart:
         add_legend(axes, [(name, looks[name]) for name in curves])
         return figure
 
-    description = "; ".join(
-        f"{name} "
-        + ", ".join(
+    described = []
+    for name, points in curves.items():
+        texts = [
             f"{100 * point.score.mean:.1f} % at {point.n_tokens:,.0f} tokens" for point in points
-        )
-        for name, points in curves.items()
-    )
+        ]
+        described.append(f"{name} {', '.join(texts)}")
+    description = "; ".join(described)
     return Chart(
         f"{task}: accuracy by tokens of what a memory recalls", inline_svg(draw), description
     )

@@ -91,7 +91,8 @@ def _by_evidence(task: str, lines: Sequence[_Line]) -> Iterator[Chart]:
             yield _by_columns(
                 title, lines, SHOWN_CLUES, shown, "of the clue frames were shown (questions)"
             )
-        distances = [name for name in DISTANCES if any(name in far(line) for line in lines)]
+        known = set().union(*map(far, lines))
+        distances = [name for name in DISTANCES if name in known]
         if len(distances) > 1 and any(line.task.context != "clues" for line in lines):
             title = f"{of_file}: accuracy by distance of the last clue from the end"
             yield _by_columns(
@@ -189,11 +190,12 @@ def _describe(lines: Sequence[_Line]) -> str:
 def _gains_chart(runs: Sequence[ReportRun]) -> Chart | None:
     """Draw the gain of each run over blank frames, a row per task; None if no run on blank frames
     is among them."""
-    rows = [
-        (f"{name_of(gain.run)}, {gain.task}", total)
-        for gain in find_gains([run.summary for run in runs])
-        if gain.metric == main_metric(gain.seeing) and (total := gain.total()) is not None
-    ]
+    summaries = [run.summary for run in runs]
+    rows = []
+    for gain in find_gains(summaries):
+        total = gain.total()
+        if gain.metric == main_metric(gain.seeing) and total is not None:
+            rows.append((f"{name_of(gain.run)}, {gain.task}", total))
     return _by_rows("Gain over blank frames", rows, "gain, in points, and its 95 % interval")
 
 
@@ -242,11 +244,10 @@ def _by_rows(
 def _heat_map(run: ReportRun) -> Chart | None:
     """Draw accuracy by depth of the needle and size of the context; None if no task of the run has
     depths."""
-    tasks = {
-        int(run.tasks[name].dataset_kwargs.get("ctx_size") or 0): task
-        for name, task in run.summary.summary.tasks.items()
-        if any(variant.startswith(_DEPTH) for variant in task.by_variant)
-    }
+    tasks: dict[int, TaskSummary] = {}
+    for name, task in run.summary.summary.tasks.items():
+        if any(variant.startswith(_DEPTH) for variant in task.by_variant):
+            tasks[int(run.tasks[name].dataset_kwargs.get("ctx_size") or 0)] = task
     if not tasks:
         return None
     sizes = sorted(tasks)
@@ -254,9 +255,9 @@ def _heat_map(run: ReportRun) -> Chart | None:
     depths = sorted(
         {depth for task in tasks.values() for depth in task.by_variant if depth.startswith(_DEPTH)}
     )
-    means = [
-        [_percent(tasks[size].by_variant.get(depth), metric) for size in sizes] for depth in depths
-    ]
+    means = []
+    for depth in depths:
+        means.append([_percent(tasks[size].by_variant.get(depth), metric) for size in sizes])
 
     def draw() -> Figure:
         figure = Figure(

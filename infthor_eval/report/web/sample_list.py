@@ -82,16 +82,10 @@ def build_samples(
             )
         )
         progress.advance(_PROMPTS, run.label)
-    samples = [
-        _sample(
-            key,
-            sources,
-            records,
-            [pictures.get(key) for pictures, _ in replayed],
-            timelines.by_unit,
-        )
-        for key, records in records_by_unit(runs).items()
-    ]
+    samples = []
+    for key, records in records_by_unit(runs).items():
+        pictures = [of_run.get(key) for of_run, _ in replayed]
+        samples.append(_sample(key, sources, records, pictures, timelines.by_unit))
     notes = [*timelines.notes, *(note for _, notes in replayed for note in notes)]
     return SuiteSamples(samples, notes, timelines.facts)
 

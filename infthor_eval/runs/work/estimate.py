@@ -185,13 +185,11 @@ def estimate_tasks(
     excess = _first_unit_excess(measured, later)
     estimates = []
     for task in dict.fromkeys(unit.key.task for group in workload.groups for unit in group.units):
-        shares = [
-            (group, sum(unit.key.task == task for unit in group.units)) for group in workload.groups
-        ]
         total = Quantities()
         n_units = 0
         frames = 0
-        for group, n in shares:
+        for group in workload.groups:
+            n = sum(unit.key.task == task for unit in group.units)
             share = n / len(group.units)  # a group may have units of several tasks
             total = total.plus(excess(group), group.frames * share).plus(
                 later.get(task, later[""]), n

@@ -87,6 +87,10 @@ class _OpenEvaluator(Generic[U, P]):
         return _Evaluator(self.run, number)
 
 
+def _without_inputs(group: Group[U]) -> Group[Unit[Any]]:
+    return Group([unit.without_inputs() for unit in group.units], group.frames)
+
+
 class _Evaluator(Generic[U, P]):
     """A worker of a run; see `infthor_eval.workers.Worker`."""
 
@@ -99,10 +103,7 @@ class _Evaluator(Generic[U, P]):
     @property
     def greeting(self) -> _Greeting:
         workload = self._bound.evaluation.workload
-        groups = [
-            Group([unit.without_inputs() for unit in group.units], group.frames)
-            for group in workload.groups
-        ]
+        groups = [_without_inputs(group) for group in workload.groups]
         parts = (workload.skipped, workload.config, workload.costs, workload.warnings)
         return _Greeting(self._bound.header, Workload(groups, *parts))
 
