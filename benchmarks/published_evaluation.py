@@ -151,7 +151,7 @@ def _arguments(given: Sequence[str] | None = None) -> argparse.Namespace:
         "--step-seconds",
         type=float,
         default=0.024,
-        help="seconds of a step in the simulator; measured, benchmarks/README.md",
+        help="seconds of a step in the simulator; measured, benchmarks/plans.md",
     )
     work.add_argument("--haystack", default="8,32,128,512,1000", help="sizes in kilo-tokens, as in tasks/nieh/contexts")
     work.add_argument(
