@@ -14,8 +14,8 @@ def commands_of(workflow):
 
 
 def test_a_commit_is_checked_by_the_ruff_of_the_environment():
-    hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
-    (ruff,) = [repository for repository in hooks if repository["repo"].endswith("/ruff-pre-commit")]
+    sources = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())["repos"]
+    (ruff,) = [source for source in sources if source["repo"].endswith("/ruff-pre-commit")]
     (version,) = re.findall(r"^ruff==(\S+)$", (ROOT / "constraints.txt").read_text(), re.MULTILINE)
     assert ruff["rev"] == f"v{version}"
 

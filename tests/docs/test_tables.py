@@ -6,7 +6,8 @@ import pytest
 
 from .blocks import ROOT
 
-LONGER = {"docs/architecture.md", "docs/simulator.md", "docs/where-things-go.md"}  # one cell a thing
+# Lists of what there is, a row for each thing with all that is to be said of it.
+LONGER = {"docs/architecture.md", "docs/simulator.md", "docs/where-things-go.md"}
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
     for path in (ROOT / "README.md", *ROOT.glob("docs/**/*.md"), *ROOT.glob("benchmarks/*.md"))
