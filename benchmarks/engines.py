@@ -1,10 +1,10 @@
 """Race of the engines: the same questions on the same checkpoint, in transformers (ours) and vLLM,
 and in lm-eval.
 
-The checkpoint is a Qwen2.5-VL of 107 million random weights. The sets are `nieh_mini_full` (147
-questions on 6 trajectories) and a long trajectory of noise. Every way is run as a whole process on
-one question, and on more; their difference, by question, is what a further question takes.
-Processor time includes a server's and all threads'.
+The checkpoint is a Qwen2.5-VL of 107 million random weights. The sets are `nieh_mini_full` and a
+long trajectory of noise. Every way is run as a whole process on one question, and on more; their
+difference, by question, is what a further question takes. Processor time includes a server's and
+all threads'.
 
     make test-vllm                                  # once: the environment with vLLM
     .venv-vllm/bin/python benchmarks/engines.py --sets mini long --dtypes float32 --threads 1

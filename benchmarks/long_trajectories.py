@@ -4,8 +4,9 @@ a step costs.
 python benchmarks/long_trajectories.py [GROUP ...] [--data FOLDER] [--workers 2] [--out FOLDER]
 [--json]
 
-The groups are those of the table in benchmarks/README.md; without any, all are run (two hours of
-one core). The same command with the same --out resumes. Exit code 1 if a trajectory was not made.
+The groups are those of the table in benchmarks/generation.md; without any, all are run (two hours
+of one core). The same command with the same --out resumes. Exit code 1 if a trajectory was not
+made.
 """
 
 import argparse

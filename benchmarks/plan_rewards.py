@@ -1,5 +1,5 @@
 """Measure what the baselines of plans earn under each set of reward rules, as a table for
-docs/plan-rewards.md.
+benchmarks/plans.md.
 
     python benchmarks/plan_rewards.py [--more FILE] [--scenes FOLDER] [--out FOLDER]
 

@@ -205,7 +205,7 @@ def _arguments(given: Sequence[str] | None = None) -> argparse.Namespace:
         "--step-seconds",
         type=float,
         default=0.024,
-        help="seconds of a step in the simulator; measured, benchmarks/README.md",
+        help="seconds of a step in the simulator; measured, benchmarks/plans.md",
     )
     work.add_argument(
         "--haystack",

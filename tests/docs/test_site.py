@@ -136,7 +136,7 @@ def test_nothing_is_wider_than_a_window_of_1400_pixels(browser, site):
         if found := opened.evaluate(WIDER):
             wider[path.relative_to(site).as_posix()] = found
     assert wider == {}
-    opened.goto((site / "cost.html").as_uri())
+    opened.goto((site / "benchmarks" / "cost.html").as_uri())
     sizes = opened.locator("pre > code.columns").evaluate_all(
         "blocks => blocks.map(block => parseFloat(getComputedStyle(block).fontSize))"
     )
