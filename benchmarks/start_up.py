@@ -66,7 +66,7 @@ class _Stopwatch(MetaPathFinder, Loader):
     def exec_module(self, module: ModuleType) -> None:
         """Wrap the answerers once they are defined."""
         self._execute(module)
-        for answerer in (module.ModelAnswerer, module.BaselineAnswerer):
+        for answerer in (module.OpenModel, module.OpenBaseline):
             answerer.answer = self._timed(answerer.answer)
 
     def _timed(self, answer: Callable[..., Any]) -> Callable[..., Any]:

@@ -7,8 +7,8 @@ from typing import Any
 
 from infthor_eval.errors import DataError, InfthorError, ModelError, UsageError
 from infthor_eval.formats.nieh_set import NiehSet
+from infthor_eval.nieh.asking.answerers import Answerer, answerer_of
 from infthor_eval.nieh.asking.answering import answer_units
-from infthor_eval.nieh.asking.answering_models import AnsweringModel, OpenAnswerer, answering_model
 from infthor_eval.nieh.asking.baselines import Baseline
 from infthor_eval.nieh.asking.recalling import apply_recall
 from infthor_eval.nieh.config import NiehConfig, NiehTaskConfig
@@ -54,17 +54,17 @@ class NiehEvaluation:
 
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
-        model = answering_model(subject)
+        answerer = answerer_of(subject)
         _refuse_without_frames(subject, self._tasks)
         _refuse_without_sampling(subject, self._options)
-        tokens = self._tokens_per_frame(model)
+        tokens = self._tokens_per_frame(answerer)
         tasks = {task.name: task for task in self._tasks}
         prepared = {name: task.prepare(tokens) for name, task in tasks.items()}
         _refuse_empty([item.task_samples for item in prepared.values()], self._tasks)
-        open_answerer = model.fit(
+        answerer.fit(
             {name: partial(task.answer_key, prepared[name], tokens) for name, task in tasks.items()}
         )
-        costs = {name: model.cost(item) for name, item in prepared.items()}
+        costs = {name: answerer.cost(item) for name, item in prepared.items()}
         workload = Workload(
             groups=_groups(prepared, self._options.repeats),
             skipped=[
@@ -74,22 +74,22 @@ class NiehEvaluation:
             ],
             config=self._config(
                 {
-                    name: task.config(prepared[name], model.video_input)
+                    name: task.config(prepared[name], answerer.video_input)
                     for name, task in tasks.items()
                 },
                 tokens,
             ),
             costs=[Cost(name, cost) for name, cost in costs.items() if cost is not None],
         )
-        return BoundNieh(workload, prepared, open_answerer, model.video_input)
+        return BoundNieh(workload, prepared, answerer)
 
-    def _tokens_per_frame(self, model: AnsweringModel) -> int | None:
+    def _tokens_per_frame(self, answerer: Answerer) -> int | None:
         """Return the size of a frame where a context is measured in it: the option's value, or the
         subject's own."""
         measured = next((task for task in self._tasks if task.needs_size), None)
         if measured is None or self._options.tokens_per_frame is not None:
             return self._options.tokens_per_frame
-        return _measure_frame(measured.data, model)
+        return _measure_frame(measured.data, answerer)
 
     def _config(self, tasks: dict[str, NiehTaskConfig], tokens_per_frame: int | None) -> NiehConfig:
         options = self._options
@@ -159,10 +159,7 @@ class PreparedEvaluation:
 
     def bind(self, subject: Subject) -> "BoundNieh":
         """See `infthor_eval.runs.Evaluation.bind`."""
-        model = answering_model(subject)
-        return BoundNieh(
-            Workload(_groups(self._prepared)), self._prepared, model.fit({}), model.video_input
-        )
+        return BoundNieh(Workload(_groups(self._prepared)), self._prepared, answerer_of(subject))
 
 
 class BoundNieh:
@@ -172,21 +169,12 @@ class BoundNieh:
         self,
         workload: Workload[NiehUnit],
         prepared: Mapping[str, PreparedTask],
-        open_answerer: OpenAnswerer,
-        video_input: bool | None,
+        answerer: Answerer,
     ) -> None:
-        """Take the work and what does it.
-
-        Args:
-            workload: the work.
-            prepared: the tasks by name.
-            open_answerer: opens the answerer of a task on a trajectory.
-            video_input: whether the model is given films as videos (`AnsweringModel.video_input`).
-        """
+        """Take the work, the tasks by name, and what answers, fitted to their answer keys."""
         self.workload = workload
         self._prepared = prepared
-        self._open_answerer = open_answerer
-        self._video_input = video_input
+        self._answerer = answerer
 
     def run(
         self, group: Group[NiehUnit], session: Session[NiehAnswer]
@@ -194,7 +182,7 @@ class BoundNieh:
         """See `infthor_eval.runs.BoundEvaluation.run`."""
         task = group.units[0].key.task
         yield from answer_units(
-            group.units, self._prepared[task], self._open_answerer(task, session), session
+            group.units, self._prepared[task], self._answerer.open(task, session), session
         )
 
     def to_sample(self, record: UnitRecord[NiehAnswer]) -> UnitSample:
@@ -204,11 +192,14 @@ class BoundNieh:
         sample = prepared.task_samples.samples[number]
         if record.payload.recall is not None:
             sample = apply_recall(sample, record.payload.recall)
+        videos = bool(self._answerer.video_input)
         return UnitSample(
             number=number,
             doc=doc_of(prepared.task_samples, sample),
             target=doc_target(sample.question),
-            prompt=prompt_of(prepared.task_samples, sample, videos=bool(self._video_input)),
+            prompt=prompt_of(
+                prepared.task_samples, sample, videos=bool(self._answerer.video_input)
+            ),
             settings=prepared.generation_kwargs,
             reply=record.payload.reply or "",
         )
@@ -244,14 +235,14 @@ def _groups(prepared: Mapping[str, PreparedTask], repeats: int = 1) -> list[Grou
     return groups
 
 
-def _measure_frame(data: NiehSet, model: AnsweringModel) -> int:
+def _measure_frame(data: NiehSet, answerer: Answerer) -> int:
     """Return the subject's size of a frame, by the first frame of the questions that can be
     read."""
     problems: list[InfthorError] = []
     for question in data.questions:
         for frame in data.clue_frames(question):
             try:
-                return model.tokens_per_frame(frame)
+                return answerer.tokens_per_frame(frame)
             except (DataError, ModelError) as error:
                 problems.append(error)
     reasons = (

@@ -62,7 +62,7 @@ def print_modules(*_):
     print(*sorted(sys.modules), flush=True)
     os._exit(0)
 
-answering.ModelAnswerer.answer = answering.BaselineAnswerer.answer = print_modules
+answering.OpenModel.answer = answering.OpenBaseline.answer = print_modules
 main(sys.argv[1:])
 """
 AFTER_THE_QUESTIONS = {"lm_eval", "scipy.special"}  # for the results

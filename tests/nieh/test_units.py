@@ -4,7 +4,7 @@ waits for it."""
 import pytest
 
 from infthor_eval.nieh import units
-from infthor_eval.nieh.asking.answering import BaselineAnswerer
+from infthor_eval.nieh.asking.answering import OpenBaseline
 from infthor_eval.nieh.records import Guess
 from infthor_eval.runs import Unit, execute
 from infthor_eval.runs.work.binding import bind_run
@@ -19,10 +19,10 @@ class _Guesses(dict):
 def events(monkeypatch):
     """What happens, in order: a question is "asked", guesses are "learned"."""
     happened = []
-    answer = BaselineAnswerer.answer
+    answer = OpenBaseline.answer
     monkeypatch.setattr(units, "find_guesses", lambda *_: happened.append("learned") or _Guesses())
     monkeypatch.setattr(
-        BaselineAnswerer, "answer", lambda *given: happened.append("asked") or answer(*given)
+        OpenBaseline, "answer", lambda *given: happened.append("asked") or answer(*given)
     )
     return happened
 

@@ -42,7 +42,7 @@ from model_adapters import (
     wrap_request_errors,
 )
 
-__all__ = ["Answerer", "BaselineAnswerer", "ModelAnswerer", "answer_units", "request_fingerprint"]
+__all__ = ["OpenAnswerer", "OpenBaseline", "OpenModel", "answer_units", "request_fingerprint"]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class _UnitRequest:
     text: str
 
     @classmethod
-    def of(cls, unit: NiehUnit, prepared: PreparedTask, answerer: "Answerer") -> "_UnitRequest":
+    def of(cls, unit: NiehUnit, prepared: PreparedTask, answerer: "OpenAnswerer") -> "_UnitRequest":
         context, text = prepared.task_samples.request(unit.sample)
         return cls(unit, prepared, answerer.read(context), text)
 
@@ -103,8 +103,8 @@ class _UnitRequest:
         )
 
 
-class Answerer(Protocol):
-    """Gives the replies to units."""
+class OpenAnswerer(Protocol):
+    """Gives the replies to the units of a task on one trajectory."""
 
     @property
     def batch_size(self) -> int:
@@ -136,7 +136,7 @@ class Answerer(Protocol):
         """Return the usage of a reply."""
 
 
-class ModelAnswerer:
+class OpenModel:
     """A model with one conversation, so that units in the same context share what is encoded of
     it."""
 
@@ -153,11 +153,11 @@ class ModelAnswerer:
         self._context: tuple[Part, ...] | None = None
 
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
-        """See `Answerer`."""
+        """See `OpenAnswerer`."""
         return tuple(context if self._video_input else as_images(context))
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
-        """See `Answerer`."""
+        """See `OpenAnswerer`."""
         context = requests[0].context
         decoding = requests[0].decoding
         if self._person is not None:
@@ -183,11 +183,11 @@ class ModelAnswerer:
         self._conversation.rewind(self._after_context)
 
     def usage(self, reply: Reply) -> Usage:
-        """See `Answerer`."""
+        """See `OpenAnswerer`."""
         return Usage.of([reply])
 
 
-class BaselineAnswerer:
+class OpenBaseline:
     """A baseline, which reads no context and has no memory."""
 
     batch_size = 1
@@ -198,22 +198,22 @@ class BaselineAnswerer:
         self._predict = predict
 
     def read(self, context: Sequence[ContextPart]) -> tuple[Part, ...]:
-        """See `Answerer`."""
+        """See `OpenAnswerer`."""
         return tuple(context)
 
     def answer(self, requests: Sequence[_UnitRequest]) -> list[Reply]:
-        """See `Answerer`."""
+        """See `OpenAnswerer`."""
         return [Reply(self._predict(item.unit.sample)) for item in requests]
 
     def usage(self, reply: Reply) -> Usage:
-        """See `Answerer`."""
+        """See `OpenAnswerer`."""
         return NOTHING
 
 
 def answer_units(
     units: Sequence[NiehUnit],
     prepared: PreparedTask,
-    answerer: Answerer,
+    answerer: OpenAnswerer,
     session: Session[NiehAnswer],
 ) -> Iterator[UnitRecord[NiehAnswer]]:
     """Yield the records of units on one trajectory.
@@ -274,7 +274,7 @@ def _names_in(part: Part) -> list[str]:
 def _recall_all(
     units: Sequence[NiehUnit],
     prepared: PreparedTask,
-    answerer: Answerer,
+    answerer: OpenAnswerer,
     session: Session[NiehAnswer],
 ) -> list[tuple[NiehUnit, NiehUnit | Exception]]:
     """Return each unit with what its memory recalled, or why that failed; as they are if there is
@@ -304,7 +304,7 @@ def _recall(unit: NiehUnit, recaller: Recaller, prepared: PreparedTask) -> NiehU
 
 
 def _answer_in_batches(
-    requests: Sequence[_UnitRequest], answerer: Answerer, session: Session[NiehAnswer]
+    requests: Sequence[_UnitRequest], answerer: OpenAnswerer, session: Session[NiehAnswer]
 ) -> Iterator[UnitRecord[NiehAnswer]]:
     # A batch has the same requests when a run is resumed, as replies can differ by rounding with
     # those beside them.
@@ -340,7 +340,7 @@ def _find_record(
 
 def _answer(
     requests: Sequence[_UnitRequest],
-    answerer: Answerer,
+    answerer: OpenAnswerer,
     session: Session[NiehAnswer],
     faults: tuple[str, ...] = (),
 ) -> Iterator[UnitRecord[NiehAnswer]]:

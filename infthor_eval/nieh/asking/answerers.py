@@ -1,13 +1,12 @@
-"""What answers the questions of a run: a model through its conversation, or a baseline from the
-answer key."""
+"""What answers the questions of a run: a model by its conversations, or a baseline."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.nieh.asking.answering import Answerer, BaselineAnswerer, ModelAnswerer
-from infthor_eval.nieh.asking.baselines import Baseline
+from infthor_eval.nieh.asking.answering import OpenAnswerer, OpenBaseline, OpenModel
+from infthor_eval.nieh.asking.baselines import Baseline, Predict
 from infthor_eval.nieh.asking.budget import budget_of
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.records import NiehAnswer
@@ -15,17 +14,14 @@ from infthor_eval.nieh.task import PreparedTask
 from infthor_eval.runs import Session
 from model_adapters import Model, Subject
 
-__all__ = ["AnsweringModel", "OpenAnswerer", "answering_model"]
-
-# Opens what answers the questions of one task on one trajectory, given the task's name.
-OpenAnswerer = Callable[[str, Session[NiehAnswer]], Answerer]
+__all__ = ["Answerer", "answerer_of"]
 
 # Baselines read no frames; contexts that are measured in tokens are cut for them as for Qwen2.5-VL
 # (published count).
 _BASELINE_TOKENS_PER_FRAME = 121
 
 
-class AnsweringModel(Protocol):
+class Answerer(Protocol):
     """A subject that answers questions: a model or a baseline.
 
     Attributes:
@@ -45,12 +41,15 @@ class AnsweringModel(Protocol):
     def cost(self, prepared: PreparedTask) -> str | None:
         """Return the cost of a task in words, or None where it is not known."""
 
-    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
+    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
         """Fit the subject to the answer key of each task, given a function that finds the key;
         models need no key."""
 
+    def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
+        """Return what answers the questions of a task on one trajectory."""
 
-class _ConversationModel:
+
+class _ModelAnswerer:
     def __init__(self, model: Model) -> None:
         self._model = model
         self.video_input: bool | None = model.capabilities.video_input
@@ -65,32 +64,32 @@ class _ConversationModel:
         return tokens
 
     def cost(self, prepared: PreparedTask) -> str | None:
-        lines = (
-            [budget_of(prepared, self._model).description]
-            if self._model.capabilities.counts_tokens
-            else []
-        )
+        lines = []
+        if self._model.capabilities.counts_tokens:
+            lines.append(budget_of(prepared, self._model).description)
         if any(sample.awaits_recall for sample in prepared.task_samples.samples):
             lines.append("what a memory recalls for each question is not counted yet")
         if prepared.task_samples.shows_films:
-            name = self._model.name
-            as_video = "the film is given as a video"
             lines.append(
-                as_video
+                "the film is given as a video"
                 if self.video_input
-                else f"{name} has no video input, the film is given as images"
+                else f"{self._model.name} has no video input, the film is given as images"
             )
         return "; ".join(lines) or None
 
-    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
-        return lambda _, session: ModelAnswerer(self._model, session)
+    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
+        pass
+
+    def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
+        return OpenModel(self._model, session)
 
 
-class _BaselineModel:
+class _BaselineAnswerer:
     video_input: bool | None = None
 
     def __init__(self, baseline: Baseline) -> None:
         self._baseline = baseline
+        self._predictions: dict[str, Predict] = {}
 
     def tokens_per_frame(self, frame: FrameRef) -> int:
         return _BASELINE_TOKENS_PER_FRAME
@@ -98,20 +97,23 @@ class _BaselineModel:
     def cost(self, prepared: PreparedTask) -> str | None:
         return None
 
-    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> OpenAnswerer:
+    def fit(self, keys: Mapping[str, Callable[[], Sequence[Sample]]]) -> None:
         # Each task on its own: the questions of one task must be no clue to another.
-        predictions = {task: self._baseline.fit(find_key()) for task, find_key in keys.items()}
-        return lambda task, _: BaselineAnswerer(predictions[task])
+        for task, find_key in keys.items():
+            self._predictions[task] = self._baseline.fit(find_key())
+
+    def open(self, task: str, session: Session[NiehAnswer]) -> OpenAnswerer:
+        return OpenBaseline(self._predictions[task])
 
 
-def answering_model(subject: Subject) -> AnsweringModel:
-    """Return the answering model of a subject.
+def answerer_of(subject: Subject) -> Answerer:
+    """Return what answers questions for a subject.
 
     Raises:
         TypeError: the subject is neither a model nor a baseline; runs refuse it before.
     """
     if isinstance(subject, Baseline):
-        return _BaselineModel(subject)
+        return _BaselineAnswerer(subject)
     if isinstance(subject, Model):
-        return _ConversationModel(subject)
+        return _ModelAnswerer(subject)
     raise TypeError(f"{subject.name} is neither a model nor a baseline of NIEH")
