@@ -197,9 +197,7 @@ class BoundNieh:
             number=number,
             doc=doc_of(prepared.task_samples, sample),
             target=doc_target(sample.question),
-            prompt=prompt_of(
-                prepared.task_samples, sample, videos=bool(self._answerer.video_input)
-            ),
+            prompt=prompt_of(prepared.task_samples, sample, videos=videos),
             settings=prepared.generation_kwargs,
             reply=record.payload.reply or "",
         )
