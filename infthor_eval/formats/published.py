@@ -15,7 +15,7 @@ import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 __all__ = ["PublishedRow", "PublishedTable", "published_tables"]
 

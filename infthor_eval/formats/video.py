@@ -20,7 +20,7 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.reading import require_file
 from infthor_eval.storage.digests import digest_of_file
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 
 __all__ = ["FILM_FPS", "Video", "read_video", "sample_positions"]
 

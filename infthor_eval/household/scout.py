@@ -12,8 +12,7 @@ from typing import Any
 from infthor_eval.errors import SimulatorError
 from infthor_eval.household.navigation import Grid, GridPose
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
+from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector, teleport_call
 
 __all__ = [
     "CAMERA_HEIGHT",

@@ -11,10 +11,10 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import UsageError, UserCodeError, in_one_line, unknown_name, wrap_errors
-from infthor_eval.formats.pairs import read_pairs
 from infthor_eval.memory.protocol import Memory
 from infthor_eval.plugins import PluginTable
 from model_adapters.adapter_identity import package_identity
+from model_adapters.options.parsing import read_pairs
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
 
 __all__ = [

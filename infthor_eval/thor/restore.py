@@ -13,8 +13,7 @@ from infthor_eval.formats.object_ids import modern_type
 from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.thor.axes import modern_rotation
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
+from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
 __all__ = ["RestoreReport", "restore"]
 

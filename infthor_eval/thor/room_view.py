@@ -9,8 +9,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
+from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
 __all__ = ["find_room_view"]
 

@@ -10,8 +10,7 @@ from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.floor_plans import write_floor_plan
 from infthor_eval.thor.room_view import find_room_view
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import SimulatorView, Vector
+from infthor_eval.thor.view import SimulatorView, Vector, teleport_call
 
 __all__ = ["dump_scene", "scene_pictures"]
 

@@ -15,9 +15,8 @@ from typing import Any, Self
 from infthor_eval.errors import SceneError, SimulatorError
 from infthor_eval.thor.controller import SafeController
 from infthor_eval.thor.launch import Launch
-from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.transport import PeerFault
-from infthor_eval.thor.view import SimulatorView, view_of
+from infthor_eval.thor.view import SimulatorView, teleport_call, view_of
 
 __all__ = ["Simulator", "SimulatorMark"]
 

@@ -1,4 +1,4 @@
-"""Typed metadata that the simulator reports after an action."""
+"""Typed metadata that the simulator reports after an action, and the call back to a pose."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import msgspec
 import numpy as np
 from msgspec import UNSET, UnsetType
+from msgspec.structs import asdict
 from numpy.typing import NDArray
 
 from infthor_eval.errors import SimulatorError, in_one_line
@@ -21,6 +22,7 @@ __all__ = [
     "ThorObject",
     "Vector",
     "instances_of",
+    "teleport_call",
     "view_of",
 ]
 
@@ -287,3 +289,16 @@ def _instances(event: Any) -> dict[str, Instance] | None:
         for code, instance in instances.items()
         if code in names and "|" in names[code]
     }
+
+
+def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:
+    """Return the 5.x call that teleports the agent to a pose; unless forced, it may be refused for
+    a collision."""
+    call: dict[str, Any] = {
+        "action": "TeleportFull",
+        "position": asdict(pose.position),
+        "rotation": {"x": 0.0, "y": pose.rotation, "z": 0.0},
+        "horizon": pose.horizon,
+        "forceAction": force,
+    }
+    return call if pose.standing is None else {**call, "standing": pose.standing}

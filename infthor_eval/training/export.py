@@ -8,9 +8,9 @@ from torch.distributed.tensor import DTensor
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.object_ids import Words
+from model_adapters.hf.global_settings import hide_transformers_output
 from model_adapters.hf.loading.card import WORDS
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
-from model_adapters.hf.loading.quiet import hide_transformers_output
 from model_adapters.hf.loading.tower_names import with_published_names
 
 __all__ = ["export", "gather_weights"]

@@ -22,9 +22,8 @@ from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.checkpoints import Checkpoints
 from infthor_eval.training.context_parallel import context_parallel
 from infthor_eval.training.encoding import TrainingSequence
-from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.network import SequenceModel
-from infthor_eval.training.ranks import Ranks
+from infthor_eval.training.ranks import Ranks, sum_gradients
 from infthor_eval.training.schedule import LoopSettings
 
 __all__ = ["Loop", "LoopSettings", "Progress"]

@@ -10,7 +10,7 @@ import msgspec
 from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.training.nano.settings import NanoRecipe
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Workers as processes of this machine."""
+"""Workers as processes of this machine, each with a share of its threads and GPUs."""
 
 import os
 import signal
@@ -6,10 +6,10 @@ import sys
 from collections.abc import Iterator
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
-from infthor_eval.workers.devices import limit_devices
 from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
 
@@ -19,6 +19,9 @@ _STOP = "stop"
 _EXIT_WAIT_S = 10.0  # for a process to end
 # Spawned, not forked: a fork of a process with threads, a GPU or a simulator does not work.
 _SPAWN = get_context("spawn")
+_VISIBLE = "CUDA_VISIBLE_DEVICES"
+_THREADS = "OMP_NUM_THREADS"
+_DRIVER = Path("/proc/driver/nvidia/gpus")
 
 
 def processes(open_worker: OpenWorker, count: int) -> Connect:
@@ -116,7 +119,7 @@ def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
         signal.SIGINT, signal.SIG_IGN
     )  # a terminal sends Ctrl-C to all processes; the driver decides
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    limit_devices(number, count)  # before imports that read them only once
+    _limit_devices(number, count)  # before imports that read them only once
     Thread(target=_end_with_driver, daemon=True).start()
     try:
         host = WorkerHost(connection.recv(), number)
@@ -169,3 +172,23 @@ def _end_with_driver() -> None:
     if parent is not None:
         wait([parent.sentinel])
         os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _visible_gpus() -> list[str]:
+    """Return the GPUs that this process may use, as CUDA names them, without torch, which would
+    occupy them."""
+    visible = os.environ.get(_VISIBLE)
+    if visible is not None:
+        return [name.strip() for name in visible.split(",") if name.strip()]
+    return (
+        [str(number) for number in range(len(list(_DRIVER.iterdir())))] if _DRIVER.is_dir() else []
+    )
+
+
+def _limit_devices(number: int, count: int) -> None:
+    """Limit this process to the share of a worker (from 1) of `count`; a number of threads already
+    set is kept."""
+    os.environ.setdefault(_THREADS, str(max(1, (os.cpu_count() or 1) // count)))
+    all_gpus = _visible_gpus()
+    if all_gpus and count > 1:
+        os.environ[_VISIBLE] = ",".join(all_gpus[(number - 1) % len(all_gpus) :: count])

@@ -1,4 +1,4 @@
-"""Building blocks that the checks of models and of policies share."""
+"""What the checks share: clauses, their error, and the questions that are asked."""
 
 import json
 import tempfile
@@ -10,16 +10,26 @@ from typing import Any, Generic, Protocol
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.protocols import Conversation, Model, Policy
+from model_adapters.protocols import Conversation, Decoding, Model, Part, Policy, Reply
 
 __all__ = [
+    "GREEDY",
+    "NEW_TOKENS",
+    "QUESTION",
     "ContractError",
+    "ask",
     "check_identity",
     "check_members",
     "frames_of_one_colour",
     "raises",
     "require",
+    "same_reply",
+    "start_conversation",
 ]
+
+NEW_TOKENS = 8
+GREEDY = Decoding(max_new_tokens=NEW_TOKENS)
+QUESTION = "\nQuestion: What do you see? Answer with a single word."
 
 
 class ContractError(AssertionError):
@@ -94,3 +104,20 @@ def _require_members(instance: object, protocol: type) -> None:
         not missing,
         f"{type(instance).__name__} lacks a member of {protocol.__name__}: {', '.join(missing)}",
     )
+
+
+def start_conversation(model: Model, *parts: Part) -> Conversation:
+    """Return a new conversation with a user turn of these parts."""
+    conversation = model.conversation()
+    conversation.append(*parts)
+    return conversation
+
+
+def ask(model: Model, *parts: Part, decoding: Decoding = GREEDY) -> Reply:
+    """Return the reply to a user turn of these parts in a new conversation."""
+    return start_conversation(model, *parts).reply(decoding)
+
+
+def same_reply(one: Reply, other: Reply) -> bool:
+    """Return whether text and token ids of two replies are equal."""
+    return (one.text, one.token_ids) == (other.text, other.token_ids)

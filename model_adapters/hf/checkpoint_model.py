@@ -8,10 +8,10 @@ import torch
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
+from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.limits import wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Piece, Prompter, n_tokens
-from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 

@@ -18,7 +18,7 @@ import transformers
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.digests import digest
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 from model_adapters.hf.loading.checkpoint import (
     origin,
     resolve_device,

@@ -6,8 +6,7 @@ import threading
 import time
 from dataclasses import dataclass
 
-from model_adapters.attended import Notice
-from model_adapters.protocols import Decoding, Turn
+from model_adapters.protocols import Decoding, Notice, Turn
 
 __all__ = ["Answer", "Asked", "Desk", "Question", "StaleError"]
 

@@ -5,12 +5,11 @@ from contextlib import ExitStack
 from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.attended import Notice
 from model_adapters.backend import BackendConversation
+from model_adapters.human.adapter import HumanOptions
 from model_adapters.human.desk import Asked, Desk
-from model_adapters.human.options import HumanOptions
 from model_adapters.human.serving import serve_desk
-from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn
+from model_adapters.protocols import Capabilities, Conversation, Decoding, Notice, Reply, Turn
 from model_adapters.stopping import cut_at_stop
 
 __all__ = ["HumanModel"]

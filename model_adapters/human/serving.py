@@ -14,8 +14,8 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
 from infthor_eval.pages.server import file_route, serve_pages
+from model_adapters.human.adapter import HumanOptions
 from model_adapters.human.desk import Answer, Desk, StaleError
-from model_adapters.human.options import HumanOptions
 from model_adapters.human.view import frames_of, state_of
 
 __all__ = ["desk_routes", "serve_desk"]

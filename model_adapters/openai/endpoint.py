@@ -12,8 +12,8 @@ import openai
 
 from infthor_eval.errors import ModelError, in_one_line
 from model_adapters.openai.options import OpenAIOptions
-from model_adapters.openai.rate import RateLimiter
 from model_adapters.openai.secret import Secret
+from model_adapters.openai.spend import RateLimiter
 from model_adapters.openai.wire import UnreadableError, Wire
 
 __all__ = ["Endpoint"]

@@ -1,15 +1,15 @@
-"""Parsing of an adapter's options from the `k=v` strings of the command line."""
+"""Parsing of options from the `k=v` strings of the command line."""
 
 import dataclasses
 import difflib
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["NoOptions", "describe", "parse"]
+__all__ = ["NoOptions", "describe", "parse", "read_pairs"]
 
 _LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -68,3 +68,20 @@ def _value(name: str, hint: Any, text: str) -> Any:
     except (KeyError, ValueError) as error:
         expected = "true or false" if convert is bool else convert.__name__
         raise ValueError(f"option {name}={text} is not {expected}") from error
+
+
+def read_pairs(items: Iterable[str], option: str) -> dict[str, str]:
+    """Return keys and values written as `k=v`; messages name the option that they belong to.
+
+    Raises:
+        UsageError: an item is not `k=v`, or a key is given twice.
+    """
+    pairs: dict[str, str] = {}
+    for item in filter(None, (part.strip() for part in items)):
+        key, equals, value = item.partition("=")
+        if not equals or not key.strip():
+            raise UsageError(f"{option}: {item!r} is not of the form key=value")
+        if key.strip() in pairs:
+            raise UsageError(f"{option}: {key.strip()!r} is given twice")
+        pairs[key.strip()] = value.strip()
+    return pairs

@@ -12,13 +12,13 @@ from model_adapters.hf.cached.decoding import ReplyState, decode_replies
 from model_adapters.hf.cached.prefix import Prefix
 from model_adapters.hf.cached.replies import begin_reply, end_reply
 from model_adapters.hf.checkpoint_model import HfModel
+from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import take_length_rope
 from model_adapters.hf.prompting.embedding import Embedder
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Piece, n_common, n_tokens, token_ids
-from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Decoding, Reply, Turn
 

@@ -6,19 +6,25 @@ Two frames of a video take 144 tokens together, all of a video between two marke
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
 import torch
 from PIL import Image
 
+from infthor_eval.storage.folders import packaged_folder
 from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.families.qwen_video import QwenVideo
 from model_adapters.hf.family import ClipShape, Shape, Size
-from model_adapters.options.families import Qwen25VLOptions
+from model_adapters.options.checkpoints import CheckpointOptions
+from model_adapters.options.families import Qwen25VLNanoOptions, Qwen25VLOptions
 
-__all__ = ["Qwen25VL", "Qwen25VLFamily"]
+__all__ = ["NANO_FOLDER", "Qwen25VL", "Qwen25VLFamily", "Qwen25VLNano"]
+
+NANO_FOLDER = "models/qwen2.5-vl-nano"
 
 
 class Qwen25VLFamily(PlainFamily):
@@ -116,3 +122,21 @@ class Qwen25VL(CheckpointAdapter):
     Options = Qwen25VLOptions
     family = Qwen25VLFamily
     model_types = ("qwen2_5_vl",)
+
+
+class Qwen25VLNano(CheckpointAdapter):
+    """The adapter `qwen2.5-vl-nano`."""
+
+    Options = Qwen25VLNanoOptions
+    family = Qwen25VLFamily
+    model_types = ("qwen2_5_vl",)
+
+    @classmethod
+    def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:
+        """Load the checkpoint of the package, or another one of the same form.
+
+        Raises:
+            ModelError: the checkpoint cannot be loaded.
+        """
+        pretrained = options.pretrained or str(packaged_folder(NANO_FOLDER))
+        return super().build(name, replace(options, pretrained=pretrained), seed)

@@ -23,10 +23,10 @@ from infthor_eval.formats.reading import require_plain_files
 from infthor_eval.storage.digests import digest, digest_of_files
 from model_adapters.hf.cached.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
+from model_adapters.hf.global_settings import hide_transformers_output
 from model_adapters.hf.loading.card import read_card_words
 from model_adapters.hf.loading.hub import fetch
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
-from model_adapters.hf.loading.quiet import hide_transformers_output
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.hf.prompting.templates import chat_template, plain_template
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading, Placement

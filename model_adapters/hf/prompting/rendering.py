@@ -10,8 +10,12 @@ from jinja2 import TemplateError
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
-from model_adapters.hf.prompting.memory_limit import OutOfMemoryError, limit_memory
-from model_adapters.hf.prompting.time_limit import OutOfTimeError, limit_time
+from model_adapters.hf.prompting.template_limits import (
+    OutOfMemoryError,
+    OutOfTimeError,
+    limit_memory,
+    limit_time,
+)
 from model_adapters.protocols import Part, Turn, Video
 
 __all__ = ["Marks", "prompt_end", "render", "starts_with_bos", "writes_videos"]
