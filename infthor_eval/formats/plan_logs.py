@@ -27,9 +27,8 @@ __all__ = ["LoggedPlans", "PlanCount", "PlanLog", "is_plan_log", "read_plan_log"
 
 _PUBLISHED_NAME = re.compile(r"eval_longhrz_checkpoints_(?P<model>.+?)_?\.log(?:\.gz)?$")
 _HINT = "give a log of the published scripts, with the counts of a trajectory's plans a line"
-_Number = Annotated[
-    int, msgspec.Meta(ge=0, le=10_000)
-]  # each plan becomes a record; a task has a few
+# Each plan becomes a record; a task has a few.
+_Number = Annotated[int, msgspec.Meta(ge=0, le=10_000)]
 
 
 class PlanCount(NamedTuple):

@@ -19,9 +19,8 @@ from infthor_eval.storage.folders import packaged_folder
 
 __all__ = ["PublishedRow", "PublishedTable", "published_tables"]
 
-_SAME_SIZE = (
-    0.1  # relative tolerance: counts of one model differ with its heads and tied embeddings
-)
+# Relative tolerance: counts of one model differ with its heads and tied embeddings.
+_SAME_SIZE = 0.1
 
 
 class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

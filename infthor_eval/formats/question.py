@@ -84,9 +84,8 @@ class Question:
     def id(self) -> str:
         """Name of the question, which does not depend on the order of the file: `<traj_id>/<12 hex
         digits>`, or qid."""
-        if (
-            self.published and self.published.qid
-        ):  # a few published questions are there twice, under two names
+        # A few published questions are there twice, under two names.
+        if self.published and self.published.qid:
             return self.published.qid
         key = repr((self.text, self.clues, self.answers))
         return f"{self.traj_id}/{digest(key, 6)}"

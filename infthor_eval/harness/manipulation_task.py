@@ -39,8 +39,7 @@ def dataset(**config: Any) -> dict[str, Any]:
     if not model_takes_references():
         raise UsageError(
             "arms are driven in a simulator, which infthor-eval's policies alone do; use --model "
-            "infthor"
-            " --model_args adapter=openvla"
+            "infthor --model_args adapter=openvla"
         )
     doc = settings_doc("manipulation", config, ArmTaskSettings, ManipulationOptions)
     units = ManipulationEvaluation(task_request(doc, "dataset", ManipulationOptions, {}, 0)).units

@@ -72,9 +72,8 @@ class InfthorLM(LM):
                 f"{adapter} is a baseline, not a model; run it with infthor-eval --model {adapter}"
             )
         given = {key: str(value) for key, value in options.items()}
-        batch = str(
-            batch_size
-        )  # "auto" means nothing to our models, and 1 is what lm-eval gives by default
+        # "auto" means nothing to our models, and 1 is what lm-eval gives by default.
+        batch = str(batch_size)
         theirs = {
             "device": None if device == _DEFAULT_DEVICE else device,
             "batch_size": batch if batch.isdigit() and int(batch) > 1 else None,

@@ -49,9 +49,8 @@ MOVABLE_RECEPTACLES = _types(_TABLES["movable_receptacles"])
 GOALS_BY_ROOM: dict[str, frozenset[str]] = {
     name: frozenset(rooms) for name, rooms in _TABLES["goals_by_room"].items()
 }
-KNOWN_TYPES = STOWABLE.union(
-    _HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"}
-)  # all types in tasks
+# All types in tasks.
+KNOWN_TYPES = STOWABLE.union(_HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"})
 MAX_PLAN_STEPS: int = _TABLES["planner_max_steps"]
 
 _INSIDE = frozenset(

@@ -18,9 +18,8 @@ from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["is_feasible", "plan", "relevant_items"]
 
-_LIMIT = (
-    60_000  # states of a search; the hardest of the solvable problems tried needed a quarter of it
-)
+# States of a search; the hardest of the solvable problems tried needed a quarter of it.
+_LIMIT = 60_000
 
 
 def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:

@@ -30,15 +30,13 @@ _REACH = 1.5  # the simulator's visibility distance, metres
 _SIDEWAYS = 32.0  # maximum angle from the camera's axis, degrees; half the field of view is 30
 _TOO_NEAR = 0.5  # metres; closer, a door may hit the agent, and an object fills the frame
 _MAX_TRIALS = 30
-_EXTRA_TRIALS = (
-    4  # trials after the first success, for a viewpoint with the object well inside the frame
-)
+# Trials after the first success, for a viewpoint with the object well inside the frame.
+_EXTRA_TRIALS = 4
 # margin and width of the frame, pixels
 _MARGIN = 15
 _SIDE = 300
-_NO_IMAGE: dict[str, Any] = {
-    "renderImage": False
-}  # the instance image is enough to tell what is in the frame
+# The instance image is enough to tell what is in the frame.
+_NO_IMAGE: dict[str, Any] = {"renderImage": False}
 
 
 @dataclass(frozen=True)

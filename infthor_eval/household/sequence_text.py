@@ -95,8 +95,7 @@ def _published_plan(high: HighAction) -> str:
         missing = "place" if template == _PLANS["GotoLocation"] else "object"
         raise DataError(
             f"sub-goal {high.high_idx} ({kind:.40}) names no {missing}, which the published words "
-            "need; take"
-            " --words natural"
+            "need; take --words natural"
         )
     return template.format(*needed)
 

@@ -29,9 +29,8 @@ class TaskType(StrEnum):
     PUT_AWAY = "put object"
 
 
-SAMPLED = tuple(
-    item for item in TaskType if item != TaskType.PUT_AWAY
-)  # those that a task is drawn from: ALFRED's
+# Those that a task is drawn from: ALFRED's.
+SAMPLED = tuple(item for item in TaskType if item != TaskType.PUT_AWAY)
 
 
 class Task(msgspec.Struct, frozen=True):

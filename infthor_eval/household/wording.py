@@ -11,14 +11,8 @@ __all__ = ["canonical_type", "compact_name", "noun", "object_type", "plural", "w
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
 _LETTERS = {"CD": "CD", "TVStand": "TV stand", "Television": "television"}
-_BARE = {
-    "blinds",
-    "boots",
-    "bread",
-    "curtains",
-    "lettuce",
-    "toilet paper",
-}  # plural, or not counted
+# Plural, or not counted.
+_BARE = {"blinds", "boots", "bread", "curtains", "lettuce", "toilet paper"}
 _IRREGULAR = {
     "knife": "knives",
     "butter knife": "butter knives",

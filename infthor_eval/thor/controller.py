@@ -59,9 +59,8 @@ class SafeController(ai2thor.controller.Controller):
             # ai2thor raises the same classes for a scene and for a build that does not exist.
             self.stop()
             message = " ".join(str(error).split())[:300]
-            if (
-                "no build exists" in message
-            ):  # its message also if the download server cannot be reached
+            # Its message also if the download server cannot be reached.
+            if "no build exists" in message:
                 raise SimulatorError(
                     "AI2-THOR's Unity build is not installed and cannot be downloaded; go online "
                     "once, or name an executable"
@@ -117,9 +116,8 @@ class SafeController(ai2thor.controller.Controller):
     def unity_command(self, width: int, height: int, headless: bool) -> list[str]:
         """Return the command line of the simulator."""
         if self._folder is not None:
-            self.gpu_device = (
-                None  # for a GPU number ai2thor would run vulkaninfo, which many machines lack
-            )
+            # For a GPU number ai2thor would run vulkaninfo, which many machines lack.
+            self.gpu_device = None
         return super().unity_command(width, height, headless)
 
     def _build_server(self, host: str, port: int, width: int, height: int) -> None:

@@ -9,12 +9,8 @@ from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["MissingObjectError", "degrees_of", "translate"]
 
-_TURNS = {
-    "RotateLeft": 90.0,
-    "RotateRight": 90.0,
-    "LookUp": 30.0,
-    "LookDown": 30.0,
-}  # default angles of 2.1.0, degrees
+# Default angles of 2.1.0, degrees.
+_TURNS = {"RotateLeft": 90.0, "RotateRight": 90.0, "LookUp": 30.0, "LookDown": 30.0}
 
 
 class MissingObjectError(LookupError):

@@ -57,9 +57,8 @@ def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
     Raises:
         SimulatorError: the simulator fails.
     """
-    for key in _objects_to_slice(
-        simulator.view, target
-    ):  # first, so that the slices exist when objects are moved
+    # First, so that the slices exist when objects are moved.
+    for key in _objects_to_slice(simulator.view, target):
         simulator.step("SliceObject", objectId=key, forceAction=True)
     for call in _door_calls(simulator.view, target):
         simulator.step(**call)
@@ -97,9 +96,8 @@ def _door_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[
         item = current.objects.get(key)
         if item is None or not goal.openable or item.openness == goal.openness:
             continue
-        if (
-            item.is_toggled and goal.is_open
-        ):  # a running appliance cannot be opened; `_STATES` switches it on again
+        # A running appliance cannot be opened; `_STATES` switches it on again.
+        if item.is_toggled and goal.is_open:
             yield {"action": "ToggleObjectOff", "objectId": key, "forceAction": True}
         if item.is_open:  # AI2-THOR changes `openness` only of closed objects
             yield {"action": "CloseObject", "objectId": key, "forceAction": True}

@@ -17,9 +17,8 @@ from model_adapters.hf.prompting.prompt import Frame
 __all__ = ["PARTS", "SequenceModel", "decay_groups", "freeze", "next_labels", "parameters_by_part"]
 
 PARTS = ("vision", "embeddings", "decoder", "head")
-_FRAME_BATCH = (
-    32  # frames in the vision tower at once; 1,000 frames would need more memory than the decoder
-)
+# Frames in the vision tower at once; 1,000 frames would need more memory than the decoder.
+_FRAME_BATCH = 32
 _LOGIT_ROWS = 1024  # rows of logits at once; each has as many values as the vocabulary
 
 

@@ -44,9 +44,8 @@ def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) ->
     context, text = task.request(sample)
     if sample.awaits_recall:
         raise UsageError("training has no memory; use another context")
-    return encoder.answer(
-        name, [*as_images(context), text], doc_target(sample.question)
-    )  # it has no video input
+    # It has no video input.
+    return encoder.answer(name, [*as_images(context), text], doc_target(sample.question))
 
 
 def _name(question: str, variant: str) -> str:

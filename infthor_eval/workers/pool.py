@@ -120,9 +120,8 @@ class Pool:
         self._accept = accept
         self._jobs = _JobQueue()
         self._events: SimpleQueue[Event | _JobEnded | Exception] = SimpleQueue()
-        self._ready: SimpleQueue[Any] = (
-            SimpleQueue()
-        )  # greetings; an exception once no worker can be opened
+        # Greetings; an exception once no worker can be opened.
+        self._ready: SimpleQueue[Any] = SimpleQueue()
         self._max_losses = _MAX_LOSSES
         self._losses: Counter[int] = Counter()  # by job, since its last new result
         self._n_results: Counter[int] = Counter()  # by job, most of all its workers
@@ -234,9 +233,8 @@ class Pool:
                 greeting = link.open()
             except WorkerLostError as error:
                 reason = error
-            except (
-                InfthorError
-            ) as error:  # it says why it cannot be created: another try would end the same way
+            except InfthorError as error:
+                # It says why it cannot be created: another try would end the same way.
                 reason = error
                 break
             else:
@@ -258,9 +256,8 @@ class Pool:
             job, create = taken
             try:
                 for count, result in enumerate(link.do(create()), 1):
-                    if (
-                        count > self._n_results[job]
-                    ):  # results that another worker gave before are no progress
+                    # Results that another worker gave before are no progress.
+                    if count > self._n_results[job]:
                         self._n_results[job] = count
                         self._losses.pop(job, None)
                     self._events.put(JobResult(number, job, result))

@@ -37,9 +37,8 @@ class ProcessLink:
         self._number = number
         self._count = count
         self._changing = Lock()  # one thread opens the link, another closes it
-        self._process: Any = (
-            None  # of multiprocessing's spawn context, whose class has no public name
-        )
+        # Of multiprocessing's spawn context, whose class has no public name.
+        self._process: Any = None
         self._connection: Connection[Any, Any] | None = None
 
     def open(self) -> Any:
@@ -115,9 +114,8 @@ class ProcessLink:
 def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
     """Run a worker's process: create the worker that it is sent, and do jobs until the driver is
     gone."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # a terminal sends Ctrl-C to all processes; the driver decides
+    # A terminal sends Ctrl-C to all processes; the driver decides.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     _limit_devices(number, count)  # before imports that read them only once
     Thread(target=_end_with_driver, daemon=True).start()

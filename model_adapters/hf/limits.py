@@ -61,9 +61,8 @@ def wrap_memory_errors(name: str, n_context: int) -> Iterator[None]:
     try:
         yield
     except (RuntimeError, MemoryError) as error:
-        traceback.clear_frames(
-            error.__traceback__
-        )  # its local variables hold the request's cache and activations
+        # Its local variables hold the request's cache and activations.
+        traceback.clear_frames(error.__traceback__)
         # torch has its own exception for GPUs only; on the CPU, only the allocator's name
         # identifies the error.
         cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)

@@ -46,9 +46,8 @@ def decode_greedily(
                 f"action token {place + 1} has no finite score (NaN); try dtype=float32"
             )
         token = int(scores.argmax()) + (allowed.start if constrained else 0)
-        ids.append(
-            min(max(token, allowed.start), allowed.stop - 1)
-        )  # the model is fed the token without clipping
+        # The model is fed the token without clipping.
+        ids.append(min(max(token, allowed.start), allowed.stop - 1))
         if place + 1 < len(action_ids):
             logits = step(token)
     return ids

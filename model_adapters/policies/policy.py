@@ -111,9 +111,8 @@ class VlaPolicy:
             image = frame.load()
             chunk = self._network.predict(image, instruction, constrained=self._options.constrained)
             actions = self._statistics.unnormalise(chunk)
-            arm_deltas(
-                self.name, actions
-            )  # refuses a bad chunk before it is averaged into later steps
+            # Refuses a bad chunk before it is averaged into later steps.
+            arm_deltas(self.name, actions)
             steps = self._ensemble.step(actions) if self._options.ensemble == "exp" else actions
             return arm_deltas(self.name, steps[: self._options.execute])
 

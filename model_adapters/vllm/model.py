@@ -20,12 +20,8 @@ __all__ = ["VllmModel"]
 
 _BATCH = 64  # continuations per call; vLLM decides how many of them it runs together
 _SEEDS = 2**63  # number of seeds of torch's generators
-_META_KEYS = (
-    "device",
-    "dtype",
-    "attn_implementation",
-    "quantization",
-)  # of the meta model, which does not run
+# Of the meta model, which does not run.
+_META_KEYS = ("device", "dtype", "attn_implementation", "quantization")
 
 
 class VllmModel(CheckpointModel):
@@ -53,9 +49,8 @@ class VllmModel(CheckpointModel):
         self._max_frames = max_frames
         # vLLM also ends a reply at the tokenizer's end token.
         self._ends = loaded.generation.end_ids | ({loaded.tokenizer.eos_token_id} - {None})
-        self._images: dict[
-            str, Image.Image
-        ] = {}  # frames of the last requests, by the digest of the file
+        # Frames of the last requests, by the digest of the file.
+        self._images: dict[str, Image.Image] = {}
         self._last_prompt: Sequence[Piece] = ()
 
     @property
@@ -159,9 +154,8 @@ class VllmModel(CheckpointModel):
             )
 
     def _settings(self, decoding: Decoding) -> dict[str, Any]:
-        read_choices(
-            self._loaded.tokenizer, decoding
-        )  # refuses choices that are longer than the reply may be
+        # Refuses choices that are longer than the reply may be.
+        read_choices(self._loaded.tokenizer, decoding)
         own = self._loaded.generation.repetition_penalty
         asked = decoding.repetition_penalty
         settings: dict[str, Any] = {

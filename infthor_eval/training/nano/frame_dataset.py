@@ -82,9 +82,8 @@ def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDa
     types = sorted({_type(key) for _, step in entries for key in step.seen or ()})
     labels = [_labels(step.seen or {}, types, frame.size) for frame, step in entries]
     cells, shown, present = (torch.stack(parts) for parts in zip(*labels, strict=True))
-    with ThreadPoolExecutor(
-        _READER_THREADS
-    ) as readers:  # decoding and resizing release the interpreter lock
+    # Decoding and resizing release the interpreter lock.
+    with ThreadPoolExecutor(_READER_THREADS) as readers:
         pixels = torch.stack(
             list(readers.map(lambda entry: _patches(entry[0], image_processor), entries))
         )

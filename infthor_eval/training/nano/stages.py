@@ -90,9 +90,8 @@ def train_small_model(
     trainer.run("text", recipe.text_steps, trainer.text_step)
     trainer.run("joint", recipe.joint_steps, trainer.joint_step)
     network.eval()
-    loaded.model.to(
-        torch.bfloat16
-    )  # halves the file; no answer of the bundled model depends on the rounding
+    # Halves the file; no answer of the bundled model depends on the rounding.
+    loaded.model.to(torch.bfloat16)
     return loaded
 
 

@@ -35,9 +35,8 @@ class _Branches:
         vocabulary)."""
         logits: dict[int, torch.Tensor] = {}
         for group in self._groups(continuations, chunk_tokens):
-            logits |= self._forward(
-                group
-            )  # the last chunk of a branch has the logits of its next token
+            # The last chunk of a branch has the logits of its next token.
+            logits |= self._forward(group)
         return torch.stack([logits[branch] for branch in range(len(continuations))])
 
     def _groups(

@@ -43,12 +43,10 @@ class BranchAttention:
     def __init__(self, config: Any, n_prefix: int, device: torch.device) -> None:
         self._config = config
         self._n_prefix = n_prefix
-        self._branches = torch.empty(
-            0, dtype=torch.long, device=device
-        )  # branch of each token behind the prefix
-        self._places = torch.empty(
-            0, dtype=torch.long, device=device
-        )  # place of each in prefix and branch
+        # Branch of each token behind the prefix.
+        self._branches = torch.empty(0, dtype=torch.long, device=device)
+        # Place of each in prefix and branch.
+        self._places = torch.empty(0, dtype=torch.long, device=device)
         self._n_new = 0
         self._masks: dict[tuple[int | None, torch.device], Tensor] = {}
         self._n_calls = 0

@@ -165,9 +165,8 @@ class ReplyState:
         penalty."""
         if self._penalised_ids is None:
             return logits
-        self._penalised_ids = self._penalised_ids.to(
-            logits.device
-        )  # copied once, then extended on the device
+        # Copied once, then extended on the device.
+        self._penalised_ids = self._penalised_ids.to(logits.device)
         penalty = RepetitionPenaltyLogitsProcessor(self._penalty)
         return penalty(cast(Any, self._penalised_ids), cast(Any, logits[None]))[0]
 

@@ -26,9 +26,8 @@ class _Allocation:
     memory beside their successors until Python's cyclic garbage collector runs.
     """
 
-    storage: (
-        torch.device | None
-    )  # device of the buffers; the device of the layers' weights where None
+    # Device of the buffers; the device of the layers' weights where None.
+    storage: torch.device | None
     capacity: int = 0  # tokens that a buffer holds when it is next allocated
 
 

@@ -59,9 +59,8 @@ class Prefix:
         self._cache = BufferedCache(self._storage)
         self._pieces: list[Piece] = []
         self._ends: list[int] = []  # tokens up to the end of each piece
-        self._starts: list[int] = [
-            0
-        ]  # position behind everything before each piece, and of the next token
+        # Position behind everything before each piece, and of the next token.
+        self._starts: list[int] = [0]
 
     @property
     def n_tokens(self) -> int:

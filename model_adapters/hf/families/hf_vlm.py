@@ -46,10 +46,8 @@ from model_adapters.protocols import Model, Part, Turn
 
 __all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor", "require_same_ids"]
 
-_TOLERANCE = {
-    torch.float32: 1e-3,
-    torch.float64: 1e-3,
-}  # relative to the largest logit; more in half precision
+# Relative to the largest logit; more in half precision.
+_TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}
 _HALF_TOLERANCE = 0.1
 _BLANK = (300, 300)  # width and height of a sample image
 

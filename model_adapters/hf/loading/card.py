@@ -26,12 +26,9 @@ def read_card_words(folder: Path) -> str | None:
         return None
     try:
         metadata = yaml.safe_load("\n".join(lines[1 : lines.index(_DASHES, 1)]))
-    except (
-        yaml.YAMLError,
-        RecursionError,
-        ValueError,
-        TypeError,
-    ):  # the last two: of dates and keys that are none
-        return None  # a card of somebody else, which need not be ours to read
+    except (yaml.YAMLError, RecursionError, ValueError, TypeError):
+        # The last two: of dates and keys that are none. A card of somebody else need not be ours to
+        # read.
+        return None
     words = metadata.get(WORDS) if isinstance(metadata, dict) else None
     return words if isinstance(words, str) else None

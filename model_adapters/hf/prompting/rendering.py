@@ -145,11 +145,8 @@ def _message(turn: Turn) -> dict[str, Any]:
 
 def _item(part: Part) -> dict[str, str]:
     if isinstance(part, str):
-        return {
-            "type": "text",
-            "text": part,
-            "content": part,
-        }  # most templates read "text", a few "content"
+        # Most templates read "text", a few "content".
+        return {"type": "text", "text": part, "content": part}
     return {"type": "video" if isinstance(part, Video) else "image"}
 
 

@@ -13,9 +13,8 @@ __all__ = ["OutOfMemoryError", "OutOfTimeError", "limit_memory", "limit_time"]
 
 _SIZE = Path("/proc/self/statm")  # its first number is the process's address space in pages
 _MB = 1024 * 1024
-_LOCK = (
-    Lock()
-)  # of two nested limits, the second would restore the first as if it were the original
+# Of two nested limits, the second would restore the first as if it were the original.
+_LOCK = Lock()
 
 
 class OutOfMemoryError(Exception):

@@ -10,11 +10,8 @@ from model_adapters.policies.preprocessing import normalise
 __all__ = ["Ego3DEmbedding", "back_project", "estimate_depth"]
 
 _HALF = (0.5, 0.5, 0.5)
-_CENTRE = (
-    0.0,
-    0.0,
-    2.0,
-)  # metres; the point in front of the camera that coordinates are relative to
+# Metres; the point in front of the camera that coordinates are relative to.
+_CENTRE = (0.0, 0.0, 2.0)
 _REACH = 2.0  # metres; coordinates are divided by it
 
 

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
-from model_adapters.openai import spend as spend_module
 from model_adapters.openai.spend import Caps, Prices, RateLimiter, Spend
 
 
@@ -102,10 +101,8 @@ def test_threads_pass_a_cap_by_one_request_at_most() -> None:
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """A clock that waiting turns on; its one item is the time."""
     now = [100.0]
-    monkeypatch.setattr(spend_module.time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(
-        spend_module.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds)
-    )
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
     return now
 
 
