@@ -25,8 +25,7 @@ def name_in_file(name: str) -> str:
 
 
 def load_from_file(name: str, kind: str = "class") -> Any:
-    """Run the file, once for each version of its content, and return what it defines under that
-    name.
+    """Run the file, once for each version of its content; return what has that name in it.
 
     The file cannot import its neighbours: code of several files has to be a package.
 
@@ -49,8 +48,7 @@ def load_from_file(name: str, kind: str = "class") -> Any:
 
 
 def file_identity(name: str) -> dict[str, Any]:
-    """Return the file's name and a digest of its content, as JSON values; its folder does not
-    matter.
+    """Return the file's name and its content's digest, as JSON values, whatever its folder.
 
     Raises:
         ModelError: the file cannot be read.

@@ -255,8 +255,7 @@ class Subject(Protocol):
         """Capabilities; of a policy's only `deterministic` and `max_in_flight` are used."""
 
     def identity(self) -> dict[str, Any]:
-        """Return everything that can change a result, as JSON values; equal identities give equal
-        results."""
+        """Return all that can change a result, as JSON values; equal ones give equal results."""
 
     def close(self) -> None:
         """Free all memory; the subject cannot be used afterwards."""
@@ -317,8 +316,7 @@ class Policy(Subject, Protocol):
 
 
 class Adapter(Protocol):
-    """An adapter class: its options, a dataclass with defaults, and a method that builds the
-    model."""
+    """An adapter class: its options, a dataclass with defaults, and how the model is built."""
 
     Options: ClassVar[type]
 
@@ -358,5 +356,4 @@ class Attended(Model, Protocol):
     """A model that is a person at a page."""
 
     def tell(self, notice: Notice) -> None:
-        """Take what is to be shown with the next request, and with those after it until the next
-        notice."""
+        """Take what is shown with the next request, and those after it until the next notice."""

@@ -108,8 +108,7 @@ def check_options(name: str, options: Mapping[str, str]) -> None:
 
 
 def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
-    """Build the model or the policy of this name, and check that it has all members of its
-    protocol.
+    """Build the model or policy of this name, and check that it has its protocol's members.
 
     Args:
         name: one of `names()`, or FILE.py:CLASS.

@@ -25,17 +25,16 @@ class Transcript:
         return self.turns_with(())
 
     def turns_with(self, continuation: Sequence[Part]) -> tuple[Turn, ...]:
-        """Return the turns as if these parts had been appended by the user; the conversation is
-        unchanged.
+        """Return the turns as if the user had appended these parts, which changes nothing.
 
         Raises:
             TypeError: a part is neither text, frame reference nor video.
         """
         items = [item for item in (*self._items, *_items(continuation, "user")) if item[1] != ""]
-        return tuple(
-            Turn(role, tuple(_join_texts(part for _, part in run)))
-            for role, run in groupby(items, lambda item: item[0])
-        )
+        turns = []
+        for role, run in groupby(items, lambda item: item[0]):
+            turns.append(Turn(role, tuple(_join_texts(part for _, part in run))))
+        return tuple(turns)
 
     def append(self, *parts: Part, role: Role = "user") -> None:
         """Add parts at the end: all of them, or none if one is invalid.
@@ -69,8 +68,7 @@ class Transcript:
     def replies(
         self: Conversation, continuations: Sequence[Sequence[Part]], decoding: Decoding
     ) -> list[Reply]:
-        """Append, reply and rewind, one continuation after the other; see
-        `Conversation.replies`."""
+        """Append, reply and rewind, continuation by continuation; see `Conversation.replies`."""
         here = self.mark()
         replies = []
         for parts in continuations:

@@ -27,8 +27,7 @@ class _Log(msgspec.Struct):
 
 
 def read_action_log(path: Path, places: Mapping[str, int]) -> dict[int, tuple[int, ...]]:
-    """Return the frames of each low-level action that has any; `places` are their positions by the
-    stem of the file.
+    """Return the frames of each low-level action that has any; `places` are positions by file stem.
 
     Raises:
         DataError: the file is missing, has another form, or names frames that are not in `places`.
@@ -41,8 +40,7 @@ def read_action_log(path: Path, places: Mapping[str, int]) -> dict[int, tuple[in
 
 
 def logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] | None:
-    """Return the frames, by their position, of each low-level action by the step log; None if it
-    does not say.
+    """Return each low-level action's frames, by position, from the step log; None if it has none.
 
     As in the published loader, frames of action 0 are left out with those before the first action:
     both have 0 there.

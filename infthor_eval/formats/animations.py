@@ -37,8 +37,7 @@ def require_animation_name(path: Path) -> None:
 
 
 def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    """Write pictures as an animation, atomically, and return their number; only one at a time is in
-    memory.
+    """Write pictures as an animation, atomically; return their number. One at a time is in memory.
 
     Args:
         path: the file; its suffix is one of `ANIMATION_FORMATS`.
@@ -64,8 +63,7 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
 
 
 def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    """Write a GIF whose pictures share one palette: with one each, what does not move would change
-    its colours."""
+    """Write a GIF with one palette: a palette each would change colours of what does not move."""
     counts = np.zeros((4, _SHADES**3))
     kept = []
     # All of them are needed before the first is written.
@@ -84,8 +82,7 @@ def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -
 
 
 def _count_colours(picture: Image.Image) -> NDArray[np.float64]:
-    """Return number, and sums of red, green and blue, of the pixels in each of `_SHADES`³ cubes of
-    colours: [4, n]."""
+    """Return number and sums of red, green and blue of the pixels in `_SHADES`³ cubes: [4, n]."""
     pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(np.int64)
     cubes = pixels * _SHADES // 256 @ (_SHADES**2, _SHADES, 1)
     weights = (None, *pixels.T)

@@ -93,8 +93,7 @@ def write_floor_plan(
 def _layout_files(
     root: Path, scene: str, objects: Sequence[dict[str, Any]], cells: Sequence[tuple[float, float]]
 ) -> dict[Path, bytes]:
-    """Return the content of a floor plan's small files: its reachable cells, and its object
-    types."""
+    """Return the content of a floor plan's small files: reachable cells, and object types."""
     array = io.BytesIO()
     np.save(array, np.array(cells, dtype=np.float64).reshape(-1, 2))
     types = sorted({item["objectType"] for item in objects})

@@ -94,8 +94,7 @@ class NiehSet:
 
     @cached_property
     def rows(self) -> tuple[Question | SkippedQuestion, ...]:
-        """All questions in the order of the files, as `SkippedQuestion` where they cannot be
-        asked."""
+        """All questions in the files' order, as `SkippedQuestion` where they cannot be asked."""
         rows: list[Question | SkippedQuestion] = []
         seen = set()
         for question in chain.from_iterable(self.files.values()):
@@ -128,8 +127,7 @@ class NiehSet:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of the questions, the step logs, and the names and sizes of the frames (hex, 32
-        characters)."""
+        """Hash of questions, step logs, and names and sizes of the frames (hex, 32 characters)."""
         # Not the content of frames, which would mean reading all of it: a record has the digests of
         # its own frames.
         digest = hashlib.blake2b(digest_size=16)

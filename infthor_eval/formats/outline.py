@@ -1,5 +1,4 @@
-"""Goals, actions and states of a trajectory, which some contexts show beside its frames; read from
-its JSON.
+"""Goals, actions and states of a trajectory, from its JSON, which some contexts show beside frames.
 
 Only these fields are required, so that the reduced files of the published evaluation can be read.
 """

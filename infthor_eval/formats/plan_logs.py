@@ -1,5 +1,4 @@
-"""Logs of the published scripts on final long-horizon tasks: counts of plans, a trajectory a line
-(`.gz` too).
+"""Logs of the published scripts on final tasks: counts of plans, a trajectory a line (`.gz` too).
 
     {"traj_id": "floorplan7_12_471_1744791924", "metric": {"total_count": 4, "success_count": 1,
     "goto_count": 2,
@@ -77,8 +76,7 @@ class PlanLog:
 
     @property
     def model(self) -> str | None:
-        """Checkpoint and extension of its context, as a published name has them; None if the log
-        has another name."""
+        """Checkpoint and context extension, as published names have them; None for other names."""
         name = _PUBLISHED_NAME.match(self.path.name)
         return name["model"] if name else None
 

@@ -1,5 +1,4 @@
-"""Numbers that the authors published, as data: `results/published/*.yaml`. A new table is a new
-file.
+"""Numbers that the authors published, as data: `results/published/*.yaml`, a file for each table.
 
 A row is compared with a run if the run's checkpoint has one of the row's names and about as many
 parameters. The name alone is not enough: one adapter runs a 3B and a 7B checkpoint, and a local

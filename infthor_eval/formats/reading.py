@@ -117,8 +117,7 @@ def read_json(path: Path, hint: str, form: Any = Any) -> Any:
 
 
 def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
-    """Yield number (from 1) and content of the lines of a file that are not empty; a `.gz` file is
-    unpacked.
+    """Yield number (from 1) and content of the lines of a file (`.gz` too) that are not empty.
 
     Raises:
         DataError: it is not a file, damaged, or a line or the whole file exceeds its limit.
@@ -146,8 +145,7 @@ def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
 
 
 def json_value(text: bytes) -> Any:
-    """Return the value of a JSON text of others, with NaN where it has it, but without lone
-    surrogates.
+    """Return the value of a JSON text of others, NaN where it has it, without lone surrogates.
 
     Python's decoder lets these through, and no file could hold what is made of them.
 

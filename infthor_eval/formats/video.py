@@ -61,8 +61,7 @@ class Video:
 
 
 def sample_positions(n_frames: int, film_fps: float, fps: float) -> tuple[int, ...]:
-    """Return the positions of the frames that are sampled from a film, ascending, as qwen-vl-utils
-    chooses them.
+    """Return the positions of the frames sampled from a film, ascending, as by qwen-vl-utils.
 
     There are `n_frames / film_fps * fps` of them, at least 4 and at most 768, rounded down to an
     even number, and evenly spread from the first frame to the last. Of a film of one frame, which

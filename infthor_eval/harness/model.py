@@ -1,5 +1,4 @@
-"""Our models under lm-eval's own command: `lm-eval run --model infthor --model_args
-adapter=qwen2.5-vl-tiny,...`."""
+"""Our models under lm-eval's command: `lm-eval run --model infthor --model_args adapter=...`."""
 
 from collections.abc import Hashable, Sequence
 from contextlib import closing
@@ -101,8 +100,7 @@ class InfthorLM(LM):
         return {"model_source": NAME, "model_name": self._model.name}
 
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
-        """Return one response per request; empty if the model could not answer (the journal has the
-        reason).
+        """Return a response per request; empty without an answer (the journal has the reason).
 
         Raises:
             UsageError: the model lacks what a suite needs.

@@ -1,5 +1,4 @@
-"""NIEH in lm-eval: the functions behind the task files in `tasks/nieh/`, and the adapter of their
-requests.
+"""NIEH in lm-eval: functions of the task files in `tasks/nieh/`, and the adapter of its requests.
 
 A request is a question. The functions are those of our own runs, in lm-eval's forms.
 """

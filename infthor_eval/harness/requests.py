@@ -23,8 +23,7 @@ class RequestAdapter(Protocol[U, P]):
     def prepare(
         self, task: str, docs: Sequence[Doc], generation_kwargs: Mapping[str, Any], seed: int
     ) -> Evaluation[U, P]:
-        """Set up the evaluation of a task's docs (at least one); units that belong to none of them
-        are not done."""
+        """Set up the evaluation of a task's docs (at least one), without other docs' units."""
 
     def doc_id(self, doc: Doc) -> Hashable:
         """Return the id of a doc, unique among those of its task."""

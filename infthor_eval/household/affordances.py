@@ -38,7 +38,9 @@ def _types(names: Iterable[str]) -> frozenset[str]:
 _HOLDS = {receptacle: _types(names) for receptacle, names in _TABLES["receptacle_holds"].items()}
 _ACTIONS = {action: _types(names) for action, names in _TABLES["action_objects"].items()}
 
-CLEANABLE, COOLABLE, HEATABLE = (_ACTIONS[name] for name in ("Cleanable", "Coolable", "Heatable"))
+CLEANABLE = _ACTIONS["Cleanable"]
+COOLABLE = _ACTIONS["Coolable"]
+HEATABLE = _ACTIONS["Heatable"]
 STOWABLE = frozenset[str]().union(*_HOLDS.values())  # types with at least one receptacle
 # Without the egg of the published table: a sliced egg is cracked and leaves nothing that could be
 # put anywhere.
@@ -70,8 +72,7 @@ _INSIDE = frozenset(
 
 
 def goes_into(item: str, receptacle: str) -> bool:
-    """Return True if the published table has object type `item` for receptacle type
-    `receptacle`."""
+    """Return True if the published table has object type `item` for type `receptacle`."""
     return item in _HOLDS.get(receptacle, frozenset())
 
 

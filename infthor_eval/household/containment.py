@@ -11,8 +11,7 @@ __all__ = ["contents_of", "direct_parent", "is_in", "logged_parent"]
 
 
 def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str]:
-    """Return the ids of all objects in or on a receptacle, including those in or on its
-    contents."""
+    """Return the ids of all objects in or on a receptacle, including those in its contents."""
     contents: set[str] = set()
     new = {holder}
     while new:
@@ -43,8 +42,7 @@ def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
 
 
 def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:
-    """Return the id of the innermost receptacle that an object is in or on, possibly the floor;
-    None if there is none.
+    """Return the id of an object's innermost receptacle, possibly the floor; None if it has none.
 
     If several qualify, it is the smallest: planning needs one place even where the report is
     ambiguous.
@@ -71,12 +69,10 @@ def logged_parent(state: ObjectState, world: Mapping[str, ObjectState]) -> str |
         return None
     parents = [key for key in state.parents if key in world and world[key].type != "Floor"]
     # The innermost one is inside all others. Basins are inside their sinks.
-    innermost = [
-        key
-        for key in parents
-        if all(_within(world, key, other) for other in parents if other != key)
-    ]
-    return innermost[0] if innermost else None
+    for key in parents:
+        if all(_within(world, key, other) for other in parents if other != key):
+            return key
+    return None
 
 
 def _volume(item: ThorObject) -> float:

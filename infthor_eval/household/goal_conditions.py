@@ -25,8 +25,7 @@ class GoalConditions(NamedTuple):
 
 
 def goal_conditions(task: Task, view: SimulatorView, treatments: Treatments) -> GoalConditions:
-    """Return the conditions of a task's goal in the current state, given what was washed, heated
-    and cooled."""
+    """Return the conditions of a task's goal now, given what was washed, heated and cooled."""
     types = {key: item.object_type for key, item in view.objects.items()}
     parents = dict(room_of(view).start.where)
     items = {key for key, object_type in types.items() if object_type in task.targets}

@@ -30,8 +30,7 @@ _APPLIANCES = {
 
 
 def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:
-    """Return all tasks that are possible with a room's objects, in a fixed order, which seeded
-    sampling relies on.
+    """Return all tasks possible with a room's objects, in a fixed order, for seeded sampling.
 
     `extra_types` are the types of the objects that are neither items nor places (faucets).
     """

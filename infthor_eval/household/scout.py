@@ -119,8 +119,7 @@ def _is_well_inside(view: SimulatorView, item: str) -> bool:
 
 
 def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels: int) -> bool:
-    """Open a receptacle and close it; return True if the object in it was visible and closing
-    succeeded."""
+    """Open and close a receptacle; return True if the object in it was seen and it closed."""
     view = simulator.query("OpenObject", objectId=holder, **_NO_IMAGE)
     if not view.success:
         return False
@@ -139,8 +138,7 @@ def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels:
 def _candidates(
     view: SimulatorView, grid: Grid, focus: ThorObject, distances: dict[GridPose, int]
 ) -> Iterator[Viewpoint]:
-    """Yield viewpoints from which the object should be in the frame, those with the fewest actions
-    first."""
+    """Yield viewpoints with the object in the frame, those with the fewest actions first."""
     box = focus.axis_aligned_bounding_box
     target = focus.position if box is None else box.center
     eye = view.agent.position.y + CAMERA_HEIGHT

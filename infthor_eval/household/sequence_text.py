@@ -177,8 +177,7 @@ def action_part(action: str) -> str:
 
 
 def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
-    """Return the whole trajectory as text, from its replay's log; of several frames of an action
-    the last counts.
+    """Return the trajectory as text, from its replay's log; of an action's frames the last counts.
 
     The words are the published ones. A sub-goal or action that has none keeps its natural words, so
     that a trajectory is never without its text.

@@ -15,8 +15,7 @@ _SURROUNDINGS = frozenset({"Floor", "Wall", "Ceiling"})
 
 
 def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
-    """Return the summaries after the low-level actions with some indices, from a log with the
-    fields of a replay."""
+    """Return summaries after the low-level actions of some indices, from the log of a replay."""
     known: dict[str, tuple[ObjectState, str | None]] = {}
     summaries: dict[int, str] = {}
     for step, world in zip(steps, iter_object_states(steps), strict=True):

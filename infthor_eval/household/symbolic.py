@@ -1,5 +1,4 @@
-"""A room as the planner sees it: where the items are, what was done to them, and where the agent
-is.
+"""A room as the planner sees it: where items are, what was done to them, and where the agent is.
 
 A *place* is what the agent can go to: a piece of furniture, a lamp, or an item on the floor. An
 *item* can be carried. Slices are items that start to exist when the whole is sliced; every task
@@ -72,8 +71,7 @@ class SymbolicRoom:
     refused: frozenset[tuple[str, str]] = frozenset()
 
     def place_of(self, item: str, where: dict[str, str]) -> str | None:
-        """Return the place where an item or receptacle can be reached, or None if it is held or
-        does not exist."""
+        """Return where an item or receptacle can be reached, or None if it is held or absent."""
         seen = set()  # in case objects are reported to be inside each other
         while item not in self.places:
             if item in seen or item not in where or where[item] == ABSENT:
@@ -85,8 +83,7 @@ class SymbolicRoom:
         return item
 
     def fits(self, item: str, receptacle: str) -> bool:
-        """Return True if a receptacle is made for an item's type and is not known to have no room
-        for it."""
+        """Return True if a receptacle is made for an item's type and not known to be full."""
         usual = receptacle in self.receptacles and goes_into(
             self.types[item], self.types[receptacle]
         )

@@ -1,5 +1,4 @@
-"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one of
-them."""
+"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one."""
 
 from enum import StrEnum
 from typing import Any
@@ -16,8 +15,7 @@ __all__ = ["SAMPLED", "Task", "TaskType", "sub_task", "task_of"]
 
 
 class TaskType(StrEnum):
-    """ALFRED's task types, and PUT_AWAY of the published generator, by their names in
-    trajectories."""
+    """ALFRED's task types, and the published generator's PUT_AWAY, by their trajectories' names."""
 
     PLACE = "pick_and_place_simple"
     PLACE_TWO = "pick_two_obj_and_place"

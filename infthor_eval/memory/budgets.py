@@ -31,8 +31,7 @@ def check_recalled(
     budget: int | None,
     tokens_per_frame: int | None,
 ) -> None:
-    """Check that what a memory recalled may be shown: texts, and steps that it has observed, within
-    its budget.
+    """Check what a memory recalled: texts, and steps that it observed, within its budget.
 
     Raises:
         ModelError: it may not; the message names the memory.

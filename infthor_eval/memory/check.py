@@ -32,8 +32,7 @@ _CLUES = (3, 9)
 
 
 def check_memory(memory: Memory) -> Iterator[CheckResult]:
-    """Yield the result of each check: a memory observes two short trajectories of plain frames, and
-    is asked on them.
+    """Yield each check's result: a memory observes two short trajectories, and is asked on them.
 
     A model that it may ask answers with the number of frames it was given.
     """

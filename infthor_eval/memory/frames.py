@@ -64,8 +64,7 @@ class FrameMemory(ABC):
 
 
 class Last(FrameMemory):
-    """The last frames before the current view: recency alone, what a window of so many tokens
-    holds."""
+    """The last frames before the current view: recency alone, a window of so many tokens."""
 
     def choose(self, query: Query, n_frames: int) -> Sequence[int]:
         """See `FrameMemory`."""
@@ -89,8 +88,7 @@ class Random(FrameMemory):
 
 
 class Oracle(FrameMemory):
-    """The clue frames, and others drawn until the frames are as many as other memories recall: the
-    upper bound.
+    """The clue frames, and others drawn until as many as of other memories: the upper bound.
 
     Of more clues than there is room for, those at even distances among them are shown. A question
     without evidence (an absence) has drawn frames alone.

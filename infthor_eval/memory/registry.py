@@ -1,5 +1,4 @@
-"""Memories by name: those built in, those of other packages (entry points), and classes in a user's
-own file."""
+"""Memories by name: built in, of other packages (entry points), and classes in a user's file."""
 
 import inspect
 import typing
@@ -28,9 +27,9 @@ __all__ = [
     "wrap_memory_errors",
 ]
 
-_FRAMES, _RETRIEVAL, _TEXTS = (
-    f"infthor_eval.memory.{module}" for module in ("frames", "retrieval", "texts")
-)
+_FRAMES = "infthor_eval.memory.frames"
+_RETRIEVAL = "infthor_eval.memory.retrieval"
+_TEXTS = "infthor_eval.memory.texts"
 MEMORIES = PluginTable(
     "memory",
     "infthor_eval.memories",

@@ -1,5 +1,4 @@
-"""Memories that recall texts: what an exact observer would write down, and the model's own
-notes."""
+"""Memories that recall texts: an exact observer's log, and the model's own notes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
@@ -41,8 +40,7 @@ class _Texts:
 
 
 class TextLog(_Texts):
-    """A log that an exact observer would write: each goal and action, and the objects seen, from
-    the metadata.
+    """An exact observer's log: each goal and action, and objects seen, from the metadata.
 
     A line says what is new: the types that come into view, what is open, in the hand, and in or on
     what is seen. Of a log beyond the budget the last lines are recalled.
@@ -95,8 +93,7 @@ class Notes(_Texts):
 
 
 def note_request(steps: str) -> str:
-    """Return the text that follows the frames of a window ("Steps 0-19") and asks for a note on
-    them."""
+    """Return the text behind a window's frames ("Steps 0-19"), which asks for a note on them."""
     return (
         f"\n{steps} of an embodied agent's trajectory, one view per step in time order. You will "
         "be asked about them later without seeing them. Note in a few short phrases which room it "

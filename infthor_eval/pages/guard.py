@@ -27,8 +27,7 @@ _HEADERS = {
 
 
 class Guard:
-    """An application that answers for another one: it refuses requests of others, and adds the
-    headers of every page.
+    """An application around another: it refuses requests of others, and adds every page's headers.
 
     Args:
         application: what answers the requests that are not refused.

@@ -51,8 +51,7 @@ class Misuse(StrEnum):
 
 
 class UngroundedError(ValueError):
-    """A text has no known action, lacks an argument, or matches no visible object; the message says
-    which."""
+    """A text without a known action, an argument or a visible object; the message says which."""
 
     def __init__(self, misuse: Misuse, message: str) -> None:
         super().__init__(message)
@@ -96,8 +95,7 @@ def text_of(
     receptacle_id: str | None = None,
     words: Words = Words.NATURAL,
 ) -> ActionText:
-    """Return the text of a call; the object of PutObject is the one that is put into the
-    receptacle."""
+    """Return the text of a call; PutObject's object is the one put into the receptacle."""
     ids = [item for item in (object_id, receptacle_id) if item is not None]
     return ActionText(action, tuple(words.name_of(item) for item in ids))
 
@@ -174,8 +172,7 @@ def text_of_call(
 
 
 def _names_of(item: ThorObject, words: Words) -> set[str]:
-    """Return the names by which an agent may call an object: its name in these words, and its
-    type."""
+    """Return the names by which an agent may call an object: in these words, and its type."""
     return {words.name_of(item.object_id), item.object_type}
 
 

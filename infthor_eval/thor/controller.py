@@ -16,8 +16,7 @@ _ANY_DISPLAY = "0"  # ai2thor requires some DISPLAY; a simulator without a windo
 
 
 class SafeController(ai2thor.controller.Controller):
-    """An `ai2thor.controller.Controller` that never hangs, and removes its process, pipes and
-    files.
+    """An `ai2thor.controller.Controller` that never hangs, and removes process, pipes and files.
 
     A simulator started from an executable has its log in a temporary folder instead of
     `~/.ai2thor`.
@@ -77,16 +76,14 @@ class SafeController(ai2thor.controller.Controller):
         return super().base_dir if self._folder is None else str(self._folder.path)
 
     def reset(self, scene: str | dict[str, Any] | None = None, **init_params: Any) -> Any:
-        """Load a scene as ai2thor's method does, but raise SimulatorError if the simulator
-        fails."""
+        """Load a scene as ai2thor's method does, but raise SimulatorError if it fails."""
         try:
             return super().reset(scene, **init_params)
         except PeerFault as fault:
             raise self._with_log(fault) from fault
 
     def step(self, action: str | dict[str, Any] | None = None, **action_args: Any) -> Any:
-        """Run one action as ai2thor's method does, but raise SimulatorError if the simulator
-        fails."""
+        """Run one action as ai2thor's method does, but raise SimulatorError if it fails."""
         try:
             return super().step(action, **action_args)
         except PeerFault as fault:
@@ -99,8 +96,7 @@ class SafeController(ai2thor.controller.Controller):
             raise self._with_log(self.server.fault) from error
 
     def stop(self) -> None:
-        """Kill and reap the simulator, and remove its pipes and temporary files. Calling it again
-        does nothing."""
+        """Kill and reap the simulator; remove its pipes and files. Again, it does nothing."""
         if self.server is not None:
             self.server.stop()
         # ai2thor registers an exit handler that keeps this object alive, so the large event is

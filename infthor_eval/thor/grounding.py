@@ -1,5 +1,4 @@
-"""Mapping object ids that another AI2-THOR version recorded, or of a restored scene, to ids of this
-simulator.
+"""Mapping ids of another AI2-THOR version's objects, or a restored scene's, to this simulator's.
 
 An id has the object's type and its position when the scene was loaded. It is mapped to the object
 of this type that was nearest to this position when the episode began. The choice is made once per
@@ -21,19 +20,17 @@ def id_position(object_id: str) -> tuple[float, float, float] | None:
     """Return the position (metres) in an object id, or None if it has none."""
     parts = object_id.split("|")[1:4]
     try:
-        x, y, z = (float(part) for part in parts)
+        x, y, z = map(float, parts)
     except ValueError:
         return None
     return x, y, z
 
 
 class Grounding:
-    """The id mapping of one episode; `distances` has the metres from recorded positions, by
-    recorded id."""
+    """The id mapping of one episode; `distances` are metres from recorded positions, by that id."""
 
     def __init__(self, view: SimulatorView) -> None:
-        """Store the positions of all objects at the start of the episode, after the scene was
-        restored."""
+        """Store all objects' positions at the episode's start, after the scene was restored."""
         self._initial_positions = {
             key: astuple(item.position) for key, item in view.objects.items()
         }
@@ -41,8 +38,7 @@ class Grounding:
         self.distances: dict[str, float] = {}
 
     def ground(self, object_id: str, view: SimulatorView) -> str | None:
-        """Return the simulator's id for a recorded one, or None if the scene has no object of the
-        type."""
+        """Return the simulator's id for a recorded one, or None if no object has the type."""
         chosen = self._chosen.get(object_id)
         if chosen in view.objects:
             return chosen
@@ -67,8 +63,7 @@ class Grounding:
         return ranked[0][1]
 
     def _distance(self, item: ThorObject, target: tuple[float, float, float] | None) -> float:
-        """Return the distance of a recorded position from the object's initial position, or from
-        that in its id."""
+        """Return how far a recorded position, else its id's, is from the initial one."""
         if target is None:
             return 0.0
         # The id has the position at which the scene file has the object; restoring the scene may

@@ -1,5 +1,4 @@
-"""Command lines of simulators: the embedded one, a local Unity executable, or the build that
-ai2thor downloads."""
+"""Command lines of simulators: the embedded one, a Unity executable, or ai2thor's download."""
 
 import shlex
 import sys
@@ -63,8 +62,7 @@ def embedded_launch(
 
 
 def unity_launch(executable: Path | None = None, *, platform: str | None = None) -> Launch:
-    """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor
-    downloads.
+    """Return the launch of a Unity build of AI2-THOR: a local executable, or ai2thor's download.
 
     Raises:
         UsageError: the time limit of an action, `limits.UNITY_ACTION_SECONDS`, is set to no number.

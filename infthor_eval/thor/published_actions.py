@@ -1,5 +1,4 @@
-"""From an agent's text to a call, as the published script goes (`interact_with_env`,
-`post_processing_action`).
+"""From an agent's text to a call, by the published `interact_with_env`, `post_processing_action`.
 
 A name is sought as a part of the objects' names, case apart, and the first visible object that has
 the property is taken, whatever its state. What cannot be grounded is sent nevertheless: without an
@@ -34,8 +33,7 @@ _TOGGLE = "ToggleObject"
 
 
 def ground_published(text: str, objects: Iterable[ThorObject]) -> tuple[str | None, str | None]:
-    """Return the action and the object's id that a text with "Object" in it stands for; None where
-    there is none.
+    """Return the action and object id of a text with "Object" in it; None where there is none.
 
     Args:
         text: what the agent said.

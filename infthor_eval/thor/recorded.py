@@ -1,5 +1,4 @@
-"""Conversion of recorded low-level actions (AI2-THOR 2.1.0, as in ALFRED and ∞-THOR) to calls of
-the 5.x API."""
+"""Conversion of recorded actions (AI2-THOR 2.1.0, as in ALFRED and ∞-THOR) to calls of 5.x."""
 
 from typing import Any
 

@@ -15,12 +15,10 @@ _PNG_LEVEL = 4  # higher levels take several times as long and hardly shrink ren
 
 
 class Recorder:
-    """Turns simulator states into log entries (`steps`, one per frame), and into images if a folder
-    is given."""
+    """Turns simulator states into log entries (`steps`, one a frame), and images into a folder."""
 
     def __init__(self, images: Path | None = None) -> None:
-        """Start without a frame; `images` is an existing folder for the frames, None keeps only the
-        log."""
+        """Start without a frame; `images` is an existing folder for frames, None for no files."""
         self._images = images
         self._states: dict[str, ObjectState] = {}
         self.steps: list[Step] = []
@@ -86,8 +84,7 @@ class Recorder:
 
 
 def object_log(view: SimulatorView) -> ObjectLog:
-    """Return the published fields of a log entry: object types, each once, in alphabetical
-    order."""
+    """Return the published fields of a log entry: object types, each once, alphabetically."""
     visible = [item for item in view.objects.values() if item.visible]
     inside: dict[str, set[str]] = {}
     for item in visible:
@@ -105,8 +102,7 @@ def object_log(view: SimulatorView) -> ObjectLog:
 
 
 def state_of(item: ThorObject) -> ObjectState:
-    """Return the part of an object's metadata that is logged, with the position to the
-    millimetre."""
+    """Return the logged part of an object's metadata, with the position to the millimetre."""
     at = item.position
     return ObjectState(
         type=item.object_type,

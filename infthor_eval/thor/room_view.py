@@ -1,5 +1,4 @@
-"""Where to stand to see a room: of the places that can be reached, the one that shows most of what
-is in it."""
+"""Where to stand to see a room: the reachable position that shows most of what is in it."""
 
 import math
 from collections.abc import Sequence
@@ -48,8 +47,7 @@ def find_room_view(simulator: Simulator, positions: Sequence[Vector], n_pixels: 
 
 
 def _far_apart(positions: Sequence[Vector]) -> list[Vector]:
-    """Choose places one by one, each as far as possible from those before it: corners come
-    first."""
+    """Choose positions one by one, each as far as possible from the others: corners first."""
     if not positions:
         return []
     points = np.array([(place.x, place.z) for place in positions])

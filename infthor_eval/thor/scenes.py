@@ -16,8 +16,7 @@ __all__ = ["dump_scene", "scene_pictures"]
 
 
 def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the scene from above, and from where most of it is seen: RGB, uint8, [height, width,
-    3].
+    """Return the scene from above, and from where most of it is seen: uint8 [height, width, 3].
 
     Raises:
         SimulatorError: the simulator does not have the scene, or sends no frames.
@@ -40,8 +39,7 @@ def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8],
 
 
 def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool = False) -> int:
-    """Record a scene's objects and reachable positions in a folder of floor plans; return the
-    number of objects.
+    """Record a scene's objects and positions as a floor plan; return its number of objects.
 
     Args:
         overwrite: True to replace a different recording of the scene.

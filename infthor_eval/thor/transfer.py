@@ -22,8 +22,7 @@ _ROUNDS = 3  # passes over all objects: moving a receptacle also moves what is i
 
 
 class _State(NamedTuple):
-    """A state of objects that calls can change; `on` and `off` set and unset it, empty if no call
-    does."""
+    """A state of objects; the calls `on` and `off` set and unset it, empty if no call does."""
 
     read: Callable[[ThorObject], Any]
     on: dict[str, Any]
@@ -46,8 +45,7 @@ _STATES = (
 
 
 def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
-    """Give all objects the states and poses that they have in another simulator; the agent stays
-    where it is.
+    """Give all objects their states and poses in another simulator; the agent stays where it is.
 
     An object held by the other agent floats where that agent holds it.
 

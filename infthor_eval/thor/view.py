@@ -155,8 +155,7 @@ class ArmState(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Instance:
-    """The pixels that show one object: their number and [xmin, ymin, xmax, ymax], both ends
-    inclusive."""
+    """The pixels that show an object: number, and [xmin, ymin, xmax, ymax], ends inclusive."""
 
     pixels: int
     box: tuple[int, int, int, int]
@@ -243,8 +242,7 @@ def view_of(event: Any) -> SimulatorView:
 
 
 def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
-    """Return the number of pixels and the box of each code, given one code per pixel [height,
-    width]."""
+    """Return each code's number of pixels and box, given a code per pixel [height, width]."""
     width = codes.shape[1]
     # This works on runs of equal pixels within a row, of which there are a few thousand instead of
     # 90,000 pixels.
@@ -292,8 +290,7 @@ def _instances(event: Any) -> dict[str, Instance] | None:
 
 
 def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:
-    """Return the 5.x call that teleports the agent to a pose; unless forced, it may be refused for
-    a collision."""
+    """Return the 5.x call that teleports the agent to a pose; unforced, a collision refuses it."""
     call: dict[str, Any] = {
         "action": "TeleportFull",
         "position": asdict(pose.position),

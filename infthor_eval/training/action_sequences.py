@@ -72,8 +72,7 @@ def recorded_segments(
 def windows(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Cut a history into sequences, each with as many whole plans as fit; every plan is in one of
-    them.
+    """Cut a history into sequences of as many whole plans as fit; every plan is in one of them.
 
     Args:
         encoder: builds the sequences.
@@ -101,8 +100,7 @@ def windows(
 def single_plans(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment]
 ) -> Iterator[TrainingSequence]:
-    """Cut a history into sequences of one plan each, with its goal and the frame that it begins
-    with.
+    """Cut a history into sequences of one plan each, with its goal and the frame it begins with.
 
     Raises:
         DataError: a frame cannot be read, or a text of the history contains a mark.

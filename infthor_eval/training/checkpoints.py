@@ -23,8 +23,7 @@ _HINT = "restore it, or remove the folder to restart"
 
 @dataclass(frozen=True)
 class Checkpoints:
-    """The last state of a run, in a folder `step-NUMBER`: weights, the optimizer's moments, and the
-    run's settings.
+    """The last state of a run, in `step-NUMBER`: weights, optimizer's moments, and settings.
 
     Nothing else is stored: order of sequences, learning rate and random numbers follow from
     settings and step.

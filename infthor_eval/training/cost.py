@@ -43,8 +43,7 @@ class TrainingCost:
         return self.weights + self.gradients + self.optimizer + self.activations
 
     def hours(self, tflops: float) -> float:
-        """Return the hours that the run takes at this speed of all processes together, in TFLOP per
-        second."""
+        """Return the hours of the run at this speed of all processes together, in TFLOP/s."""
         return self.flop / (tflops * 1e12) / 3600
 
 
@@ -74,8 +73,7 @@ def estimate_cost(
 def _flop(
     recipe: Recipe, network: SequenceModel, data: TrainingData, parts: dict[str, Any]
 ) -> float:
-    """Return the operations of one epoch: forward, backward through layers and to weights, and
-    recomputation."""
+    """Return the operations of an epoch: forward, backward to layers and weights, recomputation."""
     config = network.decoder.config
     n_weights = sum(parameter.numel() for parameter in parts["decoder"])
     width = config.num_attention_heads * getattr(
@@ -105,8 +103,7 @@ def _flop_of_frame(network: SequenceModel) -> float:
 
 
 def _activations(recipe: Recipe, network: SequenceModel, n_tokens: float) -> float:
-    """Return the activations of one sequence: each layer's input and one layer's activations, or
-    all layers'."""
+    """Return a sequence's activations: each layer's input and one layer's own, or all layers'."""
     config = network.decoder.config
     size = network.model.dtype.itemsize
     heads = config.num_key_value_heads / config.num_attention_heads

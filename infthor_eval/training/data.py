@@ -57,8 +57,7 @@ class TrainingData:
 
 
 def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]) -> TrainingData:
-    """Build the sequences of a recipe from replayed sets; trajectories and questions that cannot be
-    used are skipped.
+    """Build a recipe's sequences from replayed sets; what cannot be used is skipped.
 
     Args:
         recipe: recipe with the kinds of sequences.
@@ -121,8 +120,7 @@ def _action_items(
 def action_sequences(
     data: NiehSet, encoder: Encoder, limit: int, words: Words
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield the windows of every trajectory of a set, and the items that could not become a
-    sequence.
+    """Yield the windows of each trajectory of a set, and the items that became no sequence.
 
     The set has to contain the trajectories; `limit` is the most tokens of a sequence, frames
     expanded.

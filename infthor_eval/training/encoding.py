@@ -63,8 +63,7 @@ class SkippedItem:
 
 
 def within(sequence: TrainingSequence, limit: int) -> TrainingSequence | SkippedItem:
-    """Return the sequence, or a skipped item if it has more tokens than the limit, frames
-    expanded."""
+    """Return the sequence, or a skipped item if it has more tokens than the limit, all expanded."""
     return (
         SkippedItem(sequence.name, f"longer than {limit} tokens")
         if sequence.n_tokens > limit
@@ -148,8 +147,7 @@ class Encoder:
     def answer(
         self, name: str, parts: Sequence[Part], answer: str, system: str | None = None
     ) -> TrainingSequence:
-        """Encode a question and its answer, with loss on the answer and the token that ends the
-        turn.
+        """Encode question and answer, with loss on the answer and the token that ends the turn.
 
         Raises:
             DataError: a frame cannot be read.

@@ -49,8 +49,7 @@ def export(
     words: Words,
     weights: Mapping[str, torch.Tensor] | None = None,
 ) -> None:
-    """Write weights by their published names (safetensors), configs, tokenizer with template, image
-    processor, card.
+    """Write weights by published names (safetensors), configs, tokenizer, image processor, card.
 
     The template is that of training, so that evaluation renders the same prompts. The card has the
     title of the recipe and the words of plans and actions. The folder is created. `weights` are the

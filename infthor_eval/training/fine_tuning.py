@@ -171,8 +171,7 @@ def _processes() -> Iterator[None]:
 
 
 def _claim_folder(out: Path, document: dict[str, Any]) -> None:
-    """Write the description of the run into its folder, or check that the folder belongs to this
-    run."""
+    """Write the run's description into its folder, or check that the folder belongs to it."""
     path = out / _DESCRIPTION
     if not path.exists():
         with write_atomically(path) as partial_file:

@@ -1,5 +1,4 @@
-"""Sequences of goals, actions and frames in one turn: what the Qwen2.5-VL behind the final tasks
-was trained on.
+"""Sequences of goals, actions and frames in one turn, as for the Qwen2.5-VL of the final tasks.
 
 They are those of `infini_thor_dataset.py` (branch `dev`), in text, frames and ends: no text of a
 plan, a system prompt, one turn of the user. Later windows begin with the goal and the last frame of
@@ -37,8 +36,7 @@ class _Window:
 def goal_windows(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Cut a history into sequences of goals, actions and frames; plans outside every task are left
-    out, as published.
+    """Cut a history into sequences of goals, actions and frames, as published: without loose plans.
 
     Args:
         encoder: builds the sequences.

@@ -1,5 +1,4 @@
-"""Sequences of one action behind a memory: what the published memories for final tasks were trained
-on.
+"""Sequences of one action behind a memory, as the published memories for final tasks learned.
 
 They are those of `infini_dataset_history.py` and `infini_dataset_clip.py` (branch `dev`): the goal,
 the state in words or the retrieved frames that the trajectory's file has for the action, the
@@ -46,8 +45,7 @@ def memory_sequences(
     form: MemoryForm,
     limit: int,
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield a sequence for each action that the trajectory's file has a memory for, in the file's
-    order.
+    """Yield a sequence for each action that the file has a memory for, in the file's order.
 
     Args:
         encoder: builds the sequences.
@@ -100,8 +98,7 @@ class _State:
 
 
 class _Retrieved:
-    """The frames that were retrieved; where the list is empty, those of all actions before, first
-    and last of each."""
+    """The retrieved frames; if none, each earlier action's first and last frame."""
 
     def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
         place = f"trajectory {trajectory.traj_id}"

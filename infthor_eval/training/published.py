@@ -1,5 +1,4 @@
-"""Import of the published trainer's checkpoints: torch's distributed checkpoints of a model from
-the hub.
+"""Import of the published trainer's checkpoints: torch's distributed ones, of models of the hub.
 
 Of the published code, branch `dev` alone exports them, and Qwen2.5-VL alone. Here their weights are
 put into the model that training started from, which is then written like any other checkpoint.

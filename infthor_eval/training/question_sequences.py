@@ -1,5 +1,4 @@
-"""Training sequences for answering: NIEH questions as in evaluation, with their reference
-answers."""
+"""Training sequences for answering: NIEH questions as evaluated, with reference answers."""
 
 from collections.abc import Iterator
 
@@ -16,8 +15,7 @@ __all__ = ["question_sequences"]
 def question_sequences(
     encoder: Encoder, task: TaskSamples, limit: int
 ) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield a sequence for each sample of a task in one context, or a skipped item if it cannot be
-    used.
+    """Yield a sequence for each sample of a task in a context, or a skipped item if unusable.
 
     Args:
         encoder: builds the sequences.

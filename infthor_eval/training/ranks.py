@@ -39,8 +39,7 @@ class Ranks:
 
 
 def assign_ranks(n_context: int = 1) -> Ranks:
-    """Return this process's position; neighbouring ranks, which have the fastest links, share
-    sequences.
+    """Return this process's position; neighbouring ranks, with the fastest links, share sequences.
 
     All processes of the default process group have to call this. Without a group, the process is
     alone.

@@ -1,5 +1,4 @@
-"""Recipes: data and settings of training, as YAML files; `infthor_eval/training/recipes/` has the
-paper's."""
+"""Recipes: data and settings of training, in YAML; the paper's are in `recipes/` beside this."""
 
 from collections.abc import Mapping
 from pathlib import Path

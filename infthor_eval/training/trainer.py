@@ -28,8 +28,7 @@ _WEIGHTS = "model.safetensors"
 
 
 class _SequenceTrainer(transformers.Trainer):
-    """Saves the weights of the transformers model only, with tied weights stored once, as
-    transformers does.
+    """Saves the transformers model's weights only, with tied ones once, as transformers does.
 
     Weight decay and schedule are those of the published trainer: all weights decay, and
     `linear_share`.
@@ -82,10 +81,10 @@ class _ReportSteps(transformers.TrainerCallback):
         if not (state.is_world_process_zero and logs and "loss" in logs):
             return
         now = time.perf_counter()
-        loss, rate, norm = (float(logs[name]) for name in ("loss", "learning_rate", "grad_norm"))
         speed = self._tokens_per_step / (now - self._start)
         self._start = now
-        self._report(Progress(state.global_step, state.max_steps, loss, rate, norm, speed))
+        figures = [float(logs[name]) for name in ("loss", "learning_rate", "grad_norm")]
+        self._report(Progress(state.global_step, state.max_steps, *figures, speed))
 
 
 def train_with_trainer(
@@ -127,8 +126,7 @@ def train_with_trainer(
 
 
 def _last_complete_checkpoint(out: Path) -> str | None:
-    """Return the last checkpoint that was written completely; a run may be killed while writing
-    one.
+    """Return the last checkpoint written completely; a run may be killed while writing one.
 
     The Trainer itself would use the last folder, whatever it contains, and continue without the
     optimizer if that is missing. The state file is the last to be written.

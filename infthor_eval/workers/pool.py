@@ -1,5 +1,4 @@
-"""Jobs done by several workers: a job goes to whoever is free, and again to another if its worker
-is lost."""
+"""Jobs done by several workers: each goes to who is free, and again if its worker is lost."""
 
 import contextlib
 from collections import Counter, deque
@@ -223,8 +222,7 @@ class Pool:
             self._events.put(error)
 
     def _open_worker(self, number: int, link: Link) -> bool:
-        """Open a worker, several times if it is lost meanwhile; return whether it is ready for
-        jobs."""
+        """Open a worker, several times if lost meanwhile; return whether it is ready for jobs."""
         reason: InfthorError = WorkerLostError("the pool is closed")
         for _ in range(_MAX_LOSSES):
             if self._jobs.closed:
@@ -250,8 +248,7 @@ class Pool:
         return False
 
     def _do_jobs(self, number: int, link: Link) -> bool:
-        """Have a worker do jobs; return True when there are no more, False when the worker was
-        lost."""
+        """Have a worker do jobs; return True when none is left, False when it was lost."""
         while (taken := self._jobs.take()) is not None:
             job, create = taken
             try:

@@ -64,8 +64,7 @@ class ProcessLink:
             self._send(_STOP)
 
     def close(self) -> None:
-        """See `Link`. The connection stays open: a thread may be reading it, and must see its
-        end."""
+        """See `Link`. The connection stays open: a thread that reads it must see its end."""
         with self._changing:
             if self._process is None:
                 return
@@ -94,8 +93,7 @@ class ProcessLink:
             raise self._lost_error() from error
 
     def _receive(self) -> tuple[bool, Any]:
-        """Return True while the job goes on, and what the worker sent; raise what the worker
-        raised."""
+        """Return whether the job goes on, and what the worker sent; raise what it raised."""
         assert self._connection is not None
         try:
             message = self._connection.recv()
@@ -112,8 +110,7 @@ class ProcessLink:
 
 
 def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
-    """Run a worker's process: create the worker that it is sent, and do jobs until the driver is
-    gone."""
+    """Run a worker's process: create the worker it is sent; do jobs until the driver is gone."""
     # A terminal sends Ctrl-C to all processes; the driver decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
@@ -173,8 +170,7 @@ def _end_with_driver() -> None:
 
 
 def _visible_gpus() -> list[str]:
-    """Return the GPUs that this process may use, as CUDA names them, without torch, which would
-    occupy them."""
+    """Return this process's GPUs, as CUDA names them, without torch, which would occupy them."""
     visible = os.environ.get(_VISIBLE)
     if visible is not None:
         return [name.strip() for name in visible.split(",") if name.strip()]

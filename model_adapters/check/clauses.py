@@ -69,8 +69,7 @@ def check_members(adapter: Any) -> None:
 
 
 def check_identity(adapter: Model | Policy) -> None:
-    """Check name, identity and capabilities; raise `ContractError` for a clause that does not
-    hold."""
+    """Check name, identity and capabilities; `ContractError` for a clause that does not hold."""
     identity = adapter.identity()
     try:
         again = json.loads(json.dumps(identity))
@@ -85,18 +84,17 @@ def check_identity(adapter: Model | Policy) -> None:
 
 @contextmanager
 def frames_of_one_colour(size: tuple[int, int]) -> Iterator[tuple[FrameRef, FrameRef]]:
-    """Yield a black and a white frame of this width and height, whose files exist within the
-    context."""
+    """Yield a black and a white frame of this width and height, with files in the context."""
     with tempfile.TemporaryDirectory() as folder:
-        black, white = (Path(folder) / f"{colour}.png" for colour in ("black", "white"))
+        black = Path(folder) / "black.png"
+        white = Path(folder) / "white.png"
         for path in (black, white):
             Image.new("RGB", size, path.stem).save(path)
         yield FrameRef(black), FrameRef(white)
 
 
 def _require_members(instance: object, protocol: type) -> None:
-    """Raise `ContractError` if an object lacks public members of a protocol; no property is
-    evaluated."""
+    """Raise `ContractError` if an object lacks members of a protocol; no property is evaluated."""
     bases = [base for base in protocol.__mro__ if base not in (Protocol, Generic, object)]
     names = {name for base in bases for name in vars(base) if not name.startswith("_")}
     missing = sorted(names - set(dir(instance)))

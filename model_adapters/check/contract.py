@@ -60,8 +60,7 @@ def _checks(
 
 
 def model_checks(model: Model, black: FrameRef, white: FrameRef) -> dict[str, Callable[[], None]]:
-    """Return all checks of a model by name; each raises `ContractError` if a clause does not
-    hold."""
+    """Return all checks of a model by name; each raises `ContractError` for a broken clause."""
     return {
         "members": partial(check_members, model),
         "identity": partial(check_identity, model),

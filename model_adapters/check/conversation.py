@@ -117,8 +117,7 @@ def _check_system(model: Model, frame: FrameRef) -> None:
 
 
 def _alike(model: Model, one: Conversation, other: Conversation) -> bool:
-    """Return whether two conversations look the same: by token count, or else by a deterministic
-    reply."""
+    """Return whether two conversations look the same: by tokens, or else a deterministic reply."""
     if model.capabilities.counts_tokens:
         return one.n_tokens == other.n_tokens
     return not model.capabilities.deterministic or same_reply(

@@ -79,8 +79,7 @@ class HfModel(CheckpointModel):
 
     @property
     def capabilities(self) -> Capabilities:
-        """Sampling and choices, one request at a time, `_batch_size` continuations of a shared
-        prefix together."""
+        """Sampling and choices, a request at a time, `_batch_size` continuations together."""
         text_config = self._loaded.model.config.get_text_config()
         return Capabilities(
             sampling=True,
@@ -94,8 +93,7 @@ class HfModel(CheckpointModel):
         )
 
     def identity(self) -> dict[str, Any]:
-        """Return checkpoint, precision, kernels, versions and generation settings, as JSON
-        values."""
+        """Return checkpoint, precision, kernels, versions, generation settings, as JSON values."""
         options = self._options
         generation = self._loaded.generation
         return self._loaded.identity | {

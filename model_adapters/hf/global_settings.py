@@ -29,8 +29,7 @@ def torch_threads(n_threads: int | None) -> Iterator[None]:
 
 @contextmanager
 def hide_transformers_output() -> Iterator[None]:
-    """Hide progress bars and warnings of transformers within the context; errors are raised as
-    always.
+    """Hide transformers' progress bars and warnings within the context; errors are raised.
 
     Both settings are global in transformers, so they are restored afterwards.
     """

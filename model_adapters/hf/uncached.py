@@ -1,5 +1,4 @@
-"""Any image-text-to-text model, run by its own processor and `generate` without a cache between
-replies.
+"""Any image-text-to-text model, run by its processor and `generate`, with no cache for replies.
 
 It is slow and correct for every architecture, including those that cannot share prefixes: attention
 in both directions over images, or vision features that enter at several layers.

@@ -1,5 +1,4 @@
-"""Where a question waits for its answer: the run asks in one thread, and the page answers in
-others."""
+"""Where a question waits for its answer: a run's thread asks, the page's threads answer."""
 
 import itertools
 import threading
@@ -135,8 +134,7 @@ class Desk:
             self._changed.notify_all()
 
     def wait_until_told(self, timeout_s: float) -> None:
-        """Wait until a page has learned that it is over, if there is one, for so many seconds at
-        most."""
+        """Wait until a page, if there is one, knows that it is over: so many seconds at most."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_told or not self._has_readers, timeout_s)
 

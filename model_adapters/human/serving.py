@@ -128,8 +128,7 @@ def _problem(text: str, status: int) -> JSONResponse:
 
 
 def _has_screen() -> bool:
-    """Return whether a browser can open a window; in a terminal without one it would take the
-    terminal."""
+    """Return whether a browser can open a window; without one it would take the terminal."""
     return sys.platform in ("darwin", "win32") or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )

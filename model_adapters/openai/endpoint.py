@@ -161,8 +161,7 @@ def _hint_of(body: bytes) -> str | None:
 
 
 def _pause_s(n_faults: int, fault: _TransientError) -> float:
-    """Return the server's pause, or one that doubles; a random part spreads threads that failed
-    together."""
+    """Return the server's pause, or one that doubles, plus a random part to spread threads."""
     pause = min(_FIRST_WAIT_S * 2 ** (n_faults - 1), _LONGEST_WAIT_S) * (1 + random.random() / 4)
     return pause if fault.wait_s is None else fault.wait_s + random.random() * _FIRST_WAIT_S
 

@@ -53,8 +53,7 @@ class EncodedFrames:
             return url
 
     def _encode(self, frame: FrameRef) -> str:
-        """Encode the pixels, not the file: servers differ in how they read palettes and
-        transparency."""
+        """Encode the pixels, not the file: servers read palettes and transparency in many ways."""
         content = BytesIO()
         frame.load().save(content, self._format, **_SETTINGS[self._format])
         encoded = base64.b64encode(content.getvalue()).decode("ascii")

@@ -36,8 +36,7 @@ class Prices:
 
 @dataclass(frozen=True)
 class Caps:
-    """Caps on the tokens of a run's requests and replies, and on its cost in US dollars; None for
-    no cap."""
+    """Caps on a run's tokens, of requests and replies, and cost in US dollars; None for no cap."""
 
     tokens: int | None = None
     cost: float | None = None
@@ -78,8 +77,7 @@ class Spend:
 
     @contextmanager
     def request(self) -> Iterator[Charge]:
-        """Account for one request; what is filled into the charge counts even if the request fails
-        later.
+        """Account for one request; what the charge is filled with counts even if it fails later.
 
         Raises:
             ModelError: a cap is reached or cannot be enforced; the request must not be sent.
@@ -174,7 +172,6 @@ class RateLimiter:
             time.sleep(begin - now)
 
     def take(self, amount: float) -> None:
-        """Take units that were used already, without waiting; a negative amount gives units
-        back."""
+        """Take units that were used already, without waiting; a negative amount returns them."""
         with self._lock:
             self._free_at = max(time.monotonic(), self._free_at) + amount * self._seconds_per_unit

@@ -1,5 +1,4 @@
-"""Requests by the official client, without redirects, limited in bytes and in time whatever the
-server does."""
+"""Requests by the official client, without redirects, limited in bytes and in time."""
 
 import asyncio
 import logging

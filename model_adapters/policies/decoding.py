@@ -11,8 +11,7 @@ __all__ = ["decode_greedily", "embed_ids"]
 
 
 def embed_ids(model: Any, ids: Sequence[int]) -> torch.Tensor:
-    """Return the embeddings of ids, (1, ids, hidden), as input of a transformers model's first
-    layer."""
+    """Return embeddings of ids, (1, ids, hidden), as input of a transformers model."""
     layer = model.get_input_embeddings()
     return cast(torch.Tensor, layer(torch.tensor([ids], device=layer.weight.device)))
 

@@ -1,5 +1,4 @@
-"""Tiny twins of model families: the real classes, random weights, a tokenizer trained on the
-spot."""
+"""Tiny twins of model families: real classes, random weights, a tokenizer trained on the spot."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence

@@ -88,8 +88,7 @@ def frame_limit(max_tokens: int, tokens_per_frame: int, options: VllmOptions) ->
 
 
 def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
-    """Return a context extension `TYPE:FACTOR` as overrides of the language model's config, in
-    vLLM's form.
+    """Return a context extension `TYPE:FACTOR` as overrides of the config, in vLLM's form.
 
     vLLM replaces `rope_parameters` as a whole, so all of them are given, as `apply_rope` has
     written them.

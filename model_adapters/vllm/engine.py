@@ -142,8 +142,7 @@ class Engine:
             return [_engine_output(output) for output in outputs]
 
     def close(self) -> None:
-        """Free the memory, also twice: vLLM ends its processes when the last reference to it is
-        gone."""
+        """Free the memory, also twice: vLLM's processes end with the last reference to it."""
         self._llm = None
         gc.collect()
 

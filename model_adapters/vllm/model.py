@@ -71,8 +71,7 @@ class VllmModel(CheckpointModel):
         )
 
     def identity(self) -> dict[str, Any]:
-        """Return checkpoint, precision, engine settings, versions and generation settings, as JSON
-        values."""
+        """Return checkpoint, precision, engine settings, versions, generation settings, as JSON."""
         options = self._options
         loaded = self._loaded
         checkpoint = {

@@ -81,7 +81,7 @@ def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDa
     entries = list(frames.values())
     types = sorted({_type(key) for _, step in entries for key in step.seen or ()})
     labels = [_labels(step.seen or {}, types, frame.size) for frame, step in entries]
-    cells, shown, present = (torch.stack(parts) for parts in zip(*labels, strict=True))
+    cells, shown, present = map(torch.stack, zip(*labels, strict=True))
     # Decoding and resizing release the interpreter lock.
     with ThreadPoolExecutor(_READER_THREADS) as readers:
         pixels = torch.stack(

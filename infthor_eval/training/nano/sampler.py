@@ -101,9 +101,8 @@ class SequenceSampler:
             )
             self._samples += [(samples.data, sample) for sample in samples.samples]
             for segments in self._read_histories(NiehSet(folder)):
-                recorded += [
-                    (segment.plan, [action for action, _ in segment.steps]) for segment in segments
-                ]
+                for segment in segments:
+                    recorded.append((segment.plan, [action for action, _ in segment.steps]))
         self._synthetic = SyntheticPlans(recorded)
         for what, pool in (
             ("question", self._questions),

@@ -152,8 +152,7 @@ class _StageTrainer:
         return loss + recipe.vision_weight * vision_loss, loss.detach()
 
     def joint_step(self) -> tuple[Tensor, Tensor]:
-        """Return the loss of questions, histories and synthetic plans, plus that of the questions'
-        frames.
+        """Return the loss of questions, histories, synthetic plans, and of the questions' frames.
 
         Answers and actions have the same weight, though most tokens are actions.
         """
@@ -182,8 +181,7 @@ class _StageTrainer:
         )
 
     def _token_loss(self, sequences: Sequence[TrainingSequence]) -> Tensor:
-        """Return the mean loss per token of some sequences, which are computed in batches of about
-        one length.
+        """Return the mean loss per token of sequences, in batches of about one length.
 
         A question on one frame has 40 tokens, one behind a memory 300: most of a single batch would
         be padding.

@@ -19,8 +19,7 @@ class SyntheticPlans:
     similar plan."""
 
     def __init__(self, recorded: Iterable[tuple[str, Sequence[str]]]) -> None:
-        """Group recorded plans by their kind; those with actions that name no object of the plan
-        (ways) are ignored."""
+        """Group recorded plans by kind, without those whose actions name no object of the plan."""
         kinds: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
         for plan, actions in recorded:
             templates = tuple(open_action(action, plan) for action in actions)

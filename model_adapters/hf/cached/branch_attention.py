@@ -31,8 +31,7 @@ def can_branch(model: Any) -> bool:
 
 
 class BranchAttention:
-    """Attention in a sequence that is a prefix and branches, which are continuations of it in
-    pieces of any order.
+    """Attention in a sequence of a prefix and branches, its continuations, in pieces of any order.
 
     Args:
         config: config of the decoder.
@@ -53,8 +52,7 @@ class BranchAttention:
 
     @contextmanager
     def appended(self, branches: Sequence[int], places: Sequence[int]) -> Iterator[None]:
-        """Attend in this way within the context, in which the decoder is given some more tokens
-        once.
+        """Attend this way within the context, in which the decoder is given more tokens once.
 
         Args:
             branches: the branch of each token.
@@ -133,8 +131,7 @@ class BranchAttention:
         return output.flatten(0, 1).transpose(0, 1)[None], None
 
     def _mask(self, window: int | None, query: Tensor) -> Tensor:
-        """Return what is added to the scores, (new tokens, all tokens): 0 or minus infinity, beside
-        the queries."""
+        """Return what is added to scores, (new tokens, all tokens): 0 or minus infinity."""
         key = (window, query.device)  # a model can be on several devices
         if key not in self._masks:
             self._masks[key] = self._new_mask(window, query.dtype).to(query.device)

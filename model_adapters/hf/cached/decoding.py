@@ -39,8 +39,7 @@ _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
 
 @dataclass(frozen=True)
 class Generation:
-    """The generation settings of a checkpoint that are used; sampling settings come with each
-    request.
+    """The generation settings of a checkpoint that are used; requests have those of sampling.
 
     Attributes:
         end_ids: tokens that end the turn.
@@ -161,8 +160,7 @@ class ReplyState:
         self.done = len(self.ids) == self.decoding.max_new_tokens or self._ends_here()
 
     def _penalise(self, logits: torch.Tensor) -> torch.Tensor:
-        """Return logits with those of earlier tokens lowered by transformers' repetition
-        penalty."""
+        """Return logits with earlier tokens' lowered by transformers' repetition penalty."""
         if self._penalised_ids is None:
             return logits
         # Copied once, then extended on the device.

@@ -63,8 +63,7 @@ def stop_ids(tokenizer: Any, decoding: Decoding) -> set[int]:
 
 
 def _text(loaded: LoadedCheckpoint, ids: Sequence[int]) -> str:
-    """Return the text of a reply without special tokens, but for those that mark what the model
-    thinks."""
+    """Return a reply's text without special tokens, but for those around what the model thinks."""
     pieces: list[str] = []
     start = 0
     for at, token in enumerate(ids):

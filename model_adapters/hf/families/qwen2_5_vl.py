@@ -1,5 +1,4 @@
-"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between two markers, with three-axis (multimodal)
-positions.
+"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between markers, with three-axis positions.
 
 Two frames of a video take 144 tokens together, all of a video between two markers (`qwen_video`).
 """
@@ -77,8 +76,7 @@ class Qwen25VLFamily(PlainFamily):
     def _runs(
         self, ids: torch.Tensor, shapes: Sequence[Shape]
     ) -> Iterator[ClipShape | tuple[torch.Tensor, list[Size]]]:
-        """Yield each clip of a span, and the ids of what is between clips with the sizes of its
-        frames."""
+        """Yield each clip of a span, and the ids between clips with the sizes of their frames."""
         left = list(shapes)
         for in_video, run in groupby(
             ids.tolist(), lambda token: token == self._clips.placeholder_id
@@ -107,8 +105,7 @@ class Qwen25VLFamily(PlainFamily):
         return positions + start
 
     def _grid(self, size: Size) -> tuple[int, int, int]:
-        """Return the patches of an image of this size along time, height and width, by the image
-        processor."""
+        """Return an image's patches along time, height and width, by the image processor."""
         if size not in self._grids:
             inputs = self._image_processor(images=[Image.new("RGB", size)], return_tensors="pt")
             time, height, width = inputs["image_grid_thw"][0].tolist()

@@ -16,8 +16,7 @@ _MOST_BYTES = 1_000_000  # of a card
 
 
 def read_card_words(folder: Path) -> str | None:
-    """Return the words that a checkpoint was trained on; None if it has no card, or the card does
-    not say so."""
+    """Return the words that a checkpoint was trained on; None if no card says so."""
     path = folder / "README.md"
     if not path.is_file() or path.stat().st_size > _MOST_BYTES:
         return None

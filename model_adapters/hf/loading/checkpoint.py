@@ -135,8 +135,7 @@ def read_checkpoint(
 
 
 def build_meta_model(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the model of a checkpoint on torch's meta device: shapes without weights, which take
-    no memory.
+    """Return a checkpoint's model on torch's meta device: shapes without weights or memory.
 
     It is enough for counting a frame's tokens, if another engine has the weights.
     """
@@ -159,8 +158,7 @@ def assemble(
     max_tokens: int | None,
     origin: Mapping[str, Any],
 ) -> LoadedCheckpoint:
-    """Combine loaded parts and derive their identity, which begins with `origin`, the source of the
-    weights.
+    """Combine loaded parts and derive their identity, which begins with the weights' `origin`.
 
     Raises:
         ModelError: the generation settings are not supported, or min_pixels exceeds max_pixels.
@@ -199,8 +197,7 @@ def _check_pixels(image_processor: Any) -> None:
 
 
 def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
-    """Return the source of weights, for an identity, and what it was trained on if its card says
-    so.
+    """Return the source of weights, for an identity, and what the card says it was trained on.
 
     The commit is None for a folder of the user's.
     """

@@ -84,8 +84,7 @@ def starts_with_bos(tokenizer: Any, text: str) -> bool:
 
 
 def writes_videos(tokenizer: Any, template: str, marks: Marks) -> bool:
-    """Return whether a template writes the token of a video where a turn has one; no video is
-    looked at."""
+    """Return whether a template writes a video's token where a turn has one; without a video."""
     if marks.video is None:
         return False
     messages = [
@@ -112,8 +111,7 @@ def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
 
 
 def prompt_end(tokenizer: Any, template: str) -> str:
-    """Return what the template writes behind a turn of the user; empty if it refuses one without
-    frames."""
+    """Return what the template writes behind a user's turn; empty if it needs frames there."""
     asked = "?"
     try:
         text = _apply(tokenizer, template, (turn := Turn("user", (asked,)),), [_message(turn)])

@@ -1,5 +1,4 @@
-"""Arrays in JSON in the form of the package json_numpy, which servers of the `/act` convention
-expect."""
+"""Arrays in JSON as by the package json_numpy, which servers of the `/act` convention expect."""
 
 import base64
 import binascii

@@ -42,8 +42,7 @@ class OpenVLADescription:
 
 
 def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> OpenVLADescription:
-    """Read the files beside the weights of an OpenVLA; without an unnorm_key, there must be one
-    dataset only.
+    """Read the files beside OpenVLA's weights; without an unnorm_key, they must be of one dataset.
 
     Raises:
         ModelError: the checkpoint is of another family, or damaged.

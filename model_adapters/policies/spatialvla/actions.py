@@ -1,5 +1,4 @@
-"""SpatialVLA's action tokens: a direction and a length, a rotation, and a gripper, three tokens a
-step."""
+"""SpatialVLA's action tokens: direction and length, rotation, gripper; three tokens a step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -120,8 +119,7 @@ class SpatialBins:
 
     @property
     def action_ids(self) -> tuple[range, range, range]:
-        """Ids of a step's three tokens: translations, then rotations, then gripper closed and
-        open."""
+        """Ids of a step's three tokens: translations, rotations, gripper closed and open."""
         rotations = self.begin + _n(self.theta) * _n(self.phi) * _n(self.r)
         grippers = rotations + _n(self.roll) * _n(self.pitch) * _n(self.yaw)
         return (
@@ -158,8 +156,7 @@ def _n(borders: Sequence[float]) -> int:
 
 
 def _centres(index: np.ndarray, *axes: Sequence[float]) -> list[np.ndarray]:
-    """Return the centres on three axes of bins, (steps,), that are numbered with the last axis
-    fastest."""
+    """Return the centres on three axes of bins, (steps,), numbered with the last axis fastest."""
     places = np.unravel_index(index, [_n(axis) for axis in axes])
     return [
         (np.array(axis)[at] + np.array(axis)[at + 1]) / 2

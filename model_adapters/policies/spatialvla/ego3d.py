@@ -1,5 +1,4 @@
-"""SpatialVLA's 3D positions of patches: depth estimation, back-projection, frequency encoding, an
-MLP."""
+"""SpatialVLA's 3D positions of patches: depth, back-projection, frequency encoding, an MLP."""
 
 import torch
 from torch import nn
@@ -69,8 +68,7 @@ def estimate_depth(zoe: nn.Module, pixels: torch.Tensor, zoe_size: int) -> torch
 def back_project(
     depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolution: int
 ) -> torch.Tensor:
-    """Return points in front of the camera, (batch, patches, 3 * resolution ** 2), in metres and
-    float32.
+    """Return points before the camera, (batch, patches, 3 * resolution ** 2), metres, float32.
 
     Args:
         depth: depth in metres, (batch, 1, size, size), in the type of the weights.

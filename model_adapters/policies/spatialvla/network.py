@@ -1,5 +1,4 @@
-"""SpatialVLA's network: patches with 3D positions, followed by a Gemma 2 that predicts action
-tokens."""
+"""SpatialVLA's network: patches with 3D positions, then a Gemma 2 that predicts action tokens."""
 
 import re
 from dataclasses import dataclass
@@ -99,8 +98,7 @@ class SpatialVLAWeights(nn.Module):
 
     @torch.inference_mode()
     def place_action_embeddings(self) -> None:
-        """Copy the embeddings of action tokens, which have their own key, into those of the
-        vocabulary."""
+        """Copy the embeddings of action tokens, which have a key, into the vocabulary's."""
         model = self.language_model
         spatial = self.spatial_embed_tokens.weight
         model.model.embed_tokens.weight[-len(spatial) :] = spatial
