@@ -78,9 +78,9 @@ def _without(thinking: str, before: str) -> str:
 def _unwrapped(answer: str) -> str:
     """Return what stands between the markers of an answer, if there are any."""
     for before, behind in _WRAPPERS:
-        found = re.search(
+        match = re.search(
             f"{re.escape(before)}(.*?)(?:{re.escape(behind)}|$)", answer, flags=re.DOTALL
         )
-        if found is not None:
-            return found[1].strip()
+        if match is not None:
+            return match[1].strip()
     return answer

@@ -16,7 +16,7 @@ class Transcript:
     """
 
     def __init__(self) -> None:
-        self._items: list[tuple[Role, Part]] = []
+        self._spoken: list[tuple[Role, Part]] = []
         self._marks: list[Mark] = []
 
     @property
@@ -30,9 +30,11 @@ class Transcript:
         Raises:
             TypeError: a part is neither text, frame reference nor video.
         """
-        items = [item for item in (*self._items, *_items(continuation, "user")) if item[1] != ""]
+        spoken = [
+            part for part in (*self._spoken, *_spoken_parts(continuation, "user")) if part[1] != ""
+        ]
         turns = []
-        for role, run in groupby(items, lambda item: item[0]):
+        for role, run in groupby(spoken, lambda part: part[0]):
             turns.append(Turn(role, tuple(_join_texts(part for _, part in run))))
         return tuple(turns)
 
@@ -43,11 +45,11 @@ class Transcript:
             TypeError: a part is neither text, frame reference nor video.
             ValueError: the role is unknown.
         """
-        self._items.extend(_items(parts, role))
+        self._spoken.extend(_spoken_parts(parts, role))
 
     def mark(self) -> Mark:
         """Return a mark at the current end of the conversation."""
-        mark = Mark(len(self._items))
+        mark = Mark(len(self._spoken))
         self._marks.append(mark)
         return mark
 
@@ -62,7 +64,7 @@ class Transcript:
             raise ValueError(
                 "the mark belongs to another conversation or to a part that was rewound"
             )
-        del self._items[mark.n_parts :]
+        del self._spoken[mark.n_parts :]
         del self._marks[self._marks.index(mark) + 1 :]
 
     def replies(
@@ -80,7 +82,7 @@ class Transcript:
         return replies
 
 
-def _items(parts: Sequence[Part], role: Role) -> list[tuple[Role, Part]]:
+def _spoken_parts(parts: Sequence[Part], role: Role) -> list[tuple[Role, Part]]:
     if role not in ROLES:
         raise ValueError(f"there is no role {role!r}; roles: {', '.join(ROLES)}")
     for part in parts:

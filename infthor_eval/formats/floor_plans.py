@@ -116,7 +116,7 @@ def _read_scenes(path: Path) -> Iterator[tuple[str, str]]:
         yield scene, json.dumps(entry)
 
 
-def _without_corners(item: dict[str, Any]) -> dict[str, Any]:
-    box = item.get("axisAlignedBoundingBox") or {}
+def _without_corners(metadata: dict[str, Any]) -> dict[str, Any]:
+    box = metadata.get("axisAlignedBoundingBox") or {}
     kept = {key: value for key, value in box.items() if key != "cornerPoints"}
-    return {**item, "axisAlignedBoundingBox": kept}
+    return {**metadata, "axisAlignedBoundingBox": kept}

@@ -148,7 +148,7 @@ class NiehSet:
 
     def reasons(self) -> Counter[str]:
         """Return the number of skipped questions by reason."""
-        return Counter(item.reason for item in self.skipped)
+        return Counter(question.reason for question in self.skipped)
 
     def folder(self, traj_id: str) -> Path:
         """Return the folder of a trajectory's frames and metadata."""
@@ -192,8 +192,8 @@ class NiehSet:
     @property
     def missing_outline(self) -> str:
         """The reason for a question whose trajectory file is missing."""
-        place = "metadata/" if self.trajectories is None else f"{self.trajectories}"
-        return f"the trajectory's JSON is not in {place}; give its folder with --trajectories"
+        location = "metadata/" if self.trajectories is None else f"{self.trajectories}"
+        return f"the trajectory's JSON is not in {location}; give its folder with --trajectories"
 
     def action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
         """Return the positions in time order of the frames of each low-level action that has any.
@@ -217,8 +217,10 @@ class NiehSet:
             )
             if logged is not None:
                 return logged
-        places = {frame.path.stem: place for place, frame in enumerate(self.frames(traj_id))}
-        return read_action_log(path, places)
+        positions = {
+            frame.path.stem: position for position, frame in enumerate(self.frames(traj_id))
+        }
+        return read_action_log(path, positions)
 
     def states(self, traj_id: str) -> dict[int, str]:
         """Return the states of a trajectory in words, by low-level action.

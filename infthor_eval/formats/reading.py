@@ -102,8 +102,8 @@ def read_text(path: Path, hint: str) -> str:
 @overload
 def read_json(path: Path, hint: str) -> Any: ...
 @overload
-def read_json(path: Path, hint: str, form: type[T]) -> T: ...
-def read_json(path: Path, hint: str, form: Any = Any) -> Any:
+def read_json(path: Path, hint: str, data_type: type[T]) -> T: ...
+def read_json(path: Path, hint: str, data_type: Any = Any) -> Any:
     """Return the content of a JSON file as the type that `msgspec` decodes it to.
 
     Raises:
@@ -111,9 +111,9 @@ def read_json(path: Path, hint: str, form: Any = Any) -> Any:
             the type.
     """
     content = read_bytes(path, hint)
-    expected = "valid JSON" if form is Any else "in its documented form"
+    expected = "valid JSON" if data_type is Any else "in its documented form"
     with wrap_errors(f"{path}: not {expected}", hint, catch=NOT_JSON):
-        return msgspec.json.decode(content, type=form)
+        return msgspec.json.decode(content, type=data_type)
 
 
 def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:

@@ -226,8 +226,8 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
                 sorted(document["img_idx"], key=lambda frame: str(frame.get("img_filename")))
             )
             return [
-                {"img_idx": place, "step": frame.get("low_idx") or 0, **frame}
-                for place, frame in listed
+                {"img_idx": index, "step": frame.get("low_idx") or 0, **frame}
+                for index, frame in listed
             ]
 
 

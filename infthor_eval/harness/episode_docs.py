@@ -21,8 +21,8 @@ def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options:
         settings: dataclass of the settings that `dataset_kwargs` can have.
         options: dataclass of the suite's options.
     """
-    names = [item.name for item in fields(settings)]
-    other_names = [item.name for item in fields(options) if item.name not in names]
+    names = [setting.name for setting in fields(settings)]
+    other_names = [option.name for option in fields(options) if option.name not in names]
     return {
         "suite": suite,
         "settings": json.dumps(

@@ -51,11 +51,11 @@ class Trackers:
             "trackio": (self._to_trackio, self._trackio),
             "the hub": (self._to_hub, self._hub),
         }
-        used = {place: send for place, (send, args) in trackers.items() if args is not None}
+        used = {service: send for service, (send, args) in trackers.items() if args is not None}
         converted = convert_run(outcome) if used else None
-        for place, send in used.items():
+        for service, send in used.items():
             assert converted is not None
-            problem = f"{outcome.folder}: could not be sent to {place}"
+            problem = f"{outcome.folder}: could not be sent to {service}"
             with wrap_errors(problem, "run the same command again", catch=Exception):
                 send(converted, outcome.summary.header.name)
 

@@ -71,9 +71,9 @@ _INSIDE = frozenset(
 )
 
 
-def goes_into(item: str, receptacle: str) -> bool:
-    """Return True if the published table has object type `item` for type `receptacle`."""
-    return item in _HOLDS.get(receptacle, frozenset())
+def goes_into(object_type: str, receptacle: str) -> bool:
+    """Return True if the published table has an object type for a receptacle type."""
+    return object_type in _HOLDS.get(receptacle, frozenset())
 
 
 def preposition(receptacle: str) -> str:

@@ -17,7 +17,7 @@ def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str
     while new:
         # Both directions are read, as either may be missing from the metadata.
         inside = {key for parent in new for key in objects[parent].receptacle_object_ids or ()}
-        inside |= {key for key, item in objects.items() if new & set(item.parent_receptacles or ())}
+        inside |= {key for key, obj in objects.items() if new & set(obj.parent_receptacles or ())}
         new = (inside & objects.keys()) - contents - {holder}
         contents |= new
     return frozenset(contents)
@@ -29,11 +29,11 @@ def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
     An object in a bowl is not directly in the cabinet around the bowl. If furniture is nested (a
     drawer in a dresser), every piece that the simulator reports counts.
     """
-    item = view.objects.get(object_id)
+    obj = view.objects.get(object_id)
     holder = view.objects.get(receptacle_id)
-    if item is None or holder is None:
+    if obj is None or holder is None:
         return False
-    parents = set(item.parent_receptacles or ())
+    parents = set(obj.parent_receptacles or ())
     in_carrier = any(
         key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id}
     )
@@ -41,7 +41,7 @@ def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
     return reported and (holder.pickupable or not in_carrier)
 
 
-def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:
+def direct_parent(obj: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:
     """Return the id of an object's innermost receptacle, possibly the floor; None if it has none.
 
     If several qualify, it is the smallest: planning needs one place even where the report is
@@ -49,8 +49,8 @@ def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | 
     """
     parents = [
         objects[key]
-        for key in item.parent_receptacles or ()
-        if key in objects and key != item.object_id
+        for key in obj.parent_receptacles or ()
+        if key in objects and key != obj.object_id
     ]
     if not parents:
         return None
@@ -75,8 +75,8 @@ def logged_parent(state: ObjectState, world: Mapping[str, ObjectState]) -> str |
     return None
 
 
-def _volume(item: ThorObject) -> float:
-    box = item.axis_aligned_bounding_box
+def _volume(obj: ThorObject) -> float:
+    box = obj.axis_aligned_bounding_box
     return math.inf if box is None else box.size.x * box.size.y * box.size.z
 
 

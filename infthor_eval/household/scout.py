@@ -50,7 +50,7 @@ class Viewpoint:
 def find_viewpoint(
     simulator: Simulator,
     grid: Grid,
-    shown: list[str],
+    targets: list[str],
     inside: str | None = None,
     min_pixels: int = 0,
 ) -> Viewpoint | None:
@@ -62,7 +62,7 @@ def find_viewpoint(
     Args:
         simulator: the simulator; its agent returns to its pose.
         grid: the reachable cells.
-        shown: ids of the objects that must be visible; the agent faces the first.
+        targets: ids of the objects that must be visible; the agent faces the first.
         inside: id of an object hidden in the first one, which must become visible when that is
             opened.
         min_pixels: minimum size of the first object in the frame, pixels.
@@ -71,17 +71,19 @@ def find_viewpoint(
         The viewpoint, or None if no candidate qualifies.
     """
     start = simulator.view
-    focus = start.objects[inside or shown[0]]
+    focus = start.objects[inside or targets[0]]
     distances = grid.distances(grid_pose_of(start.agent, grid))
     best = None
     trials_left = _EXTRA_TRIALS
     for viewpoint in list(_candidates(start, grid, focus, distances))[:_MAX_TRIALS]:
         view = _teleport(simulator, grid, start, viewpoint)
-        qualifies = view.success and _shows(view, shown, min_pixels)
+        qualifies = view.success and _shows(view, targets, min_pixels)
         if qualifies and (
-            inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels)
+            inside is None or _comes_into_view(simulator, targets[0], inside, min_pixels)
         ):
-            is_clear = inside is not None or not focus.pickupable or _is_well_inside(view, shown[0])
+            is_clear = (
+                inside is not None or not focus.pickupable or _is_well_inside(view, targets[0])
+            )
             best = viewpoint if is_clear or best is None else best
             if is_clear:
                 break
@@ -105,16 +107,18 @@ def grid_pose_of(pose: AgentPose, grid: Grid) -> GridPose:
     )
 
 
-def _shows(view: SimulatorView, shown: list[str], min_pixels: int) -> bool:
-    if not all(key in view.objects and view.objects[key].visible for key in shown):
+def _shows(view: SimulatorView, targets: list[str], min_pixels: int) -> bool:
+    if not all(key in view.objects and view.objects[key].visible for key in targets):
         return False
     instances = view.instances
-    return instances is None or (shown[0] in instances and instances[shown[0]].pixels >= min_pixels)
+    return instances is None or (
+        targets[0] in instances and instances[targets[0]].pixels >= min_pixels
+    )
 
 
-def _is_well_inside(view: SimulatorView, item: str) -> bool:
+def _is_well_inside(view: SimulatorView, object_id: str) -> bool:
     """Return True if an object does not touch the margin of the frame."""
-    instance = (view.instances or {}).get(item)
+    instance = (view.instances or {}).get(object_id)
     return instance is None or all(_MARGIN <= edge < _SIDE - _MARGIN for edge in instance.box)
 
 

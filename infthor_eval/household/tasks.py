@@ -28,7 +28,7 @@ class TaskType(StrEnum):
 
 
 # Those that a task is drawn from: ALFRED's.
-SAMPLED = tuple(item for item in TaskType if item != TaskType.PUT_AWAY)
+SAMPLED = tuple(task_type for task_type in TaskType if task_type != TaskType.PUT_AWAY)
 
 
 class Task(msgspec.Struct, frozen=True):
@@ -175,14 +175,14 @@ def _is_sliced(params: dict[str, Any]) -> bool:
 
 def _describe(task: Task) -> str:
     bare = f"sliced {noun(task.pickup)}" if task.sliced else noun(task.pickup)
-    place = task.receptacle
+    receptacle = task.receptacle
     text = _TEMPLATES[task.task_type].format(
         pickup=task.pickup,
-        receptacle=place,
+        receptacle=receptacle,
         item=with_article(bare),
         items=f"slices of {noun(task.pickup)}" if task.sliced else plural(bare),
         bare=bare,
-        where=f"{preposition(place)} the {noun(place)}" if place else "",
+        where=f"{preposition(receptacle)} the {noun(receptacle)}" if receptacle else "",
         light=noun(task.light) if task.light else "",
         movable=with_article(noun(task.movable)) if task.movable else "",
     )

@@ -47,7 +47,7 @@ class FrameMemory(ABC):
     def recall(self, query: Query, budget: int | None) -> Recalled:
         """See `Memory`; in time order."""
         n_frames = min(self._room(budget), len(self.past))
-        return [self.past[place] for place in sorted(self.choose(query, n_frames))]
+        return [self.past[index] for index in sorted(self.choose(query, n_frames))]
 
     @abstractmethod
     def choose(self, query: Query, n_frames: int) -> Sequence[int]:
@@ -100,11 +100,11 @@ class Oracle(FrameMemory):
         """See `FrameMemory`."""
         known = set(query.clues or ())
         clues = [
-            place for place, observation in enumerate(self.past) if observation.number in known
+            index for index, observation in enumerate(self.past) if observation.number in known
         ]
         if len(clues) >= n_frames:
             return [clues[number * len(clues) // n_frames] for number in range(n_frames)]
         others = [
-            place for place, observation in enumerate(self.past) if observation.number not in known
+            index for index, observation in enumerate(self.past) if observation.number not in known
         ]
         return [*clues, *self.draw(query).sample(others, n_frames - len(clues))]

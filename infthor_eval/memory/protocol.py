@@ -151,6 +151,6 @@ class Memory(Protocol):
 
 def tokens_of(recalled: Recalled, tokens_per_frame: int) -> int:
     """Return the tokens of what is recalled: its frames', and an estimate of its texts'."""
-    texts = [item for item in recalled if isinstance(item, str)]
+    texts = [piece for piece in recalled if isinstance(piece, str)]
     of_texts = sum(math.ceil(len(text) / CHARACTERS_PER_TOKEN) for text in texts)
     return of_texts + tokens_per_frame * (len(recalled) - len(texts))

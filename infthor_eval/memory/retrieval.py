@@ -56,7 +56,9 @@ class _Nearest(FrameMemory):
         if not n_frames:
             return ()
         return nearest(
-            self.retriever.frames([item.frame for item in self.past]), self.vector(query), n_frames
+            self.retriever.frames([observation.frame for observation in self.past]),
+            self.vector(query),
+            n_frames,
         )
 
     @abstractmethod

@@ -87,7 +87,7 @@ class Notes(_Texts):
             raise ValueError("notes need a model that writes them")
         steps = _steps(window[0].number, window[-1].number)
         note = self.facts.write(
-            [*(item.frame for item in window), note_request(steps)], self._tokens
+            [*(observation.frame for observation in window), note_request(steps)], self._tokens
         )
         return f"{steps}: {' '.join(note.split())}\n"
 
@@ -123,12 +123,12 @@ def _lines(steps: Sequence[Observation]) -> Iterator[str]:
     goal = None
     before = ObjectLog()
     for step in steps:
-        said = [f"goal: {step.goal}"] if step.goal != goal and step.goal else []
-        said += [step.action] if step.action else []
+        sentences = [f"goal: {step.goal}"] if step.goal != goal and step.goal else []
+        sentences += [step.action] if step.action else []
         log = step.log or ObjectLog()
-        said += _news(before, log)
-        if said:
-            yield f"Step {step.number}: {'; '.join(said)}.\n"
+        sentences += _news(before, log)
+        if sentences:
+            yield f"Step {step.number}: {'; '.join(sentences)}.\n"
         goal = step.goal
         before = log
 

@@ -66,8 +66,8 @@ class Guard:
         # from elsewhere.
         if headers.get("origin", f"http://{host}") != f"http://{host}":
             return "another page asked"
-        given = path.removeprefix("/").partition("/")[0]
-        if not secrets.compare_digest(given.encode(), self._token):
+        token = path.removeprefix("/").partition("/")[0]
+        if not secrets.compare_digest(token.encode(), self._token):
             return (
                 "the address does not hold the token of this server; open the address that the "
                 "command printed"

@@ -41,14 +41,14 @@ class Limit:
         Raises:
             UsageError: the variable is not a whole number above 0.
         """
-        given = os.environ.get(self.name)
-        if given is None:
+        text = os.environ.get(self.name)
+        if text is None:
             return self.default
-        if not (given.isascii() and given.isdecimal() and len(given) <= 18 and int(given) > 0):
+        if not (text.isascii() and text.isdecimal() and len(text) <= 18 and int(text) > 0):
             raise UsageError(
-                f"{self.name}={given[:40]}: not a whole number above 0; set it to one, or unset it"
+                f"{self.name}={text[:40]}: not a whole number above 0; set it to one, or unset it"
             )
-        return int(given)
+        return int(text)
 
     @property
     def hint(self) -> str:

@@ -26,11 +26,11 @@ def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8],
         raise SimulatorError(
             f"scene {scene}: the simulator sends no frames; start it with rendering"
         )
-    places = [
-        msgspec.convert(place, Vector)
-        for place in _query(simulator, "GetReachablePositions").result
+    positions = [
+        msgspec.convert(position, Vector)
+        for position in _query(simulator, "GetReachablePositions").result
     ]
-    pose = find_room_view(simulator, places, first.shape[0] * first.shape[1])
+    pose = find_room_view(simulator, positions, first.shape[0] * first.shape[1])
     room = simulator.query(**teleport_call(pose)).frame
     above = _query(simulator, "ToggleMapView").frame
     assert room is not None
@@ -51,9 +51,8 @@ def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool =
     simulator.reset(scene)
     objects = simulator.metadata["objects"]
     reachable = _query(simulator, "GetReachablePositions").result
-    write_floor_plan(
-        folder, scene, objects, [(place["x"], place["z"]) for place in reachable], overwrite
-    )
+    cells = [(position["x"], position["z"]) for position in reachable]
+    write_floor_plan(folder, scene, objects, cells, overwrite)
     return len(objects)
 
 

@@ -216,8 +216,8 @@ def view_of(event: Any) -> SimulatorView:
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)
         # The inventory of arm agents is always empty; what they hold is in the arm's state.
         in_hand = [
-            item.object_id
-            for item in msgspec.convert(metadata["inventoryObjects"], list[_InHand] | None) or ()
+            held.object_id
+            for held in msgspec.convert(metadata["inventoryObjects"], list[_InHand] | None) or ()
         ]
         outcome = msgspec.convert(metadata, _Outcome)
     except (ValueError, KeyError, TypeError) as error:  # msgspec's errors are ValueErrors
@@ -228,7 +228,7 @@ def view_of(event: Any) -> SimulatorView:
     return SimulatorView(
         frame=None if event.frame is None else np.ascontiguousarray(event.frame),
         depth=None if event.depth_frame is None else np.ascontiguousarray(event.depth_frame),
-        objects={item.object_id: item for item in objects},
+        objects={obj.object_id: obj for obj in objects},
         agent=agent,
         inventory=tuple(in_hand if arm is None else arm.held),
         success=outcome.success,

@@ -79,15 +79,16 @@ def _flop(
     width = config.num_attention_heads * getattr(
         config, "head_dim", config.hidden_size // config.num_attention_heads
     )
+    lengths = [sequence.n_tokens for sequence in data.sequences]
     forward = sum(
-        2 * n_weights * item.n_tokens + 2 * config.num_hidden_layers * width * item.n_tokens**2
-        for item in data.sequences
+        2 * n_weights * n_tokens + 2 * config.num_hidden_layers * width * n_tokens**2
+        for n_tokens in lengths
     )
     trains_decoder = recipe.lora is None and any(
         parameter.requires_grad for parameter in parts["decoder"]
     )
     times = 2 + int(trains_decoder) + int(recipe.gradient_checkpointing)
-    n_frames = sum(len(item.frames) for item in data.sequences)
+    n_frames = sum(len(sequence.frames) for sequence in data.sequences)
     return times * forward + n_frames * _flop_of_frame(network) * (
         3 if network.trains_vision else 1
     )

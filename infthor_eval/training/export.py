@@ -36,8 +36,8 @@ def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
     if not any(isinstance(tensor, DTensor) for tensor in weights.values()):
         return None
     return {
-        name: item.full_tensor().cpu() if isinstance(item, DTensor) else item
-        for name, item in weights.items()
+        name: tensor.full_tensor().cpu() if isinstance(tensor, DTensor) else tensor
+        for name, tensor in weights.items()
     }
 
 

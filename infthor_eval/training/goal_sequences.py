@@ -13,7 +13,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import ACT, action_part, task_goal_part
 from infthor_eval.plans.history.segments import Part, PlanSegment
 from infthor_eval.plans.published.system_prompts import system_prompt
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 
 __all__ = ["goal_windows", "goals_of_actions"]
 
@@ -35,7 +35,7 @@ class _Window:
 
 def goal_windows(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
-) -> Iterator[TrainingSequence | SkippedItem]:
+) -> Iterator[TrainingSequence | SkippedSequence]:
     """Cut a history into sequences of goals, actions and frames, as published: without loose plans.
 
     Args:

@@ -57,9 +57,9 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
         reader = dcp.FileSystemReader(folder)
         stored: Mapping[str, Any] = reader.read_metadata().state_dict_metadata
         sizes = {
-            name: item.size
-            for name, item in stored.items()
-            if isinstance(item, TensorStorageMetadata)
+            name: entry.size
+            for name, entry in stored.items()
+            if isinstance(entry, TensorStorageMetadata)
         }
     weights = loaded.model.state_dict()
     stored_names = _stored_names(sizes, loaded.model, folder)
@@ -93,12 +93,12 @@ def _stored_names(sizes: Mapping[str, Any], model: Any, folder: Path) -> Mapping
     }
     tables = [
         {name: name for name in weights},
-        {of_hub[id(item)]: name for name, item in weights.items() if id(item) in of_hub},
+        {of_hub[id(weight)]: name for name, weight in weights.items() if id(weight) in of_hub},
     ]
-    found = max((_with_prefix(sizes, table) for table in tables), key=len)
-    if not found:
+    prefixed = max((_with_prefix(sizes, table) for table in tables), key=len)
+    if not prefixed:
         raise DataError(f"{folder}: has no weight of this model; {_HINT}")
-    return found
+    return prefixed
 
 
 def _with_prefix(sizes: Mapping[str, Any], names: Mapping[str, str]) -> Mapping[str, str]:

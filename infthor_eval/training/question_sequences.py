@@ -7,14 +7,14 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import TaskSamples
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence, within
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence, within
 
 __all__ = ["question_sequences"]
 
 
 def question_sequences(
     encoder: Encoder, task: TaskSamples, limit: int
-) -> Iterator[TrainingSequence | SkippedItem]:
+) -> Iterator[TrainingSequence | SkippedSequence]:
     """Yield a sequence for each sample of a task in a context, or a skipped item if unusable.
 
     Args:
@@ -27,13 +27,13 @@ def question_sequences(
         ModelError: the template refuses the turns.
     """
     for skipped in task.skipped:
-        yield SkippedItem(_name(skipped.question.id, skipped.variant), skipped.reason)
+        yield SkippedSequence(_name(skipped.question.id, skipped.variant), skipped.reason)
     for sample in task.samples:
         name = _name(sample.question.id, sample.variant)
         try:
             sequence = _sequence(encoder, task, sample, name)
         except DataError as error:
-            yield SkippedItem(name, str(error))
+            yield SkippedSequence(name, str(error))
             continue
         yield within(sequence, limit)
 

@@ -131,14 +131,14 @@ def _last_complete_checkpoint(out: Path) -> str | None:
     The Trainer itself would use the last folder, whatever it contains, and continue without the
     optimizer if that is missing. The state file is the last to be written.
     """
-    for place in sorted(
+    for folder in sorted(
         out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True
     ):
         try:
-            json.loads((place / "trainer_state.json").read_text(encoding="utf-8"))
+            json.loads((folder / "trainer_state.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue
-        return str(place)
+        return str(folder)
     return None
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from model_adapters.protocols import Decoding, Notice, Turn
 
-__all__ = ["Answer", "Asked", "Desk", "Question", "StaleError"]
+__all__ = ["Answer", "Desk", "Inquiry", "Question", "StaleError"]
 
 # seconds between two looks at signals: conditions wait without, and Ctrl-C must end a run at once
 _WAKE_S = 0.2
@@ -18,7 +18,7 @@ class StaleError(Exception):
 
 
 @dataclass(frozen=True)
-class Asked:
+class Inquiry:
     """What is put before a person: the turns that a model would be given, the decoding, and what is
     told beside."""
 
@@ -41,7 +41,7 @@ class Question:
     it was put."""
 
     number: int
-    asked: Asked
+    inquiry: Inquiry
     since: float
 
 
@@ -84,14 +84,14 @@ class Desk:
         """Whether nothing will be asked any more."""
         return self._is_closed
 
-    def ask(self, asked: Asked) -> Answer:
+    def ask(self, inquiry: Inquiry) -> Answer:
         """Put a question, and wait until it is answered.
 
         Raises:
             KeyboardInterrupt: the person stops the run from the page.
         """
         with self._changed:
-            self._question = Question(next(self._numbers), asked, time.monotonic())
+            self._question = Question(next(self._numbers), inquiry, time.monotonic())
             self._answer = None
             self._change()
             try:

@@ -26,7 +26,7 @@ _LONGEST = 2000  # characters of an answer
 _PACKAGE = "model_adapters.human"
 
 
-class _Given(msgspec.Struct):
+class _AnswerForm(msgspec.Struct):
     """An answer as the page sends it."""
 
     number: int
@@ -67,10 +67,10 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
         question = desk.question
         if question is None or question.number != request.path_params["number"]:
             return _problem("this question is not asked any more", 409)
-        frames = frames_of(question.asked.turns)
-        if request.path_params["place"] >= len(frames):
+        frames = frames_of(question.inquiry.turns)
+        if request.path_params["index"] >= len(frames):
             return _problem("there is no such frame", 404)
-        path = frames[request.path_params["place"]].path
+        path = frames[request.path_params["index"]].path
         return (
             FileResponse(path)
             if path.is_file()
@@ -80,10 +80,10 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
     async def answer(request: Request) -> Response:
         """Take an answer."""
         try:
-            given = msgspec.json.decode(await request.body(), type=_Given)
+            form = msgspec.json.decode(await request.body(), type=_AnswerForm)
         except (msgspec.ValidationError, msgspec.DecodeError):
             return _problem("not an answer", 400)
-        return _take(desk, given)
+        return _take(desk, form)
 
     async def stop(_request: Request) -> Response:
         """End the run, which can go on later."""
@@ -97,27 +97,27 @@ def desk_routes(desk: Desk) -> list[BaseRoute]:
     return [
         *pages,
         Route("/state.json", state),
-        Route("/frames/{number:int}/{place:int}", frame),
+        Route("/frames/{number:int}/{index:int}", frame),
         Route("/answer", answer, methods=["POST"]),
         Route("/stop", stop, methods=["POST"]),
     ]
 
 
-def _take(desk: Desk, given: _Given) -> Response:
+def _take(desk: Desk, form: _AnswerForm) -> Response:
     question = desk.question
-    text = given.text.strip()
+    text = form.text.strip()
     if not text:
         return _problem("write an answer first", 400)
     if len(text) > _LONGEST:
         return _problem(f"an answer has at most {_LONGEST} characters", 400)
     if (
         question is not None
-        and question.asked.decoding.choices
-        and text not in question.asked.decoding.choices
+        and question.inquiry.decoding.choices
+        and text not in question.inquiry.decoding.choices
     ):
         return _problem("only the listed replies are possible here", 400)
     try:
-        desk.give(given.number, Answer(text, max(0, given.watched)))
+        desk.give(form.number, Answer(text, max(0, form.watched)))
     except StaleError:
         return _problem("this question was answered already, perhaps in another tab", 409)
     return JSONResponse({})

@@ -38,15 +38,15 @@ def decode_greedily(
     """
     ids: list[int] = []
     logits = first
-    for place, allowed in enumerate(action_ids):
+    for position, allowed in enumerate(action_ids):
         scores = logits[allowed.start : allowed.stop] if constrained else logits
         if not torch.isfinite(scores.max()):  # the maximum is NaN if any score is
             raise ModelError(
-                f"action token {place + 1} has no finite score (NaN); try dtype=float32"
+                f"action token {position + 1} has no finite score (NaN); try dtype=float32"
             )
         token = int(scores.argmax()) + (allowed.start if constrained else 0)
         # The model is fed the token without clipping.
         ids.append(min(max(token, allowed.start), allowed.stop - 1))
-        if place + 1 < len(action_ids):
+        if position + 1 < len(action_ids):
             logits = step(token)
     return ids

@@ -156,11 +156,11 @@ class VllmModel(CheckpointModel):
         # Refuses choices that are longer than the reply may be.
         read_choices(self._loaded.tokenizer, decoding)
         own = self._loaded.generation.repetition_penalty
-        asked = decoding.repetition_penalty
+        penalty = decoding.repetition_penalty
         settings: dict[str, Any] = {
             "max_tokens": decoding.max_new_tokens,
             "temperature": decoding.temperature,
-            "repetition_penalty": own if asked is None else asked,
+            "repetition_penalty": own if penalty is None else penalty,
             "stop_token_ids": sorted(self._ends),
         }
         if not decoding.greedy:

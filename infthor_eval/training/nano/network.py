@@ -114,14 +114,14 @@ class NanoNetwork(SequenceModel):
         cell_loss = binary_cross_entropy_with_logits(
             logits, self._dataset.cells[rows], reduction="none"
         )
-        shown = self._dataset.shown[rows]
+        visible = self._dataset.visible[rows]
         present = self._dataset.present[rows]
         frame_loss = binary_cross_entropy_with_logits(
-            torch.logsumexp(logits, 1), shown, reduction="none"
+            torch.logsumexp(logits, 1), visible, reduction="none"
         )
         return (
             cell_loss.sum(-1).mean()
-            + (frame_loss * (1 - present + shown).clamp(max=1)).sum(-1).mean()
+            + (frame_loss * (1 - present + visible).clamp(max=1)).sum(-1).mean()
         )
 
     @property

@@ -19,7 +19,7 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.training.action_sequences import single_plans, windows
 from infthor_eval.training.data import read_history, trajectory_names
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.nano.network import spellings
 from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
@@ -92,7 +92,7 @@ class SequenceSampler:
         self._samples: list[tuple[NiehSet, Sample]] = []  # of the questions on their clue frames
         self._windows: list[TrainingSequence] = []
         self._single_plans: list[TrainingSequence] = []
-        self.skipped: list[SkippedItem] = []
+        self.skipped: list[SkippedSequence] = []
         recorded: list[tuple[str, list[str]]] = []
         for folder in folders:
             samples = find_samples({"data": str(folder), "context": "clues"})
@@ -113,7 +113,7 @@ class SequenceSampler:
                 raise DataError(
                     f"{', '.join(map(str, folders))}: no {what} to learn from; give another set"
                 )
-        counts = dataset.shown.sum(0).tolist()
+        counts = dataset.visible.sum(0).tolist()
         frequent = {
             name: count
             for name, count in zip(dataset.types, counts, strict=True)
@@ -129,20 +129,20 @@ class SequenceSampler:
                 history_windows = [*windows(self._encoder, name, segments, self._limit)]
                 plans = [*single_plans(self._encoder, name, segments)]
             except DataError as error:
-                self.skipped.append(SkippedItem(name, str(error)))
+                self.skipped.append(SkippedSequence(name, str(error)))
                 continue
             self._windows += self._without_skipped(history_windows)
             self._single_plans += [plan for plan in plans if plan.n_tokens <= self._limit]
             yield segments
 
     def _without_skipped(
-        self, items: Iterable[TrainingSequence | SkippedItem]
+        self, encoded: Iterable[TrainingSequence | SkippedSequence]
     ) -> Iterator[TrainingSequence]:
-        for item in items:
-            if isinstance(item, TrainingSequence):
-                yield item
+        for sequence in encoded:
+            if isinstance(sequence, TrainingSequence):
+                yield sequence
             else:
-                self.skipped.append(item)
+                self.skipped.append(sequence)
 
     def questions(
         self, n: int, synthetic_share: float, recalled_share: float, n_others: int
@@ -175,8 +175,8 @@ class SequenceSampler:
         clues = set() if sample.question.absence else set(sample.frames)
         others = self._rng.sample(range(last), min(self._rng.randint(0, n_others), last))
         recalled = tuple(sorted((clues | set(others)) - {last}))
-        shown = replace(sample, frames=(*recalled, last), recalled=recalled)
-        context, text = CONTEXTS[MEMORY].request(data, shown)
+        remembered = replace(sample, frames=(*recalled, last), recalled=recalled)
+        context, text = CONTEXTS[MEMORY].request(data, remembered)
         return self._encoder.answer(
             "recalled", [*as_images(context), text], doc_target(sample.question)
         )
@@ -221,10 +221,10 @@ class SequenceSampler:
             (name,) = self._rng.choices(self._names, self._weights)
             index = self._rng.randrange(len(self._dataset.frames))
             column = self._dataset.types.index(name)
-            if (self._dataset.shown if is_present else 1 - self._dataset.present)[index, column]:
+            if (self._dataset.visible if is_present else 1 - self._dataset.present)[index, column]:
                 break
         words = noun(name)
         text = self._rng.choice(_QUESTIONS).format(with_article(words), words)
         prompt = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
-        answer = "yes" if self._dataset.shown[index, column] else "no"
+        answer = "yes" if self._dataset.visible[index, column] else "no"
         return self._encoder.answer("synthetic", [self._dataset.frames[index], prompt], answer)

@@ -81,7 +81,7 @@ def train_small_model(
         words=recipe.words,
         seed=recipe.seed,
     )
-    for _, reason, n in count_reasons(("", item.reason) for item in sampler.skipped):
+    for _, reason, n in count_reasons(("", skipped.reason) for skipped in sampler.skipped):
         print_note(f"{n} skipped: {reason}")
     trainer = _StageTrainer(recipe, network, sampler, on_step)
     network.train()

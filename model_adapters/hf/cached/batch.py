@@ -24,7 +24,7 @@ class _Branches:
         self._embed = embed
         self._prefix = prefix
         self._ends = [prefix.end] * n_branches  # position of the next token of each
-        self._places = [prefix.n_tokens] * n_branches  # tokens of each, with the prefix
+        self._lengths = [prefix.n_tokens] * n_branches  # tokens of each, with the prefix
         device = model.get_input_embeddings().weight.device
         self._attention = BranchAttention(model.get_decoder().config, prefix.n_tokens, device)
 
@@ -80,11 +80,11 @@ class _Branches:
         keep: slice | torch.Tensor,
     ) -> torch.Tensor:
         """Encode tokens of the owners' branches; return the kept logits, (kept, vocabulary)."""
-        places = []
+        n_before = []
         for branch in owners:
-            places.append(self._places[branch])
-            self._places[branch] += 1
-        with self._attention.appended(owners, places):
+            n_before.append(self._lengths[branch])
+            self._lengths[branch] += 1
+        with self._attention.appended(owners, n_before):
             output = self._model(
                 inputs_embeds=embeds[None],
                 position_ids=positions,

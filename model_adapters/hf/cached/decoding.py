@@ -115,8 +115,8 @@ class ReplyState:
         self._generation = generation
         self._choices = choices
         self._finished = finished
-        asked = decoding.repetition_penalty
-        self._penalty = generation.repetition_penalty if asked is None else asked
+        penalty = decoding.repetition_penalty
+        self._penalty = generation.repetition_penalty if penalty is None else penalty
         # The penalty depends on the set of tokens, not on their counts.
         self._penalised_ids = (
             torch.tensor([list(set(context))], dtype=torch.long) if self._penalty != 1.0 else None

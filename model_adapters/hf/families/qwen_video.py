@@ -125,5 +125,5 @@ class QwenVideo:
             n_frames, -1, pixels.shape[-1] // (n_frames * area), n_frames, area
         )
         return torch.stack(
-            [by_frame[place, :, :, place] for place in range(n_frames)], dim=2
+            [by_frame[index, :, :, index] for index in range(n_frames)], dim=2
         ).flatten(1)

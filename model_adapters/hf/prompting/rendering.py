@@ -112,12 +112,12 @@ def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
 
 def prompt_end(tokenizer: Any, template: str) -> str:
     """Return what the template writes behind a user's turn; empty if it needs frames there."""
-    asked = "?"
+    probe = "?"
     try:
-        text = _apply(tokenizer, template, (turn := Turn("user", (asked,)),), [_message(turn)])
+        text = _apply(tokenizer, template, (turn := Turn("user", (probe,)),), [_message(turn)])
     except ModelError:
         return ""
-    return text.rpartition(asked)[2]
+    return text.rpartition(probe)[2]
 
 
 def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:
@@ -138,10 +138,10 @@ def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:
 
 
 def _message(turn: Turn) -> dict[str, Any]:
-    return {"role": turn.role, "content": [_item(part) for part in turn.parts]}
+    return {"role": turn.role, "content": [_content_part(part) for part in turn.parts]}
 
 
-def _item(part: Part) -> dict[str, str]:
+def _content_part(part: Part) -> dict[str, str]:
     if isinstance(part, str):
         # Most templates read "text", a few "content".
         return {"type": "text", "text": part, "content": part}

@@ -138,9 +138,8 @@ class SpatialBins:
         Args:
             ids: three ids per step, each among `action_ids` of its place.
         """
-        steps = np.array(ids).reshape(-1, TOKENS_PER_STEP) - [
-            place.start for place in self.action_ids
-        ]
+        first_ids = [allowed.start for allowed in self.action_ids]
+        steps = np.array(ids).reshape(-1, TOKENS_PER_STEP) - first_ids
         theta, phi, r = _centres(steps[:, 0], self.theta, self.phi, self.r)
         xyz = [r * np.sin(theta) * np.cos(phi), r * np.sin(theta) * np.sin(phi), r * np.cos(theta)]
         rotation = _centres(steps[:, 1], self.roll, self.pitch, self.yaw)
@@ -157,8 +156,8 @@ def _n(borders: Sequence[float]) -> int:
 
 def _centres(index: np.ndarray, *axes: Sequence[float]) -> list[np.ndarray]:
     """Return the centres on three axes of bins, (steps,), numbered with the last axis fastest."""
-    places = np.unravel_index(index, [_n(axis) for axis in axes])
+    coordinates = np.unravel_index(index, [_n(axis) for axis in axes])
     return [
         (np.array(axis)[at] + np.array(axis)[at + 1]) / 2
-        for at, axis in zip(places, axes, strict=True)
+        for at, axis in zip(coordinates, axes, strict=True)
     ]

@@ -224,8 +224,8 @@ class SpatialVLANetwork:
             return logits(embed_ids(model, [token]))
 
         ids = self.prompt_ids(instruction)
-        places = torch.tensor(ids, device=model.device) == self.image_id
-        prefix = embed_ids(model, ids).masked_scatter(places[None, :, None], self.features(image))
+        is_image = torch.tensor(ids, device=model.device) == self.image_id
+        prefix = embed_ids(model, ids).masked_scatter(is_image[None, :, None], self.features(image))
         action = decode_greedily(
             logits(prefix), step, self.bins.action_ids * self.chunk, constrained=constrained
         )
