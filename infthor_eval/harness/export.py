@@ -120,10 +120,12 @@ def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
     rows = []
     for _, same in sorted(repeated.items()):
         replies = [reply for row, _ in same for reply in row["filtered_resps"]]
-        merged = {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics}
+        first, _ = same[0]
+        rows.append(
+            first | {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics}
+        )
         for name in task.metrics:
-            merged[name] = fmean(scores.get(name, 0.0) for _, scores in same)
-        rows.append(same[0][0] | merged)
+            rows[-1][name] = fmean(scores.get(name, 0.0) for _, scores in same)
     return rows
 
 

@@ -83,8 +83,10 @@ class _ReportSteps(transformers.TrainerCallback):
         now = time.perf_counter()
         speed = self._tokens_per_step / (now - self._start)
         self._start = now
-        figures = [float(logs[name]) for name in ("loss", "learning_rate", "grad_norm")]
-        self._report(Progress(state.global_step, state.max_steps, *figures, speed))
+        loss = float(logs["loss"])
+        rate = float(logs["learning_rate"])
+        norm = float(logs["grad_norm"])
+        self._report(Progress(state.global_step, state.max_steps, loss, rate, norm, speed))
 
 
 def train_with_trainer(

@@ -63,7 +63,8 @@ class Endpoint:
 
     After a request has failed in all its attempts, later requests get one attempt each until one
     succeeds: otherwise every sample of a run would wait through all retries of a server that is
-    down.
+    down. The client's own retries would neither be recorded, nor count in the rate limit, nor be
+    known to the other threads, and they wait for at most 8 s.
     """
 
     def __init__(self, options: OpenAIOptions, secret: Secret) -> None:

@@ -95,24 +95,12 @@ class SequenceSampler:
         self.skipped: list[SkippedSequence] = []
         recorded: list[tuple[str, list[str]]] = []
         for folder in folders:
-            samples = find_samples({"data": str(folder), "context": "clues"})
-            self._questions += self._without_skipped(
-                question_sequences(encoder, samples, window_tokens)
-            )
-            self._samples += [(samples.data, sample) for sample in samples.samples]
+            self._read_questions(folder)
             for segments in self._read_histories(NiehSet(folder)):
                 for segment in segments:
                     recorded.append((segment.plan, [action for action, _ in segment.steps]))
         self._synthetic = SyntheticPlans(recorded)
-        for what, pool in (
-            ("question", self._questions),
-            ("history", self._windows),
-            ("plan", self._synthetic),
-        ):
-            if not pool:
-                raise DataError(
-                    f"{', '.join(map(str, folders))}: no {what} to learn from; give another set"
-                )
+        self._require_all_kinds(folders)
         counts = dataset.visible.sum(0).tolist()
         frequent = {
             name: count
@@ -120,6 +108,19 @@ class SequenceSampler:
             if count >= _LEAST_FRAMES
         }
         self._names, self._weights = list(frequent), list(frequent.values())
+
+    def _read_questions(self, folder: Path) -> None:
+        samples = find_samples({"data": str(folder), "context": "clues"})
+        sequences = question_sequences(self._encoder, samples, self._limit)
+        self._questions += self._without_skipped(sequences)
+        self._samples += [(samples.data, sample) for sample in samples.samples]
+
+    def _require_all_kinds(self, folders: Sequence[Path]) -> None:
+        kinds = {"question": self._questions, "history": self._windows, "plan": self._synthetic}
+        for kind, pool in kinds.items():
+            if not pool:
+                where = ", ".join(map(str, folders))
+                raise DataError(f"{where}: no {kind} to learn from; give another set")
 
     def _read_histories(self, data: NiehSet) -> Iterator[list[PlanSegment]]:
         """Read the histories of a set, skipping those that cannot be read."""
