@@ -37,8 +37,7 @@ from model_adapters.registry import (
     names,
     options,
 )
-from model_adapters.stopping import cut_at_stop
-from model_adapters.thinking import Thought, answer_of
+from model_adapters.thinking import Thought, answer_of, cut_at_stop
 from model_adapters.transcript import Transcript
 
 __all__ = [

@@ -56,15 +56,15 @@ def is_feasible(task: Task, room: SymbolicRoom) -> bool:
     """
     if task.receptacle is None:
         return True
-    items = _of_types(room, {task.pickup, *task.targets})
+    items = _items_of_types(room, {task.pickup, *task.targets})
     goals = [key for key in room.receptacles if room.types[key] == task.receptacle]
     if task.movable is None:
         return _any_fits(room, items, goals)
-    carriers = _of_types(room, {task.movable})
+    carriers = _items_of_types(room, {task.movable})
     return _any_fits(room, items, carriers) and _any_fits(room, carriers, goals)
 
 
-def _of_types(room: SymbolicRoom, types: set[str | None]) -> list[str]:
+def _items_of_types(room: SymbolicRoom, types: set[str | None]) -> list[str]:
     return [item for item, _ in room.start.where if room.types[item] in types]
 
 

@@ -10,7 +10,7 @@ from model_adapters.human.adapter import HumanOptions
 from model_adapters.human.desk import Desk, Inquiry
 from model_adapters.human.serving import serve_desk
 from model_adapters.protocols import Capabilities, Conversation, Decoding, Notice, Reply, Turn
-from model_adapters.stopping import cut_at_stop
+from model_adapters.thinking import cut_at_stop
 
 __all__ = ["HumanModel"]
 

@@ -20,10 +20,14 @@ from infthor_eval.training.export import export
 from infthor_eval.training.nano.architecture import TOKENS, build_untrained, image_processor
 from infthor_eval.training.nano.frame_dataset import _cell_coverage, _type, read_frame_dataset
 from infthor_eval.training.nano.network import NanoNetwork, spellings
-from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts, question_intro
+from infthor_eval.training.nano.sampler import (
+    SequenceSampler,
+    SyntheticPlans,
+    corpus_texts,
+    question_intro,
+)
 from infthor_eval.training.nano.settings import NanoRecipe
 from infthor_eval.training.nano.stages import train_small_model
-from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from model_adapters import check_adapter, load
 
 from ..bundled import bundled_name

@@ -1,6 +1,7 @@
 """Random sampling of the small model's training sequences."""
 
 import random
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,16 +17,17 @@ from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.plans.actors.habits import fill_action, open_action
+from infthor_eval.plans.actors.script import read_plan, replace_objects
 from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.training.action_sequences import single_plans, windows
 from infthor_eval.training.data import read_history, trajectory_names
 from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.nano.network import spellings
-from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from infthor_eval.training.question_sequences import question_sequences
 
-__all__ = ["SequenceSampler", "corpus_texts", "question_intro"]
+__all__ = ["SequenceSampler", "SyntheticPlans", "corpus_texts", "question_intro"]
 
 _LEAST_FRAMES = 20  # frames that have to show a type before synthetic questions ask for it
 _QUESTIONS = ("Have you seen {0}?", "Is there any {1} in this room?")
@@ -229,3 +231,31 @@ class SequenceSampler:
         prompt = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
         answer = "yes" if self._dataset.visible[index, column] else "no"
         return self._encoder.answer("synthetic", [self._dataset.frames[index], prompt], answer)
+
+
+class SyntheticPlans:
+    """Plans and actions of experts, each object replaced by one of the same role in a similar plan.
+
+    The words of a plan and the objects of its actions correspond, so a model learns which words
+    name which objects.
+    """
+
+    def __init__(self, recorded: Iterable[tuple[str, Sequence[str]]]) -> None:
+        """Group recorded plans by kind, without those whose actions name no object of the plan."""
+        kinds: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
+        for plan, actions in recorded:
+            templates = tuple(open_action(action, plan) for action in actions)
+            if templates != tuple(actions):
+                kinds[read_plan(plan)[0], templates].append(plan)
+        self._kinds = [(templates, plans) for (_, templates), plans in kinds.items()]
+
+    def __bool__(self) -> bool:
+        """Return True if any plan can be sampled."""
+        return bool(self._kinds)
+
+    def sample(self, rng: random.Random) -> tuple[str, list[str]]:
+        """Return a plan and its actions; kinds are as frequent as in the recorded plans."""
+        ((templates, plans),) = rng.choices(self._kinds, [len(plans) for _, plans in self._kinds])
+        columns = zip(*(read_plan(plan)[1] for plan in plans), strict=True)
+        plan = replace_objects(plans[0], [rng.choice(column) for column in columns])
+        return plan, [fill_action(action, plan) for action in templates]

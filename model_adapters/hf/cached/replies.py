@@ -7,7 +7,7 @@ from model_adapters.hf.cached.choices import read_choices
 from model_adapters.hf.cached.decoding import ReplyState
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.protocols import Decoding, Reply
-from model_adapters.stopping import cut_at_stop
+from model_adapters.thinking import cut_at_stop
 
 __all__ = ["begin_reply", "end_reply", "reply_text", "stop_ids"]
 
