@@ -81,9 +81,8 @@ def find_viewpoint(
         if qualifies and (
             inside is None or _comes_into_view(simulator, targets[0], inside, min_pixels)
         ):
-            is_clear = (
-                inside is not None or not focus.pickupable or _is_well_inside(view, targets[0])
-            )
+            needs_margin = inside is None and focus.pickupable
+            is_clear = not needs_margin or _is_well_inside(view, targets[0])
             best = viewpoint if is_clear or best is None else best
             if is_clear:
                 break
@@ -110,10 +109,9 @@ def grid_pose_of(pose: AgentPose, grid: Grid) -> GridPose:
 def _shows(view: SimulatorView, targets: list[str], min_pixels: int) -> bool:
     if not all(key in view.objects and view.objects[key].visible for key in targets):
         return False
-    instances = view.instances
-    return instances is None or (
-        targets[0] in instances and instances[targets[0]].pixels >= min_pixels
-    )
+    if view.instances is None:
+        return True
+    return targets[0] in view.instances and view.instances[targets[0]].pixels >= min_pixels
 
 
 def _is_well_inside(view: SimulatorView, object_id: str) -> bool:

@@ -156,12 +156,12 @@ def _object_type(
     object_type = in_info or params.get(name)
     if isinstance(object_type, str) and object_type:
         return modern_type(object_type)
-    places = (
+    sources = (
         f"task_info's {_IN_INFO[name]} or pddl_params' {name}"
         if name in _IN_INFO
         else f"pddl_params' {name}"
     )
-    raise DataError(f"a task of type {task_type} has no {places}; give an object type there")
+    raise DataError(f"a task of type {task_type} has no {sources}; give an object type there")
 
 
 def _is_sliced(params: dict[str, Any]) -> bool:

@@ -55,11 +55,8 @@ class _Nearest(FrameMemory):
 
         if not n_frames:
             return ()
-        return nearest(
-            self.retriever.frames([observation.frame for observation in self.past]),
-            self.vector(query),
-            n_frames,
-        )
+        frames = self.retriever.frames([observation.frame for observation in self.past])
+        return nearest(frames, self.vector(query), n_frames)
 
     @abstractmethod
     def vector(self, query: Query) -> Any:

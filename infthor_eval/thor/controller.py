@@ -16,7 +16,8 @@ _ANY_DISPLAY = "0"  # ai2thor requires some DISPLAY; a simulator without a windo
 
 
 class SafeController(ai2thor.controller.Controller):
-    """An `ai2thor.controller.Controller` that never hangs, and removes process, pipes and files.
+    """An `ai2thor.controller.Controller` that never hangs, and removes its process, pipes and
+    files.
 
     A simulator started from an executable has its log in a temporary folder instead of
     `~/.ai2thor`.
@@ -58,8 +59,9 @@ class SafeController(ai2thor.controller.Controller):
             # ai2thor raises the same classes for a scene and for a build that does not exist.
             self.stop()
             message = " ".join(str(error).split())[:300]
-            # Its message also if the download server cannot be reached.
-            if "no build exists" in message:
+            if (
+                "no build exists" in message
+            ):  # its message also if the download server cannot be reached
                 raise SimulatorError(
                     "AI2-THOR's Unity build is not installed and cannot be downloaded; go online "
                     "once, or name an executable"
@@ -76,14 +78,16 @@ class SafeController(ai2thor.controller.Controller):
         return super().base_dir if self._folder is None else str(self._folder.path)
 
     def reset(self, scene: str | dict[str, Any] | None = None, **init_params: Any) -> Any:
-        """Load a scene as ai2thor's method does, but raise SimulatorError if it fails."""
+        """Load a scene as ai2thor's method does, but raise SimulatorError if the simulator
+        fails."""
         try:
             return super().reset(scene, **init_params)
         except PeerFault as fault:
             raise self._with_log(fault) from fault
 
     def step(self, action: str | dict[str, Any] | None = None, **action_args: Any) -> Any:
-        """Run one action as ai2thor's method does, but raise SimulatorError if it fails."""
+        """Run one action as ai2thor's method does, but raise SimulatorError if the simulator
+        fails."""
         try:
             return super().step(action, **action_args)
         except PeerFault as fault:
@@ -96,7 +100,8 @@ class SafeController(ai2thor.controller.Controller):
             raise self._with_log(self.server.fault) from error
 
     def stop(self) -> None:
-        """Kill and reap the simulator; remove its pipes and files. Again, it does nothing."""
+        """Kill and reap the simulator, and remove its pipes and temporary files. Calling it again
+        does nothing."""
         if self.server is not None:
             self.server.stop()
         # ai2thor registers an exit handler that keeps this object alive, so the large event is
@@ -112,8 +117,9 @@ class SafeController(ai2thor.controller.Controller):
     def unity_command(self, width: int, height: int, headless: bool) -> list[str]:
         """Return the command line of the simulator."""
         if self._folder is not None:
-            # For a GPU number ai2thor would run vulkaninfo, which many machines lack.
-            self.gpu_device = None
+            self.gpu_device = (
+                None  # for a GPU number ai2thor would run vulkaninfo, which many machines lack
+            )
         return super().unity_command(width, height, headless)
 
     def _build_server(self, host: str, port: int, width: int, height: int) -> None:

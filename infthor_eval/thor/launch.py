@@ -1,4 +1,5 @@
-"""Command lines of simulators: the embedded one, a Unity executable, or ai2thor's download."""
+"""Command lines of simulators: the embedded one, a local Unity executable, or the build that
+ai2thor downloads."""
 
 import shlex
 import sys
@@ -47,7 +48,7 @@ def embedded_launch(
     Raises:
         UsageError: the time limit of an action, `limits.ACTION_SECONDS`, is set to no number.
     """
-    words = [sys.executable, "-m", "infthor_sim.player"]
+    words = [sys.executable, "-m", "infthor_sim"]
     if data is not None:
         words += ["--data", str(Path(data).resolve())]
     if supplement is not None:
@@ -62,7 +63,8 @@ def embedded_launch(
 
 
 def unity_launch(executable: Path | None = None, *, platform: str | None = None) -> Launch:
-    """Return the launch of a Unity build of AI2-THOR: a local executable, or ai2thor's download.
+    """Return the launch of a Unity build of AI2-THOR: a local executable, or the build that ai2thor
+    downloads.
 
     Raises:
         UsageError: the time limit of an action, `limits.UNITY_ACTION_SECONDS`, is set to no number.
