@@ -47,9 +47,7 @@ def logged_action_frames(steps: Sequence[Step]) -> dict[int, tuple[int, ...]] | 
     """
     if all(step.low_idx is None for step in steps):
         return None
-    return _by_action(
-        (step.low_idx, position) for position, step in enumerate(steps) if step.low_idx
-    )
+    return _by_action((step.low_idx, index) for index, step in enumerate(steps) if step.low_idx)
 
 
 def _by_action(frames: Iterable[tuple[int, int]]) -> dict[int, tuple[int, ...]]:

@@ -217,9 +217,7 @@ class NiehSet:
             )
             if logged is not None:
                 return logged
-        positions = {
-            frame.path.stem: position for position, frame in enumerate(self.frames(traj_id))
-        }
+        positions = {frame.path.stem: index for index, frame in enumerate(self.frames(traj_id))}
         return read_action_log(path, positions)
 
     def states(self, traj_id: str) -> dict[int, str]:

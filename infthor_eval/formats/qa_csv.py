@@ -46,9 +46,7 @@ def read_questions(path: Path) -> list[Question | SkippedQuestion]:
     file = next((name for name in _CLUE_FILES if f"{name}_clue" in path.stem), None)
     entries = [_question_or_reason(row, path, file) for row in read_rows(path, _COLUMNS, hint)]
     if entries and not any(isinstance(entry, Question) for entry in entries):
-        reason = next(
-            question.reason for question in entries if isinstance(question, SkippedQuestion)
-        )
+        reason = next(entry.reason for entry in entries if isinstance(entry, SkippedQuestion))
         raise DataError(f"{path}: no row is a question ({reason})")
     return entries
 
@@ -76,9 +74,8 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
             question.question_type or "",
             absence,
         ]
-        writer.writerow(
-            [*cells, *(_published_cells(question.published) if question.published else ())]
-        )
+        published = _published_cells(question.published) if question.published else ()
+        writer.writerow([*cells, *published])
     return text.getvalue().encode()
 
 
