@@ -86,7 +86,9 @@ def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
                 if there
             }
             shown = {
-                name for name, there in zip(dataset.types, dataset.shown[at], strict=True) if there
+                name
+                for name, there in zip(dataset.types, dataset.visible[at], strict=True)
+                if there
             }
             assert present == {_type(key) for key in step.seen}
             assert shown <= set(step.object_log.visible) | present
@@ -158,7 +160,7 @@ def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answe
         about = max((name for name in words if f" {name}" in text), key=len)
         counts[answer] += 1
         here = index[frame.digest]
-        assert bool(dataset.shown[here, words[about]]) == (answer == "yes")
+        assert bool(dataset.visible[here, words[about]]) == (answer == "yes")
         assert answer == "yes" or not dataset.present[here, words[about]]
     assert min(counts.values()) > 70
 
