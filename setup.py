@@ -1,7 +1,7 @@
 """Which files go into the wheel; everything else about the package is in pyproject.toml.
 
 `tasks/` and `results/` lie beside the package in a checkout (people edit and read them there) and
-inside it in a wheel, as data. `infthor_eval.storage.packaged` finds them in either place.
+inside it in a wheel, as data. `infthor_eval.storage.folders` finds them in either place.
 """
 
 from setuptools import find_packages, setup

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from noise_set import write_set
 
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
 SHIM = Path(__file__).parents[1] / "tests" / "peers"

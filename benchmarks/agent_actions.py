@@ -32,7 +32,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.training.data import read_history, trajectory_names
 from model_adapters import Decoding
 from model_adapters.hf.cached.model import TransformersModel

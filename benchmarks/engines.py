@@ -28,7 +28,7 @@ from noise_set import write_set
 from served import serve_vllm
 
 from infthor_eval.runs import read_run
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import find_suite
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 

@@ -32,7 +32,7 @@ from playwright.sync_api import sync_playwright
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs.journals.shards import FOLDER, read_run
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 _MODELS, _TASK = ("oracle", "blind"), "nieh_gt"
 _ROUNDS = 5

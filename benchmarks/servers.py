@@ -7,7 +7,7 @@ vLLM and transformers here.
     make test-vllm                                  # once: the environment with vLLM
     .venv-vllm/bin/python benchmarks/servers.py
     .venv/bin/python benchmarks/servers.py --engines "transformers serve" \\
-        --pretrained FOLDER --adapter hf-vlm
+        --pretrained NANO_FOLDER --adapter hf-vlm
 
 `transformers serve` wants all of torchvision or none of it. For a CPU there is but half of it, and
 a Qwen2.5-VL needs that: so it is asked in the ordinary environment, with a checkpoint of another
@@ -27,9 +27,9 @@ from typing import Any
 from served import Served, serve_transformers, serve_vllm
 
 from infthor_eval.runs import read_run
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.suites import find_suite
-from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
+from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
 
 TASKS = {"nieh": "nieh_mini", "plans": "infthor_plans_mini"}
 HERE = "transformers, here"
@@ -51,7 +51,10 @@ def main() -> None:
         "--limit", type=int, help="questions, and trajectories of plans, of each task"
     )
     parser.add_argument(
-        "--pretrained", type=Path, default=packaged_folder(FOLDER), help="folder of a checkpoint"
+        "--pretrained",
+        type=Path,
+        default=packaged_folder(NANO_FOLDER),
+        help="folder of a checkpoint",
     )
     parser.add_argument("--adapter", default="qwen2.5-vl", help="its model name here")
     parser.add_argument("--engines", nargs="+", choices=ENGINES, default=ENGINES)

@@ -1,14 +1,10 @@
-"""Classes and functions by name, of this package and of others: a built-in table first, then entry
-points.
+"""Classes and functions by name: a built-in table first, then entry points of other packages.
 
 They are imported only when they are asked for, so that `--help` stays quick.
 """
 
-import gc
 import importlib
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import reduce
 from importlib.metadata import EntryPoint, entry_points
@@ -16,7 +12,7 @@ from typing import Any
 
 from infthor_eval.errors import UsageError, describe_exception, in_one_line, unknown_name
 
-__all__ = ["PluginTable", "collecting_no_garbage", "import_target"]
+__all__ = ["PluginTable", "import_target"]
 
 
 @dataclass(frozen=True)
@@ -80,25 +76,4 @@ class PluginTable:
 def import_target(target: str) -> Any:
     """Import what "module:Class" names."""
     module, _, attributes = target.partition(":")
-    with nullcontext() if module in sys.modules else collecting_no_garbage():
-        imported = importlib.import_module(module)
-    return reduce(getattr, attributes.split("."), imported)
-
-
-@contextmanager
-def collecting_no_garbage() -> Iterator[None]:
-    """Pause garbage collection, and let later collections pass over what was made meanwhile, which
-    modules keep.
-
-    Importing torch and transformers makes a million objects, and collections look at them again and
-    again: a quarter of the time from the command to a small model's first question.
-    """
-    if not gc.isenabled():
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.enable()
+    return reduce(getattr, attributes.split("."), importlib.import_module(module))

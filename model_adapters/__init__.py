@@ -3,18 +3,19 @@
 Importing this package imports neither torch nor transformers; the first model that needs them does.
 """
 
-from model_adapters.attended import Attended, Notice
 from model_adapters.backend import Backend, BackendConversation
 from model_adapters.check import CheckResult, ContractError, check_adapter, run_checks
 from model_adapters.protocols import (
     ROLES,
     Adapter,
     ArmDelta,
+    Attended,
     Capabilities,
     Conversation,
     Decoding,
     Mark,
     Model,
+    Notice,
     Part,
     Policy,
     Reply,
@@ -36,8 +37,7 @@ from model_adapters.registry import (
     names,
     options,
 )
-from model_adapters.stopping import cut_at_stop
-from model_adapters.thinking import Thought, answer_of
+from model_adapters.thinking import Thought, answer_of, cut_at_stop
 from model_adapters.transcript import Transcript
 
 __all__ = [

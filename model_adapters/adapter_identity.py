@@ -13,8 +13,7 @@ __all__ = ["package_identity"]
 
 
 def package_identity(point: EntryPoint) -> dict[str, Any]:
-    """Return the package behind an entry point, its version and a digest of its source, as JSON
-    values.
+    """Return an entry point's package, version and digest of its source, as JSON values.
 
     The digest covers all modules of the top-level package, because an adapter may be edited without
     a new version. Nothing is imported.

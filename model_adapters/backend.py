@@ -46,8 +46,7 @@ class BackendConversation(Transcript):
 
     @property
     def n_tokens(self) -> int | None:
-        """Tokens that the model would be given by `reply` now, or None if the model does not count
-        them.
+        """Tokens that `reply` would give the model now, or None if it does not count them.
 
         Raises:
             DataError: a frame cannot be read.

@@ -43,7 +43,7 @@ BUILT_IN = {
     ),
     "hf-vlm": _locate("hf.families.hf_vlm:HfVlm", "options.families:HfVlmOptions"),
     "hf-vlm@vllm": _locate("vllm.adapter:HfVlmOnVllm", "vllm.options:HfVlmOnVllmOptions"),
-    "human": _locate("human.adapter:Human", "human.options:HumanOptions", _PERSON),
+    "human": _locate("human.adapter:Human", "human.adapter:HumanOptions", _PERSON),
     "llava-onevision": _locate(
         "hf.families.llava_onevision:LlavaOnevision", "options.families:LlavaOnevisionOptions"
     ),
@@ -63,7 +63,7 @@ BUILT_IN = {
     "qwen2.5-vl": _locate("hf.families.qwen2_5_vl:Qwen25VL", "options.families:Qwen25VLOptions"),
     "qwen2.5-vl@vllm": _locate("vllm.adapter:Qwen25VLOnVllm", "vllm.options:Qwen25VLOnVllmOptions"),
     "qwen2.5-vl-nano": _locate(
-        "tiny.qwen2_5_vl_nano:Qwen25VLNano", "options.families:Qwen25VLNanoOptions", _NANO
+        "hf.families.qwen2_5_vl:Qwen25VLNano", "options.families:Qwen25VLNanoOptions", _NANO
     ),
     "qwen2.5-vl-tiny": _locate(
         "tiny.qwen2_5_vl:Qwen25VLTiny", "options.tiny:Qwen25VLTinyOptions", _RANDOM

@@ -1,5 +1,4 @@
-"""Import transformers without scikit-learn and scipy's optimizers, which take a fifth of the
-start-up time.
+"""Import transformers without scikit-learn and scipy's optimizers: a fifth of the start-up time.
 
 transformers imports one function of scikit-learn wherever that is installed (lm-eval needs it), for
 assisted generation, and one of scipy, for the losses of object detection. No adapter uses either.
@@ -20,8 +19,7 @@ _UNUSED = (
 
 
 def _import_without(module: str, test_name: str, package: str) -> None:
-    """Import a module of transformers that takes a package for missing unless it is imported
-    already."""
+    """Import a module of transformers, which takes a package not yet imported for missing."""
     is_available = getattr(transformers.utils, test_name)
     setattr(transformers.utils, test_name, lambda: package in sys.modules)
     try:

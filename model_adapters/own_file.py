@@ -8,7 +8,6 @@ from types import ModuleType
 from typing import Any
 
 from infthor_eval.errors import ModelError, wrap_errors
-from infthor_eval.plugins import collecting_no_garbage
 from infthor_eval.storage.digests import digest
 
 __all__ = ["file_identity", "load_from_file", "name_in_file", "names_a_file"]
@@ -25,8 +24,7 @@ def name_in_file(name: str) -> str:
 
 
 def load_from_file(name: str, kind: str = "class") -> Any:
-    """Run the file, once for each version of its content, and return what it defines under that
-    name.
+    """Run the file, once for each version of its content; return what has that name in it.
 
     The file cannot import its neighbours: code of several files has to be a package.
 
@@ -40,17 +38,16 @@ def load_from_file(name: str, kind: str = "class") -> Any:
     """
     path = _path(name)
     module = _module(path, _source(path))
-    found = getattr(module, name_in_file(name), None)
-    if found is None:
+    target = getattr(module, name_in_file(name), None)
+    if target is None:
         raise ModelError(
             f"{path} has no {kind} {name_in_file(name)}; write FILE.py:NAME with a {kind} in it"
         )
-    return found
+    return target
 
 
 def file_identity(name: str) -> dict[str, Any]:
-    """Return the file's name and a digest of its content, as JSON values; its folder does not
-    matter.
+    """Return the file's name and its content's digest, as JSON values, whatever its folder.
 
     Raises:
         ModelError: the file cannot be read.
@@ -80,11 +77,7 @@ def _module(path: Path, source: bytes) -> ModuleType:
     module = ModuleType(f"infthor_eval_own_{digest(source)}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses resolve annotations through it
-    with (
-        wrap_errors(
-            f"{path}: fails when it is imported", "fix it", catch=Exception, raise_as=ModelError
-        ),
-        collecting_no_garbage(),
-    ):
+    problem = f"{path}: fails when it is imported"
+    with wrap_errors(problem, "fix it", catch=Exception, raise_as=ModelError):
         exec(compile(source, path, "exec"), vars(module))
     return module

@@ -17,11 +17,13 @@ __all__ = [
     "ROLES",
     "Adapter",
     "ArmDelta",
+    "Attended",
     "Capabilities",
     "Conversation",
     "Decoding",
     "Mark",
     "Model",
+    "Notice",
     "Part",
     "Policy",
     "Reply",
@@ -97,10 +99,10 @@ class Decoding:
     def document(self) -> dict[str, Any]:
         """Return all settings as JSON values, for fingerprints; a penalty that is the checkpoint's
         own is left out."""
-        given = {name: value for name, value in asdict(self).items() if value is not None}
+        settings = {name: value for name, value in asdict(self).items() if value is not None}
         return {
             name: list(value) if isinstance(value, tuple) else value
-            for name, value in given.items()
+            for name, value in settings.items()
         }
 
 
@@ -253,8 +255,7 @@ class Subject(Protocol):
         """Capabilities; of a policy's only `deterministic` and `max_in_flight` are used."""
 
     def identity(self) -> dict[str, Any]:
-        """Return everything that can change a result, as JSON values; equal identities give equal
-        results."""
+        """Return all that can change a result, as JSON values; equal ones give equal results."""
 
     def close(self) -> None:
         """Free all memory; the subject cannot be used afterwards."""
@@ -315,8 +316,7 @@ class Policy(Subject, Protocol):
 
 
 class Adapter(Protocol):
-    """An adapter class: its options, a dataclass with defaults, and a method that builds the
-    model."""
+    """An adapter class: its options, a dataclass with defaults, and how the model is built."""
 
     Options: ClassVar[type]
 
@@ -329,3 +329,31 @@ class Adapter(Protocol):
             options: an instance of `Options`.
             seed: seed of whatever is random in the model.
         """
+
+
+@dataclass(frozen=True, kw_only=True)
+class Notice:
+    """What a person is told beside the conversation, which models are not.
+
+    Attributes:
+        title: heading of what is asked.
+        facts: names and values, in order.
+        news: what became of the last reply; empty if there is nothing to say.
+        words: words that complete what is typed.
+        replies: replies that are possible now, as buttons; others are possible too, unless the
+            decoding has choices.
+    """
+
+    title: str = ""
+    facts: tuple[tuple[str, str], ...] = ()
+    news: str = ""
+    words: tuple[str, ...] = ()
+    replies: tuple[str, ...] = ()
+
+
+@runtime_checkable
+class Attended(Model, Protocol):
+    """A model that is a person at a page."""
+
+    def tell(self, notice: Notice) -> None:
+        """Take what is shown with the next request, and those after it until the next notice."""

@@ -27,8 +27,7 @@ def check_decoding(name: str, capabilities: Capabilities, decoding: Decoding) ->
 
 
 def check_turns(name: str, capabilities: Capabilities, turns: Sequence[Turn]) -> None:
-    """Check that it is the turn of the model of this name, and that it takes all parts of the
-    conversation.
+    """Check that it is this model's turn, and that it takes all parts of the conversation.
 
     Raises:
         ModelError: the conversation is empty, its last turn is not the user's, or it has a video

@@ -108,8 +108,7 @@ def check_options(name: str, options: Mapping[str, str]) -> None:
 
 
 def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
-    """Build the model or the policy of this name, and check that it has all members of its
-    protocol.
+    """Build the model or policy of this name, and check that it has its protocol's members.
 
     Args:
         name: one of `names()`, or FILE.py:CLASS.
@@ -135,11 +134,11 @@ def load(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
 def build(name: str, options: Mapping[str, str], seed: int) -> Model | Policy:
     """Build the model or the policy of this name without checking its members; see `load`."""
     adapter = _adapter(name)
-    given = parse(name, adapter.Options, options)
+    parsed = parse(name, adapter.Options, options)
     if name in BUILT_IN:
-        return adapter.build(name, given, seed)
+        return adapter.build(name, parsed, seed)
     with wrap_adapter_errors(f"model {name}: build() fails"):
-        return adapter.build(name_in_file(name) if names_a_file(name) else name, given, seed)
+        return adapter.build(name_in_file(name) if names_a_file(name) else name, parsed, seed)
 
 
 def adapter_identity(name: str) -> dict[str, Any]:

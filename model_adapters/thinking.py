@@ -1,4 +1,4 @@
-"""Telling what a model thinks from what it answers.
+"""The text of replies: what is thought told from what is answered, and cut at stop strings.
 
 Models that think write it before the answer, between markers of their family. The markers below are
 those of the families' chat templates and of vLLM's reasoning parsers. Some templates write the
@@ -7,11 +7,12 @@ sends them in a field of their own (`Reply.thinking`).
 """
 
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from model_adapters.protocols import Reply
 
-__all__ = ["MARKERS", "Thought", "answer_of", "opening_marker", "split_thinking"]
+__all__ = ["MARKERS", "Thought", "answer_of", "cut_at_stop", "opening_marker", "split_thinking"]
 
 # Before and behind what a model thinks, by the families that write them.
 MARKERS = {
@@ -78,9 +79,15 @@ def _without(thinking: str, before: str) -> str:
 def _unwrapped(answer: str) -> str:
     """Return what stands between the markers of an answer, if there are any."""
     for before, behind in _WRAPPERS:
-        found = re.search(
+        match = re.search(
             f"{re.escape(before)}(.*?)(?:{re.escape(behind)}|$)", answer, flags=re.DOTALL
         )
-        if found is not None:
-            return found[1].strip()
+        if match is not None:
+            return match[1].strip()
     return answer
+
+
+def cut_at_stop(text: str, stop: Sequence[str]) -> str | None:
+    """Return the text before its first stop string, or None if it holds none."""
+    positions = [text.index(string) for string in stop if string in text]
+    return text[: min(positions)] if positions else None

@@ -16,7 +16,7 @@ class Transcript:
     """
 
     def __init__(self) -> None:
-        self._items: list[tuple[Role, Part]] = []
+        self._spoken: list[tuple[Role, Part]] = []
         self._marks: list[Mark] = []
 
     @property
@@ -25,17 +25,18 @@ class Transcript:
         return self.turns_with(())
 
     def turns_with(self, continuation: Sequence[Part]) -> tuple[Turn, ...]:
-        """Return the turns as if these parts had been appended by the user; the conversation is
-        unchanged.
+        """Return the turns as if the user had appended these parts, which changes nothing.
 
         Raises:
             TypeError: a part is neither text, frame reference nor video.
         """
-        items = [item for item in (*self._items, *_items(continuation, "user")) if item[1] != ""]
-        return tuple(
-            Turn(role, tuple(_join_texts(part for _, part in run)))
-            for role, run in groupby(items, lambda item: item[0])
-        )
+        spoken = [
+            part for part in (*self._spoken, *_spoken_parts(continuation, "user")) if part[1] != ""
+        ]
+        turns = []
+        for role, run in groupby(spoken, lambda part: part[0]):
+            turns.append(Turn(role, tuple(_join_texts(part for _, part in run))))
+        return tuple(turns)
 
     def append(self, *parts: Part, role: Role = "user") -> None:
         """Add parts at the end: all of them, or none if one is invalid.
@@ -44,11 +45,11 @@ class Transcript:
             TypeError: a part is neither text, frame reference nor video.
             ValueError: the role is unknown.
         """
-        self._items.extend(_items(parts, role))
+        self._spoken.extend(_spoken_parts(parts, role))
 
     def mark(self) -> Mark:
         """Return a mark at the current end of the conversation."""
-        mark = Mark(len(self._items))
+        mark = Mark(len(self._spoken))
         self._marks.append(mark)
         return mark
 
@@ -63,14 +64,13 @@ class Transcript:
             raise ValueError(
                 "the mark belongs to another conversation or to a part that was rewound"
             )
-        del self._items[mark.n_parts :]
+        del self._spoken[mark.n_parts :]
         del self._marks[self._marks.index(mark) + 1 :]
 
     def replies(
         self: Conversation, continuations: Sequence[Sequence[Part]], decoding: Decoding
     ) -> list[Reply]:
-        """Append, reply and rewind, one continuation after the other; see
-        `Conversation.replies`."""
+        """Append, reply and rewind, continuation by continuation; see `Conversation.replies`."""
         here = self.mark()
         replies = []
         for parts in continuations:
@@ -82,7 +82,7 @@ class Transcript:
         return replies
 
 
-def _items(parts: Sequence[Part], role: Role) -> list[tuple[Role, Part]]:
+def _spoken_parts(parts: Sequence[Part], role: Role) -> list[tuple[Role, Part]]:
     if role not in ROLES:
         raise ValueError(f"there is no role {role!r}; roles: {', '.join(ROLES)}")
     for part in parts:

@@ -1,6 +1,6 @@
 """The bundled set's trajectories by their scene: their seeds change when the set is made again."""
 
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 BUNDLED = packaged_folder("sets/nieh_mini")
 

@@ -13,7 +13,7 @@ from infthor_eval.formats.trajectory import (
     iter_sources,
     trajectory_files,
 )
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 __all__ = ["TaskTrajectory", "TrajectorySet", "find_recorded_trajectory", "find_trajectories"]
 

@@ -37,8 +37,7 @@ def require_animation_name(path: Path) -> None:
 
 
 def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    """Write pictures as an animation, atomically, and return their number; only one at a time is in
-    memory.
+    """Write pictures as an animation, atomically; return their number. One at a time is in memory.
 
     Args:
         path: the file; its suffix is one of `ANIMATION_FORMATS`.
@@ -56,30 +55,26 @@ def write_animation(path: Path, pictures: Iterable[Image.Image], per_second: flo
         write_atomically(path) as partial,
         tempfile.TemporaryDirectory(dir=path.parent, prefix=".recording-") as folder,
     ):
-        file = (
-            Path(folder) / f"animation{path.suffix.lower()}"
-        )  # OpenCV chooses by the suffix, which `partial` lacks
+        # OpenCV chooses by the suffix, which `partial` lacks.
+        file = Path(folder) / f"animation{path.suffix.lower()}"
         n_pictures = write(file, pictures, per_second)
         file.replace(partial)
     return n_pictures
 
 
 def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:
-    """Write a GIF whose pictures share one palette: with one each, what does not move would change
-    its colours."""
+    """Write a GIF with one palette: a palette each would change colours of what does not move."""
     counts = np.zeros((4, _SHADES**3))
     kept = []
-    for number, picture in enumerate(
-        pictures
-    ):  # all of them are needed before the first is written
+    # All of them are needed before the first is written.
+    for number, picture in enumerate(pictures):
         counts += _count_colours(picture)
         kept.append(path.with_name(f"{number}.png"))
         picture.save(kept[-1], compress_level=1)
     palette = _choose_palette(counts)
     quantized = (_in_palette(file, palette) for file in kept)
-    duration = max(
-        20, round(100 / per_second) * 10
-    )  # GIF has hundredths of a second; viewers take 10 ms for 100 ms
+    # GIF has hundredths of a second; viewers take 10 ms for 100 ms.
+    duration = max(20, round(100 / per_second) * 10)
     next(quantized).save(
         path, save_all=True, append_images=quantized, duration=duration, loop=0, optimize=False
     )
@@ -87,8 +82,7 @@ def _write_gif(path: Path, pictures: Iterable[Image.Image], per_second: float) -
 
 
 def _count_colours(picture: Image.Image) -> NDArray[np.float64]:
-    """Return number, and sums of red, green and blue, of the pixels in each of `_SHADES`³ cubes of
-    colours: [4, n]."""
+    """Return number and sums of red, green and blue of the pixels in `_SHADES`³ cubes: [4, n]."""
     pixels = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(np.int64)
     cubes = pixels * _SHADES // 256 @ (_SHADES**2, _SHADES, 1)
     weights = (None, *pixels.T)
@@ -108,9 +102,8 @@ def _choose_palette(counts: NDArray[np.float64]) -> Image.Image:
 
 def _in_palette(file: Path, palette: Image.Image) -> Image.Image:
     with Image.open(file) as picture:
-        return picture.convert("RGB").quantize(
-            palette=palette, dither=Image.Dither.NONE
-        )  # noise makes files larger
+        # Noise makes files larger.
+        return picture.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)
 
 
 def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -> int:

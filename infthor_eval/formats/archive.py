@@ -72,8 +72,7 @@ class _BoundedInfo(tarfile.TarInfo):
 
 
 def _check_end(tar: tarfile.TarFile) -> None:
-    """Check that all members were read: tarfile takes a damaged header for the end of the
-    archive."""
+    """Check that all members were read: tarfile takes a damaged header for the archive's end."""
     assert tar.fileobj is not None
     tar.fileobj.seek(tar.offset)
     if tar.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):

@@ -8,7 +8,7 @@ from PIL import Image
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.frames import FrameRef
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 
 __all__ = ["blank_like"]
 

@@ -1,5 +1,4 @@
-"""CSV files: read strictly, so that a missing quote cannot swallow rows, and written so that no
-cell is a formula."""
+"""CSV files: read strictly (a missing quote swallows no rows), and written without formulas."""
 
 import csv
 import io
@@ -86,7 +85,8 @@ def write_sheet(path: Path, columns: Sequence[str], rows: Iterable[Sequence[obje
     with write_atomically(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
-        writer.writerows([shield(str(cell)) for cell in row] for row in rows)
+        for row in rows:
+            writer.writerow([shield(str(cell)) for cell in row])
 
 
 def unshield(cell: str) -> str:
@@ -97,6 +97,5 @@ def unshield(cell: str) -> str:
 
 
 def shield(cell: str) -> str:
-    """Return the text that a spreadsheet shows as this one: a formula gets an apostrophe before
-    it."""
+    """Return the text that a spreadsheet shows as this one: a formula gets a leading apostrophe."""
     return _SHIELD + cell if cell.startswith((*_FORMULA, _SHIELD)) else cell

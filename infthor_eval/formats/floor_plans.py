@@ -93,8 +93,7 @@ def write_floor_plan(
 def _layout_files(
     root: Path, scene: str, objects: Sequence[dict[str, Any]], cells: Sequence[tuple[float, float]]
 ) -> dict[Path, bytes]:
-    """Return the content of a floor plan's small files: its reachable cells, and its object
-    types."""
+    """Return the content of a floor plan's small files: reachable cells, and object types."""
     array = io.BytesIO()
     np.save(array, np.array(cells, dtype=np.float64).reshape(-1, 2))
     types = sorted({item["objectType"] for item in objects})
@@ -117,7 +116,7 @@ def _read_scenes(path: Path) -> Iterator[tuple[str, str]]:
         yield scene, json.dumps(entry)
 
 
-def _without_corners(item: dict[str, Any]) -> dict[str, Any]:
-    box = item.get("axisAlignedBoundingBox") or {}
+def _without_corners(metadata: dict[str, Any]) -> dict[str, Any]:
+    box = metadata.get("axisAlignedBoundingBox") or {}
     kept = {key: value for key, value in box.items() if key != "cornerPoints"}
-    return {**item, "axisAlignedBoundingBox": kept}
+    return {**metadata, "axisAlignedBoundingBox": kept}

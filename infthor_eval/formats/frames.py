@@ -47,8 +47,7 @@ _DAMAGED = (
 
 @dataclass(frozen=True)
 class FrameRef:
-    """One frame of a trajectory: the path of its image file (PNG or JPEG, 300x300 in the published
-    data)."""
+    """One frame of a trajectory: path of its image (PNG or JPEG, 300x300 in the published data)."""
 
     path: Path
 
@@ -74,8 +73,7 @@ class FrameRef:
             return image.size
 
     def problem(self) -> str | None:
-        """Return why this cannot be a frame, judged by its first bytes, or None if nothing is wrong
-        with those."""
+        """Return why this cannot be a frame, by its first bytes, or None if those are right."""
         reason = file_problem(self.path)
         if reason is not None:
             return f"{self.path}: {reason}"
@@ -119,8 +117,7 @@ class FrameRef:
             ) from error
 
     def _wrong_size(self, width: int, height: int) -> str | None:
-        """Return why an image of this size is refused: it would fill the memory, or no image
-        processor accepts it."""
+        """Return why an image of this size is refused: for its memory, or by image processors."""
         if min(width, height) < 1:
             return f"{self.path}: an image of {width}x{height} pixels"
         if width * height > IMAGE_MEGAPIXELS.value * 1_000_000:

@@ -94,8 +94,7 @@ class NiehSet:
 
     @cached_property
     def rows(self) -> tuple[Question | SkippedQuestion, ...]:
-        """All questions in the order of the files, as `SkippedQuestion` where they cannot be
-        asked."""
+        """All questions in the files' order, as `SkippedQuestion` where they cannot be asked."""
         rows: list[Question | SkippedQuestion] = []
         seen = set()
         for question in chain.from_iterable(self.files.values()):
@@ -128,8 +127,7 @@ class NiehSet:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Hash of the questions, the step logs, and the names and sizes of the frames (hex, 32
-        characters)."""
+        """Hash of questions, step logs, and names and sizes of the frames (hex, 32 characters)."""
         # Not the content of frames, which would mean reading all of it: a record has the digests of
         # its own frames.
         digest = hashlib.blake2b(digest_size=16)
@@ -150,7 +148,7 @@ class NiehSet:
 
     def reasons(self) -> Counter[str]:
         """Return the number of skipped questions by reason."""
-        return Counter(item.reason for item in self.skipped)
+        return Counter(question.reason for question in self.skipped)
 
     def folder(self, traj_id: str) -> Path:
         """Return the folder of a trajectory's frames and metadata."""
@@ -194,8 +192,8 @@ class NiehSet:
     @property
     def missing_outline(self) -> str:
         """The reason for a question whose trajectory file is missing."""
-        place = "metadata/" if self.trajectories is None else f"{self.trajectories}"
-        return f"the trajectory's JSON is not in {place}; give its folder with --trajectories"
+        location = "metadata/" if self.trajectories is None else f"{self.trajectories}"
+        return f"the trajectory's JSON is not in {location}; give its folder with --trajectories"
 
     def action_frames(self, traj_id: str) -> dict[int, tuple[int, ...]]:
         """Return the positions in time order of the frames of each low-level action that has any.
@@ -219,8 +217,8 @@ class NiehSet:
             )
             if logged is not None:
                 return logged
-        places = {frame.path.stem: place for place, frame in enumerate(self.frames(traj_id))}
-        return read_action_log(path, places)
+        positions = {frame.path.stem: index for index, frame in enumerate(self.frames(traj_id))}
+        return read_action_log(path, positions)
 
     def states(self, traj_id: str) -> dict[int, str]:
         """Return the states of a trajectory in words, by low-level action.

@@ -1,5 +1,4 @@
-"""Goals, actions and states of a trajectory, which some contexts show beside its frames; read from
-its JSON.
+"""Goals, actions and states of a trajectory, from its JSON, which some contexts show beside frames.
 
 Only these fields are required, so that the reduced files of the published evaluation can be read.
 """
@@ -24,8 +23,8 @@ class _Call(msgspec.Struct):
     @property
     def words(self) -> str:
         """The action with its object types: "PutObject Mug Fridge"."""
-        ids = [item for item in (self.object_id, self.receptacle_id) if item]
-        return " ".join([self.action, *(item.partition("|")[0] for item in ids)])
+        ids = [object_id for object_id in (self.object_id, self.receptacle_id) if object_id]
+        return " ".join([self.action, *(object_id.partition("|")[0] for object_id in ids)])
 
 
 class _LowAction(msgspec.Struct):
@@ -64,17 +63,17 @@ class Outline(msgspec.Struct):
     @property
     def actions(self) -> list[str]:
         """Every low-level action in words."""
-        return [item.api_action.words for item in self.plan.low_actions]
+        return [action.api_action.words for action in self.plan.low_actions]
 
     @property
     def tasks(self) -> list[tuple[str, range]]:
         """Goals with the ranges of their actions, paired one to one as in the published code."""
         # Published files repeat the final task as the last sub-task. Ours do not, so it is appended
         # here.
-        goals = [item.task_desc for item in self.sub_tasks]
+        goals = [sub_task.task_desc for sub_task in self.sub_tasks]
         if len(self.sub_trajs) == len(goals) + 1 and self.long_horizon_task is not None:
             goals.append(self.long_horizon_task.task_desc)
-        ranges = [range(*item.low_pddl_idx) for item in self.sub_trajs]
+        ranges = [range(*part.low_pddl_idx) for part in self.sub_trajs]
         return list(zip(goals, ranges, strict=False))
 
 
@@ -93,7 +92,7 @@ def read_outline(path: Path) -> Outline:
     content = read_bytes(path, "restore it")
     with wrap_errors(f"{path}: not a trajectory", "restore it", catch=NOT_JSON):
         outline = msgspec.json.decode(content, type=Outline, strict=False)
-    ranges = [item.low_pddl_idx for item in outline.sub_trajs]
+    ranges = [part.low_pddl_idx for part in outline.sub_trajs]
     if any(not 0 <= first <= end <= len(outline.plan.low_actions) for first, end in ranges):
         raise DataError(f"{path}: sub_trajs reach outside the low-level actions; restore it")
     return outline

@@ -1,5 +1,4 @@
-"""Logs of the published scripts on final long-horizon tasks: counts of plans, a trajectory a line
-(`.gz` too).
+"""Logs of the published scripts on final tasks: counts of plans, a trajectory a line (`.gz` too).
 
     {"traj_id": "floorplan7_12_471_1744791924", "metric": {"total_count": 4, "success_count": 1,
     "goto_count": 2,
@@ -27,9 +26,8 @@ __all__ = ["LoggedPlans", "PlanCount", "PlanLog", "is_plan_log", "read_plan_log"
 
 _PUBLISHED_NAME = re.compile(r"eval_longhrz_checkpoints_(?P<model>.+?)_?\.log(?:\.gz)?$")
 _HINT = "give a log of the published scripts, with the counts of a trajectory's plans a line"
-_Number = Annotated[
-    int, msgspec.Meta(ge=0, le=10_000)
-]  # each plan becomes a record; a task has a few
+# Each plan becomes a record; a task has a few.
+_Number = Annotated[int, msgspec.Meta(ge=0, le=10_000)]
 
 
 class PlanCount(NamedTuple):
@@ -78,8 +76,7 @@ class PlanLog:
 
     @property
     def model(self) -> str | None:
-        """Checkpoint and extension of its context, as a published name has them; None if the log
-        has another name."""
+        """Checkpoint and context extension, as published names have them; None for other names."""
         name = _PUBLISHED_NAME.match(self.path.name)
         return name["model"] if name else None
 

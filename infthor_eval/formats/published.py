@@ -1,5 +1,4 @@
-"""Numbers that the authors published, as data: `results/published/*.yaml`. A new table is a new
-file.
+"""Numbers that the authors published, as data: `results/published/*.yaml`, a file for each table.
 
 A row is compared with a run if the run's checkpoint has one of the row's names and about as many
 parameters. The name alone is not enough: one adapter runs a 3B and a 7B checkpoint, and a local
@@ -15,13 +14,12 @@ import msgspec
 
 from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 __all__ = ["PublishedRow", "PublishedTable", "published_tables"]
 
-_SAME_SIZE = (
-    0.1  # relative tolerance: counts of one model differ with its heads and tied embeddings
-)
+# Relative tolerance: counts of one model differ with its heads and tied embeddings.
+_SAME_SIZE = 0.1
 
 
 class PublishedRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

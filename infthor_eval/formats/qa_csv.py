@@ -44,11 +44,11 @@ def read_questions(path: Path) -> list[Question | SkippedQuestion]:
     """
     hint = f"a question file is a UTF-8 CSV file with the columns {', '.join(_COLUMNS)}"
     file = next((name for name in _CLUE_FILES if f"{name}_clue" in path.stem), None)
-    found = [_question_or_reason(row, path, file) for row in read_rows(path, _COLUMNS, hint)]
-    if found and not any(isinstance(item, Question) for item in found):
-        reason = next(item.reason for item in found if isinstance(item, SkippedQuestion))
+    entries = [_question_or_reason(row, path, file) for row in read_rows(path, _COLUMNS, hint)]
+    if entries and not any(isinstance(entry, Question) for entry in entries):
+        reason = next(entry.reason for entry in entries if isinstance(entry, SkippedQuestion))
         raise DataError(f"{path}: no row is a question ({reason})")
-    return found
+    return entries
 
 
 def write_questions(path: Path, questions: Iterable[Question]) -> None:
@@ -62,33 +62,34 @@ def encode_questions(questions: Iterable[Question]) -> bytes:
     questions = list(questions)
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    are_published = any(item.published for item in questions)
+    are_published = any(question.published for question in questions)
     writer.writerow([*_COLUMNS, _TYPE, _ABSENCE, *(_PUBLISHED if are_published else ())])
-    for item in questions:
-        absence = "yes" if item.absence else ""
+    for question in questions:
+        absence = "yes" if question.absence else ""
         cells = [
-            item.traj_id,
-            item.text,
-            list(item.clues),
-            list(item.answers),
-            item.question_type or "",
+            question.traj_id,
+            question.text,
+            list(question.clues),
+            list(question.answers),
+            question.question_type or "",
             absence,
         ]
-        writer.writerow([*cells, *(_published_cells(item.published) if item.published else ())])
+        published = _published_cells(question.published) if question.published else ()
+        writer.writerow([*cells, *published])
     return text.getvalue().encode()
 
 
 def _question_or_reason(row: CsvRow, path: Path, file: str | None) -> Question | SkippedQuestion:
     # The file's name alone, without its folder: reasons are in a run's identity.
-    place = f"{path.name}, line {row.line}"
+    location = f"{path.name}, line {row.line}"
     cells = row.cells
     try:
         if row.problem is not None:
             raise DataError(row.problem)
         return _question(cells, file)
     except DataError as error:
-        shown = Question(cells["traj_id"].strip(), cells["question"].strip(), (), ())
-        return SkippedQuestion(shown, f"{place}: {error}")
+        incomplete = Question(cells["traj_id"].strip(), cells["question"].strip(), (), ())
+        return SkippedQuestion(incomplete, f"{location}: {error}")
 
 
 # Messages say nothing of a cell's content, so that rows with one mistake are counted together.
@@ -149,7 +150,7 @@ def _literal_list(row: dict[str, str], name: str, types: type | tuple[type, ...]
         value = None
     if not isinstance(value, list):
         raise DataError(f"{name} is not a list; write it as in [12, 13] or ['yes']")
-    if not all(isinstance(item, types) and not isinstance(item, bool) for item in value):
+    if not all(isinstance(element, types) and not isinstance(element, bool) for element in value):
         raise DataError(
             f"{name} has an entry of the wrong type; write it as in [12, 13] or ['yes']"
         )

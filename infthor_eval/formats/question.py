@@ -14,8 +14,7 @@ ABSENCE = "absence"  # column of the absence questions (no frame is evidence)
 
 @dataclass(frozen=True)
 class PublishedColumns:
-    """What only the published question files say of a question; None or empty where a column is
-    missing.
+    """What only the published files say of a question; None or empty where a column is missing.
 
     Attributes:
         file: the file that it is in: the one of a single clue or the one of several.
@@ -66,8 +65,7 @@ class Question:
 
     @property
     def clue_column(self) -> str:
-        """Column of the question in the paper's Table 4, `ABSENCE`, or empty if it is in the total
-        alone.
+        """The question's column in the paper's Table 4, `ABSENCE`, or empty if only in the total.
 
         Columns count clue frames, not steps. Two published files make one exception: "1" is the
         whole file of a single clue, and a question of the other file with one frame is in the total
@@ -82,11 +80,9 @@ class Question:
 
     @cached_property
     def id(self) -> str:
-        """Name of the question, which does not depend on the order of the file: `<traj_id>/<12 hex
-        digits>`, or qid."""
-        if (
-            self.published and self.published.qid
-        ):  # a few published questions are there twice, under two names
+        """Name of the question, whatever the file's order: `<traj_id>/<12 hex digits>`, or qid."""
+        # A few published questions are there twice, under two names.
+        if self.published and self.published.qid:
             return self.published.qid
         key = repr((self.text, self.clues, self.answers))
         return f"{self.traj_id}/{digest(key, 6)}"
@@ -94,8 +90,7 @@ class Question:
 
 @dataclass(frozen=True)
 class SkippedQuestion:
-    """A question that cannot be asked, with the reason; in one variant of the task, or in all if
-    `variant` is empty."""
+    """A question that cannot be asked, and why; in all variants if `variant` is empty."""
 
     question: Question
     reason: str

@@ -51,16 +51,11 @@ FORMS = (
     QuestionForm("movement_counting", "How many times did you move {}?"),
 )
 
-_CONTENT, _OPEN, _LOCATION, _COUNT, _PUT = (
-    f"{name}_further"
-    for name in (
-        "container_content",
-        "open_state",
-        "location_tracing",
-        "movement_counting",
-        "put_action",
-    )
-)
+_CONTENT = "container_content_further"
+_OPEN = "open_state_further"
+_LOCATION = "location_tracing_further"
+_COUNT = "movement_counting_further"
+_PUT = "put_action_further"
 FURTHER_FORMS = (
     QuestionForm(_OPEN, "Was {} open when you {}?"),
     QuestionForm(_OPEN, "Is {} open now?"),

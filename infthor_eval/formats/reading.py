@@ -102,8 +102,8 @@ def read_text(path: Path, hint: str) -> str:
 @overload
 def read_json(path: Path, hint: str) -> Any: ...
 @overload
-def read_json(path: Path, hint: str, form: type[T]) -> T: ...
-def read_json(path: Path, hint: str, form: Any = Any) -> Any:
+def read_json(path: Path, hint: str, data_type: type[T]) -> T: ...
+def read_json(path: Path, hint: str, data_type: Any = Any) -> Any:
     """Return the content of a JSON file as the type that `msgspec` decodes it to.
 
     Raises:
@@ -111,14 +111,13 @@ def read_json(path: Path, hint: str, form: Any = Any) -> Any:
             the type.
     """
     content = read_bytes(path, hint)
-    expected = "valid JSON" if form is Any else "in its documented form"
+    expected = "valid JSON" if data_type is Any else "in its documented form"
     with wrap_errors(f"{path}: not {expected}", hint, catch=NOT_JSON):
-        return msgspec.json.decode(content, type=form)
+        return msgspec.json.decode(content, type=data_type)
 
 
 def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
-    """Yield number (from 1) and content of the lines of a file that are not empty; a `.gz` file is
-    unpacked.
+    """Yield number (from 1) and content of the lines of a file (`.gz` too) that are not empty.
 
     Raises:
         DataError: it is not a file, damaged, or a line or the whole file exceeds its limit.
@@ -146,8 +145,7 @@ def lines_of(path: Path, hint: str) -> Iterator[tuple[int, bytes]]:
 
 
 def json_value(text: bytes) -> Any:
-    """Return the value of a JSON text of others, with NaN where it has it, but without lone
-    surrogates.
+    """Return the value of a JSON text of others, NaN where it has it, without lone surrogates.
 
     Python's decoder lets these through, and no file could hold what is made of them.
 

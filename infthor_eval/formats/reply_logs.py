@@ -1,5 +1,4 @@
-"""Replies to NIEH questions that others made, a JSON object a line (`.gz` too), in one of three
-forms.
+"""Replies to NIEH questions that others made, a JSON object a line (`.gz` too), in three forms.
 
 | form | question | reply |
 |---|---|---|
@@ -108,8 +107,7 @@ class UnreadRow:
 
 
 def read_reply_log(path: Path) -> Iterator[LoggedReply | UnreadRow]:
-    """Yield the replies of a log in its order; a bad line, such as a last one that is cut, is an
-    `UnreadRow`.
+    """Yield the replies of a log in order; a bad line, such as a cut last one, is an `UnreadRow`.
 
     Raises:
         DataError: the file cannot be read.

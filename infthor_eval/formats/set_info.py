@@ -1,5 +1,4 @@
-"""`set.json` of an NIEH set: the format of its files, and the simulator that rendered its
-frames."""
+"""`set.json` of an NIEH set: the format of its files, and which simulator rendered its frames."""
 
 import json
 from pathlib import Path
@@ -16,8 +15,7 @@ _FILE = "set.json"
 
 
 def simulator_of(root: Path) -> str | None:
-    """Return the simulator that rendered the set's frames ("embedded", "unity"), or None if it is
-    not recorded.
+    """Return what rendered the set's frames ("embedded", "unity"), or None if it is not recorded.
 
     Published sets do not record it.
 

@@ -46,8 +46,7 @@ class Layout(StrEnum):
 
 
 class ObjectLog(msgspec.Struct, omit_defaults=False):
-    """What the simulator reports about the objects at one frame, by object type (the published
-    fields).
+    """What the simulator reports about objects at one frame, by object type (published fields).
 
     Attributes:
         visible: types of the visible objects (within the simulator's visibility distance).
@@ -68,8 +67,7 @@ class ObjectLog(msgspec.Struct, omit_defaults=False):
 
 
 class LoggedPose(msgspec.Struct):
-    """The agent's pose: position in metres, rotation about the vertical and camera horizon in
-    degrees."""
+    """The agent's pose: position in metres, rotation about the vertical and horizon in degrees."""
 
     x: float
     y: float
@@ -163,8 +161,7 @@ class Step(msgspec.Struct, omit_defaults=True):
 
 
 def read_steps(folder: Path) -> list[Step]:
-    """Read the log of the trajectory in `metadata/<traj_id>`: one entry per frame, in the order of
-    the file.
+    """Read the log of the trajectory in `metadata/<traj_id>`: an entry a frame, in file order.
 
     Raises:
         DataError: the file is missing, not JSON, or has none of the known layouts.
@@ -175,8 +172,7 @@ def read_steps(folder: Path) -> list[Step]:
 
 
 def write_steps(folder: Path, steps: Sequence[Step]) -> None:
-    """Write the log of one trajectory into its folder, which must exist: a list of entries, one per
-    line."""
+    """Write the log of a trajectory into its folder, which must exist: a list, an entry a line."""
     lines = b",\n".join(msgspec.json.encode(step) for step in steps)
     (Path(folder) / _FILE).write_bytes(b"[\n" + lines + b"\n]\n")
 
@@ -230,14 +226,13 @@ def _entries(path: Path, document: Any) -> list[dict[str, Any]]:
                 sorted(document["img_idx"], key=lambda frame: str(frame.get("img_filename")))
             )
             return [
-                {"img_idx": place, "step": frame.get("low_idx") or 0, **frame}
-                for place, frame in listed
+                {"img_idx": index, "step": frame.get("low_idx") or 0, **frame}
+                for index, frame in listed
             ]
 
 
 def _rows(path: Path, columns: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the rows of a dict of columns, without the columns that are not lists (remarks, not
-    per frame)."""
+    """Return the rows of a dict of columns; values that are not lists are remarks, not columns."""
     lists = {name: column for name, column in columns.items() if isinstance(column, list)}
     n_rows = len(columns["img_idx"])
     for name, column in lists.items():

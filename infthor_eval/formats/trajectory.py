@@ -1,5 +1,4 @@
-"""Trajectory JSON: ∞-THOR's, ours, and that of their single-task predecessor, ALFRED's
-`traj_data.json`.
+"""Trajectory JSON: ∞-THOR's, ours, and ALFRED's `traj_data.json`, their single-task predecessor.
 
 One set of types serves all three; `_normalize` converts what the published saver writes
 differently. Unknown fields are ignored, so code that passes a trajectory on keeps
@@ -79,8 +78,7 @@ class InitAction(_Fields, omit_defaults=False):
 
 
 class ObjectPose(_Fields):
-    """The pose of one object in the initial scene; `name` is that of the Unity object, without
-    "(Clone)"."""
+    """The pose of an object in the initial scene; `name` is Unity's, without "(Clone)"."""
 
     name: str = msgspec.field(name="objectName")
     position: dict[str, float]
@@ -109,8 +107,7 @@ class Scene(_Fields, omit_defaults=False):
 
 
 class ApiAction(_Fields):
-    """One recorded call of the simulator, with object ids of the AI2-THOR version that recorded
-    it."""
+    """One recorded call of the simulator, with object ids of the recording AI2-THOR version."""
 
     action: Annotated[str, Meta(pattern=r"\S")]
     object_id: str | None = msgspec.field(name="objectId", default=None)
@@ -129,8 +126,7 @@ class DiscreteAction(_Fields, omit_defaults=False):
 
     @property
     def box(self) -> tuple[int, int, int, int] | None:
-        """Recorded box [xmin, ymin, xmax, ymax] of the object acted on, in pixels of the 300x300
-        frame."""
+        """Recorded box [xmin, ymin, xmax, ymax] of the object, in pixels of the 300x300 frame."""
         box = self.args.get("bbox") if isinstance(self.args, dict) else None
         return tuple(box) if isinstance(box, list) and len(box) == 4 else None
 
@@ -198,8 +194,7 @@ class SubTrajectory(_Fields, omit_defaults=False):
 
 
 class Trajectory(_Fields):
-    """One trajectory; the fields below `plan` are not in all of the formats (see the module's
-    docstring)."""
+    """One trajectory; not all formats have the fields below `plan` (see the module's docstring)."""
 
     scene: Scene
     plan: ExpertPlan
@@ -220,8 +215,7 @@ class Trajectory(_Fields):
 
 @dataclass(frozen=True)
 class TrajectorySource:
-    """One trajectory in a file, not yet decoded, so that a malformed one does not prevent reading
-    the others.
+    """A trajectory in a file, not yet decoded: a malformed one does not prevent reading others.
 
     `line` is its line in the file, from 1; None if the file holds only this trajectory.
     """
@@ -236,8 +230,7 @@ class TrajectorySource:
         return str(self.path) if self.line is None else f"{self.path}:{self.line}"
 
     def read(self) -> Trajectory:
-        """Decode and check the trajectory; a missing `traj_id` becomes the task's id, else the
-        file's name.
+        """Decode and check the trajectory; a missing `traj_id` becomes the task's id or the file's.
 
         Raises:
             DataError: the text is not JSON, not of the documented form, or has more object poses
@@ -259,8 +252,7 @@ class TrajectorySource:
 
 
 def iter_sources(path: Path) -> Iterator[TrajectorySource]:
-    """Yield the trajectories of a file (`.json`, `.jsonl`, `.jsonl.gz`) or a folder of such files,
-    not decoded.
+    """Yield trajectories, not decoded, of a file (`.json`, `.jsonl`, `.jsonl.gz`) or of a folder.
 
     They come in the order of file names and lines.
 
@@ -308,8 +300,7 @@ def iter_trajectories(path: Path) -> Iterator[Trajectory]:
 
 
 def encode_trajectory(trajectory: Trajectory) -> bytes:
-    """Return the trajectory as indented JSON, with the keys that the published saver always
-    writes."""
+    """Return the trajectory as indented JSON, with the keys that the published saver writes."""
     document = {name: empty() for name, empty in _ALWAYS.items()} | msgspec.to_builtins(trajectory)
     return msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n"
 
@@ -341,8 +332,7 @@ def _normalize(document: Any) -> Any:
 
 
 def folder_name(traj_id: str) -> str:
-    """Return the name of a trajectory's folder: its id, with other characters than `A-Za-z0-9_.-`
-    replaced.
+    """Return a trajectory's folder name: its id, with characters outside `A-Za-z0-9_.-` replaced.
 
     A hash is appended if any is replaced (the ids of ALFRED have a slash), so that two ids never
     share a folder.

@@ -20,7 +20,7 @@ from infthor_eval.errors import DataError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.reading import require_file
 from infthor_eval.storage.digests import digest_of_file
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 
 __all__ = ["FILM_FPS", "Video", "read_video", "sample_positions"]
 
@@ -61,8 +61,7 @@ class Video:
 
 
 def sample_positions(n_frames: int, film_fps: float, fps: float) -> tuple[int, ...]:
-    """Return the positions of the frames that are sampled from a film, ascending, as qwen-vl-utils
-    chooses them.
+    """Return the positions of the frames sampled from a film, ascending, as by qwen-vl-utils.
 
     There are `n_frames / film_fps * fps` of them, at least 4 and at most 768, rounded down to an
     even number, and evenly spread from the first frame to the last. Of a film of one frame, which

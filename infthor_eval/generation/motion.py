@@ -4,8 +4,7 @@ action."""
 from collections.abc import Iterator
 
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
+from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
 __all__ = ["intermediate_views"]
 

@@ -1,2 +1,1 @@
-"""Everything that uses lm-eval: our tasks and models under its command, and our runs in its
-files."""
+"""Everything that uses lm-eval: our tasks and models under its command, our runs in its files."""

@@ -13,8 +13,7 @@ __all__ = ["settings_doc", "task_request"]
 
 
 def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options: type) -> Doc:
-    """Return the common part of a task's docs: its suite, settings and options as JSON, and the
-    place of the data.
+    """Return the common part of a task's docs: suite, settings, options and data folder, as JSON.
 
     Args:
         suite: name of the suite.
@@ -22,8 +21,8 @@ def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options:
         settings: dataclass of the settings that `dataset_kwargs` can have.
         options: dataclass of the suite's options.
     """
-    names = [item.name for item in fields(settings)]
-    other_names = [item.name for item in fields(options) if item.name not in names]
+    names = [setting.name for setting in fields(settings)]
+    other_names = [option.name for option in fields(options) if option.name not in names]
     return {
         "suite": suite,
         "settings": json.dumps(
@@ -37,8 +36,7 @@ def settings_doc(suite: str, config: Mapping[str, Any], settings: type, options:
 def task_request(
     doc: Doc, task: str, options: type, generation_kwargs: Mapping[str, Any], seed: int
 ) -> TaskRequest[Any]:
-    """Return the request of a task to its suite, given any of its docs, and the dataclass of the
-    suite's options."""
+    """Return a task's request to its suite, given any of its docs and the type of its options."""
     settings = {
         "dataset_kwargs": json.loads(doc["settings"]),
         "generation_kwargs": generation_kwargs,

@@ -44,12 +44,7 @@ def convert_run(outcome: RunOutcome) -> Exported:
 
     tasks = _tasks(outcome)
     samples = {task.name: _scored_rows(task) for task in tasks}
-    hashes = {
-        name: _hash(
-            "".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows)
-        )
-        for name, rows in samples.items()
-    }
+    hashes = {name: _hash_of_rows(rows) for name, rows in samples.items()}
     model = str(sanitize_model_name(outcome.run.request.model))
     return Exported(
         model,
@@ -59,8 +54,7 @@ def convert_run(outcome: RunOutcome) -> Exported:
 
 
 def export(outcome: RunOutcome) -> Path:
-    """Write `lm_eval/<model>/results_<time>.json` and `samples_<task>_<time>.jsonl` into a run's
-    folder.
+    """Write lm-eval's files, `results_<time>.json` and `samples_<task>_<time>.jsonl`, for a run.
 
     Returns:
         The folder with both.
@@ -86,8 +80,7 @@ def export(outcome: RunOutcome) -> Path:
 
 @dataclass(frozen=True)
 class _Scored:
-    """A task with the records of its units, the scores of each, and its line in lm-eval's file
-    without the scores."""
+    """A task with its units' records, scores, and lines in lm-eval's file without the scores."""
 
     file: TaskFile
     records: list[UnitRecord[Any]] = field(default_factory=list)
@@ -120,21 +113,24 @@ def _tasks(outcome: RunOutcome[Any, Any]) -> list[_Scored]:
 
 
 def _scored_rows(task: _Scored) -> list[dict[str, Any]]:
-    """Return a row per sample, in the task's order; one that was repeated has all replies, and its
-    mean scores."""
+    """Return a row per sample, in the task's order; repeats give all replies and mean scores."""
     repeated: dict[int, list[tuple[dict[str, Any], Mapping[str, float]]]] = {}
     for row, scores in zip(task.rows, task.scores, strict=True):
         repeated.setdefault(row["doc_id"], []).append((row, scores))
     rows = []
     for _, same in sorted(repeated.items()):
         replies = [reply for row, _ in same for reply in row["filtered_resps"]]
-        means = {name: fmean(scores.get(name, 0.0) for _, scores in same) for name in task.metrics}
+        first, _ = same[0]
         rows.append(
-            same[0][0]
-            | {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics}
-            | means
+            first | {"resps": [replies], "filtered_resps": replies, "metrics": task.metrics}
         )
+        for name in task.metrics:
+            rows[-1][name] = fmean(scores.get(name, 0.0) for _, scores in same)
     return rows
+
+
+def _hash_of_rows(rows: Sequence[Mapping[str, Any]]) -> str:
+    return _hash("".join(row["doc_hash"] + row["prompt_hash"] + row["target_hash"] for row in rows))
 
 
 def _row(sample: UnitSample) -> dict[str, Any]:

@@ -1,5 +1,4 @@
-"""Manipulation in lm-eval: the functions behind the files in `tasks/manipulation/`, and the adapter
-of their requests.
+"""Manipulation in lm-eval: functions of `tasks/manipulation/`, and the adapter of its requests.
 
 A request is an episode. lm-eval has no simulator and no policies, so only our model class can
 answer, with a policy as its adapter.
@@ -39,17 +38,15 @@ def dataset(**config: Any) -> dict[str, Any]:
     if not model_takes_references():
         raise UsageError(
             "arms are driven in a simulator, which infthor-eval's policies alone do; use --model "
-            "infthor"
-            " --model_args adapter=openvla"
+            "infthor --model_args adapter=openvla"
         )
     doc = settings_doc("manipulation", config, ArmTaskSettings, ManipulationOptions)
     units = ManipulationEvaluation(task_request(doc, "dataset", ManipulationOptions, {}, 0)).units
-    return {
-        "test": Dataset.from_list([
-            {**doc, "arm_episode": unit.key.id,
-             "instruction": unit.payload.instruction} for unit in units
-        ])
-    }  # fmt: skip
+    docs = []
+    for unit in units:
+        episode = {"arm_episode": unit.key.id, "instruction": unit.payload.instruction}
+        docs.append(doc | episode)
+    return {"test": Dataset.from_list(docs)}
 
 
 def doc_to_text(doc: Doc) -> str:

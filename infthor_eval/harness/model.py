@@ -1,5 +1,4 @@
-"""Our models under lm-eval's own command: `lm-eval run --model infthor --model_args
-adapter=qwen2.5-vl-tiny,...`."""
+"""Our models under lm-eval's command: `lm-eval run --model infthor --model_args adapter=...`."""
 
 from collections.abc import Hashable, Sequence
 from contextlib import closing
@@ -12,11 +11,10 @@ from lm_eval.api.model import LM
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.harness.registration import NAME, say_model_takes_references
-from infthor_eval.harness.requests import RequestAdapter
+from infthor_eval.harness.requests import Payload, RequestAdapter, SuiteUnit
 from infthor_eval.runs import RunHeader, Suite, UnitRecord
 from infthor_eval.runs.config import RunConfig
 from infthor_eval.runs.journals.journal import Journal
-from infthor_eval.runs.journals.records import P, U
 from infthor_eval.runs.journals.session import JournalSession
 from infthor_eval.runs.work.binding import require_capability
 from infthor_eval.storage.scratch import ScratchFolder
@@ -71,23 +69,22 @@ class InfthorLM(LM):
             raise UsageError(
                 f"{adapter} is a baseline, not a model; run it with infthor-eval --model {adapter}"
             )
-        given = {key: str(value) for key, value in options.items()}
-        batch = str(
-            batch_size
-        )  # "auto" means nothing to our models, and 1 is what lm-eval gives by default
+        option_texts = {key: str(value) for key, value in options.items()}
+        # "auto" means nothing to our models, and 1 is what lm-eval gives by default.
+        batch = str(batch_size)
         theirs = {
             "device": None if device == _DEFAULT_DEVICE else device,
             "batch_size": batch if batch.isdigit() and int(batch) > 1 else None,
         }
-        given |= {
+        option_texts |= {
             key: value
             for key, value in theirs.items()
             if value is not None and has_option(adapter, key)
         }
         say_model_takes_references()
-        self._model = load(adapter, given, seed)
+        self._model = load(adapter, option_texts, seed)
         self._seed = seed
-        self._name, self._code = label(adapter, given), adapter_identity(adapter)
+        self._name, self._code = label(adapter, option_texts), adapter_identity(adapter)
         self._scratch = ScratchFolder()
         self._folder = Path(journal) if journal else self._scratch.path
         self._sessions: dict[str, JournalSession[Any]] = {}
@@ -102,8 +99,7 @@ class InfthorLM(LM):
         return {"model_source": NAME, "model_name": self._model.name}
 
     def generate_until(self, requests: Sequence[Instance]) -> list[str]:
-        """Return one response per request; empty if the model could not answer (the journal has the
-        reason).
+        """Return a response per request; empty without an answer (the journal has the reason).
 
         Raises:
             UsageError: the model lacks what a suite needs.
@@ -128,13 +124,17 @@ class InfthorLM(LM):
 
     loglikelihood_rolling = loglikelihood
 
-    def _respond(self, suite: Suite[U, P], task: str, requests: Sequence[Instance]) -> list[str]:
+    def _respond(
+        self, suite: Suite[SuiteUnit, Payload], task: str, requests: Sequence[Instance]
+    ) -> list[str]:
         """Return the responses to the requests of one task."""
         require_capability(self._model, self._name, suite)
-        adapter: RequestAdapter[U, P] = find_request_adapter(suite.name)
+        adapter: RequestAdapter[SuiteUnit, Payload] = find_request_adapter(suite.name)
         session = self._session(suite)
         docs = [request.doc for request in requests]
-        records: dict[Hashable, list[UnitRecord[P]]] = {adapter.doc_id(doc): [] for doc in docs}
+        records: dict[Hashable, list[UnitRecord[Payload]]] = {
+            adapter.doc_id(doc): [] for doc in docs
+        }
         evaluation = adapter.prepare(task, docs, requests[0].args[1], self._seed)
         with closing(evaluation.bind(self._model)) as bound:
             for group in bound.workload.groups:
@@ -148,7 +148,7 @@ class InfthorLM(LM):
                     records[doc_id].append(session.append_new(record)[0])
         return [adapter.response(records[adapter.doc_id(doc)]) for doc in docs]
 
-    def _session(self, suite: Suite[U, P]) -> JournalSession[P]:
+    def _session(self, suite: Suite[SuiteUnit, Payload]) -> JournalSession[Payload]:
         """Return the session of a suite, whose journal is in a folder of the suite's name."""
         if suite.name not in self._sessions:
             model = {"name": self._model.name, **self._model.identity()}

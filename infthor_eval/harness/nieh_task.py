@@ -1,5 +1,4 @@
-"""NIEH in lm-eval: the functions behind the task files in `tasks/nieh/`, and the adapter of their
-requests.
+"""NIEH in lm-eval: functions of the task files in `tasks/nieh/`, and the adapter of its requests.
 
 A request is a question. The functions are those of our own runs, in lm-eval's forms.
 """
@@ -58,7 +57,7 @@ def dataset(**config: Any) -> dict[str, Any]:
     task_samples = find_samples(config)
     pixels = not model_takes_references()
     if not task_samples.samples:
-        counts = Counter(item.reason for item in task_samples.skipped).most_common(3)
+        counts = Counter(question.reason for question in task_samples.skipped).most_common(3)
         reasons = "; ".join(f"{reason} ({n})" for reason, n in counts) or "its files are empty"
         raise UsageError(f"{task_samples.data.root}: no question of it can be asked: {reasons}")
     samples = recall_all(task_samples) if pixels else task_samples.samples

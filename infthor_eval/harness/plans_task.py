@@ -1,5 +1,4 @@
-"""Plans in lm-eval: the functions behind the task files in `tasks/plans/`, and the adapter of their
-requests.
+"""Plans in lm-eval: functions of the task files in `tasks/plans/`, and the adapter of its requests.
 
 A request is a trajectory. lm-eval has no simulator, so only our model class can answer; its
 response has the outcome of every plan.
@@ -43,15 +42,11 @@ def dataset(**config: Any) -> dict[str, Any]:
         )
     doc = settings_doc("plans", config, PlanTaskSettings, PlansOptions)
     texts: dict[str, list[str]] = {}
-    for unit in PlansEvaluation(
-        task_request(doc, "dataset", PlansOptions, {"max_gen_toks": 1}, 0)
-    ).units:
+    request = task_request(doc, "dataset", PlansOptions, {"max_gen_toks": 1}, 0)
+    for unit in PlansEvaluation(request).units:
         texts.setdefault(unit.cluster, []).append(unit.payload.plan)
-    return {
-        "test": Dataset.from_list(
-            [{**doc, "traj_id": name, "plans": plans} for name, plans in texts.items()]
-        )
-    }
+    docs = [{**doc, "traj_id": name, "plans": plans} for name, plans in texts.items()]
+    return {"test": Dataset.from_list(docs)}
 
 
 def doc_to_text(doc: Doc) -> str:
@@ -65,8 +60,7 @@ def doc_to_target(doc: Doc) -> str:
 
 
 def process_results(_doc: Doc, results: Sequence[str]) -> dict[str, float]:
-    """Return the share of completed plans, and the reward of all plans; see
-    `PlansRequests.response`."""
+    """Return the share of completed plans, and the reward of all; see `PlansRequests.response`."""
     plans = json.loads(results[0] or "[]")
     return {
         "success": sum(plan["done"] for plan in plans) / len(plans) if plans else 0.0,
@@ -93,8 +87,9 @@ class PlansRequests:
 
     def response(self, records: Sequence[UnitRecord[PlanRecord]]) -> str:
         """Return the outcomes of the plans as JSON, without excluded plans."""
-        names = ("plan", "done", "reward", "ended")
-        payloads = [record.payload for record in records if record.excluded is None]
-        return json.dumps(
-            [{name: getattr(payload, name) for name in names} for payload in payloads]
-        )
+        counted = [record.payload for record in records if record.excluded is None]
+        return json.dumps([_outcome(plan) for plan in counted])
+
+
+def _outcome(plan: PlanRecord) -> dict[str, Any]:
+    return {name: getattr(plan, name) for name in ("plan", "done", "reward", "ended")}

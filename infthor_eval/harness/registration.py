@@ -1,5 +1,4 @@
-"""Registering our model class with lm-eval, without importing it, and telling our tasks whether it
-is used."""
+"""Registers our model class with lm-eval unimported, and tells our tasks whether it is used."""
 
 __all__ = ["NAME", "model_takes_references", "register", "say_model_takes_references"]
 
@@ -9,8 +8,7 @@ _references = False
 
 
 def register() -> None:
-    """Register the class under its name, as a "module:Class" that lm-eval imports when a person
-    asks for it."""
+    """Register the class as a "module:Class" that lm-eval imports when a person asks for it."""
     import lm_eval.models  # noqa: F401 - before registering, or the built-in models vanish (0.4.13)
     from lm_eval.api.registry import model_registry
 
@@ -19,13 +17,11 @@ def register() -> None:
 
 
 def say_model_takes_references() -> None:
-    """Record that our class is the model of this process; lm-eval creates the model before the
-    tasks."""
+    """Record that our class is this process's model; lm-eval creates the model before the tasks."""
     global _references  # noqa: PLW0603 - lm-eval passes nothing from the model to the tasks
     _references = True
 
 
 def model_takes_references() -> bool:
-    """Return True if requests need no pixels. A decoded frame takes 270 KB in every request that
-    shows it."""
+    """Return True if requests need no pixels: a decoded frame takes 270 KB in each request."""
     return _references

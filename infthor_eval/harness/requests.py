@@ -6,25 +6,25 @@ them to our model, which looks up the suite's `RequestAdapter` by that name
 """
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
-from infthor_eval.runs import Evaluation, UnitKey, UnitRecord
-from infthor_eval.runs.journals.records import P, U
+from infthor_eval.runs import Evaluation, Unit, UnitKey, UnitRecord
 
-__all__ = ["Doc", "RequestAdapter"]
+__all__ = ["Doc", "Payload", "RequestAdapter", "SuiteUnit"]
 
 
 Doc = dict[str, Any]
+Payload = TypeVar("Payload")  # of the records of a suite
+SuiteUnit = TypeVar("SuiteUnit", bound=Unit[Any])
 
 
-class RequestAdapter(Protocol[U, P]):
+class RequestAdapter(Protocol[SuiteUnit, Payload]):
     """Turns lm-eval's requests into an evaluation, and records into responses."""
 
     def prepare(
         self, task: str, docs: Sequence[Doc], generation_kwargs: Mapping[str, Any], seed: int
-    ) -> Evaluation[U, P]:
-        """Set up the evaluation of a task's docs (at least one); units that belong to none of them
-        are not done."""
+    ) -> Evaluation[SuiteUnit, Payload]:
+        """Set up the evaluation of a task's docs (at least one), without other docs' units."""
 
     def doc_id(self, doc: Doc) -> Hashable:
         """Return the id of a doc, unique among those of its task."""
@@ -32,5 +32,5 @@ class RequestAdapter(Protocol[U, P]):
     def doc_id_of_unit(self, key: UnitKey, cluster: str) -> Hashable:
         """Return the `doc_id` of the doc that a unit belongs to."""
 
-    def response(self, records: Sequence[UnitRecord[P]]) -> str:
+    def response(self, records: Sequence[UnitRecord[Payload]]) -> str:
         """Return the response to a doc, given the records of its units."""

@@ -30,8 +30,7 @@ class Trackers:
         trackio_args: Arguments | None = None,
         hf_hub_log_args: Arguments | None = None,
     ) -> None:
-        """Check the arguments of `wandb.init`, `trackio.init` and lm-eval's `EvaluationTracker`;
-        None for not used.
+        """Check the arguments of `wandb.init`, `trackio.init`, `EvaluationTracker`; None if unused.
 
         Raises:
             UsageError: a package or a token is missing, or an argument is not known.
@@ -52,11 +51,11 @@ class Trackers:
             "trackio": (self._to_trackio, self._trackio),
             "the hub": (self._to_hub, self._hub),
         }
-        used = {place: send for place, (send, args) in trackers.items() if args is not None}
+        used = {service: send for service, (send, args) in trackers.items() if args is not None}
         converted = convert_run(outcome) if used else None
-        for place, send in used.items():
+        for service, send in used.items():
             assert converted is not None
-            problem = f"{outcome.folder}: could not be sent to {place}"
+            problem = f"{outcome.folder}: could not be sent to {service}"
             with wrap_errors(problem, "run the same command again", catch=Exception):
                 send(converted, outcome.summary.header.name)
 
@@ -148,20 +147,14 @@ def _parse(option: str, typed: Arguments, names: list[str]) -> dict[str, Any]:
 
 
 def _as_evaluated(run: Exported) -> dict[str, list[dict[str, Any]]]:
-    """Return the samples as lm-eval has them before it writes them: the arguments of a request as a
-    pair."""
-    return {
-        task: [
-            {
-                **row,
-                "arguments": [
-                    tuple(row["arguments"]["gen_args_0"][name] for name in ("arg_0", "arg_1"))
-                ],
-            }
-            for row in rows
-        ]
-        for task, rows in run.samples.items()
-    }
+    """Return the samples as lm-eval has them before it writes them: with pairs of arguments."""
+    samples: dict[str, list[dict[str, Any]]] = {}
+    for task, rows in run.samples.items():
+        samples[task] = []
+        for row in rows:
+            arguments = row["arguments"]["gen_args_0"]
+            samples[task].append(row | {"arguments": [(arguments["arg_0"], arguments["arg_1"])]})
+    return samples
 
 
 @contextmanager

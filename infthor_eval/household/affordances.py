@@ -38,7 +38,9 @@ def _types(names: Iterable[str]) -> frozenset[str]:
 _HOLDS = {receptacle: _types(names) for receptacle, names in _TABLES["receptacle_holds"].items()}
 _ACTIONS = {action: _types(names) for action, names in _TABLES["action_objects"].items()}
 
-CLEANABLE, COOLABLE, HEATABLE = (_ACTIONS[name] for name in ("Cleanable", "Coolable", "Heatable"))
+CLEANABLE = _ACTIONS["Cleanable"]
+COOLABLE = _ACTIONS["Coolable"]
+HEATABLE = _ACTIONS["Heatable"]
 STOWABLE = frozenset[str]().union(*_HOLDS.values())  # types with at least one receptacle
 # Without the egg of the published table: a sliced egg is cracked and leaves nothing that could be
 # put anywhere.
@@ -49,9 +51,8 @@ MOVABLE_RECEPTACLES = _types(_TABLES["movable_receptacles"])
 GOALS_BY_ROOM: dict[str, frozenset[str]] = {
     name: frozenset(rooms) for name, rooms in _TABLES["goals_by_room"].items()
 }
-KNOWN_TYPES = STOWABLE.union(
-    _HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"}
-)  # all types in tasks
+# All types in tasks.
+KNOWN_TYPES = STOWABLE.union(_HOLDS, KNIVES, *_ACTIONS.values(), {"Faucet", "Microwave"})
 MAX_PLAN_STEPS: int = _TABLES["planner_max_steps"]
 
 _INSIDE = frozenset(
@@ -70,10 +71,9 @@ _INSIDE = frozenset(
 )
 
 
-def goes_into(item: str, receptacle: str) -> bool:
-    """Return True if the published table has object type `item` for receptacle type
-    `receptacle`."""
-    return item in _HOLDS.get(receptacle, frozenset())
+def goes_into(object_type: str, receptacle: str) -> bool:
+    """Return True if the published table has an object type for a receptacle type."""
+    return object_type in _HOLDS.get(receptacle, frozenset())
 
 
 def preposition(receptacle: str) -> str:

@@ -11,14 +11,13 @@ __all__ = ["contents_of", "direct_parent", "is_in", "logged_parent"]
 
 
 def contents_of(holder: str, objects: Mapping[str, ThorObject]) -> frozenset[str]:
-    """Return the ids of all objects in or on a receptacle, including those in or on its
-    contents."""
+    """Return the ids of all objects in or on a receptacle, including those in its contents."""
     contents: set[str] = set()
     new = {holder}
     while new:
         # Both directions are read, as either may be missing from the metadata.
         inside = {key for parent in new for key in objects[parent].receptacle_object_ids or ()}
-        inside |= {key for key, item in objects.items() if new & set(item.parent_receptacles or ())}
+        inside |= {key for key, obj in objects.items() if new & set(obj.parent_receptacles or ())}
         new = (inside & objects.keys()) - contents - {holder}
         contents |= new
     return frozenset(contents)
@@ -30,11 +29,11 @@ def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
     An object in a bowl is not directly in the cabinet around the bowl. If furniture is nested (a
     drawer in a dresser), every piece that the simulator reports counts.
     """
-    item = view.objects.get(object_id)
+    obj = view.objects.get(object_id)
     holder = view.objects.get(receptacle_id)
-    if item is None or holder is None:
+    if obj is None or holder is None:
         return False
-    parents = set(item.parent_receptacles or ())
+    parents = set(obj.parent_receptacles or ())
     in_carrier = any(
         key in view.objects and view.objects[key].pickupable for key in parents - {receptacle_id}
     )
@@ -42,17 +41,16 @@ def is_in(object_id: str, receptacle_id: str, view: SimulatorView) -> bool:
     return reported and (holder.pickupable or not in_carrier)
 
 
-def direct_parent(item: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:
-    """Return the id of the innermost receptacle that an object is in or on, possibly the floor;
-    None if there is none.
+def direct_parent(obj: ThorObject, objects: Mapping[str, ThorObject]) -> str | None:
+    """Return the id of an object's innermost receptacle, possibly the floor; None if it has none.
 
     If several qualify, it is the smallest: planning needs one place even where the report is
     ambiguous.
     """
     parents = [
         objects[key]
-        for key in item.parent_receptacles or ()
-        if key in objects and key != item.object_id
+        for key in obj.parent_receptacles or ()
+        if key in objects and key != obj.object_id
     ]
     if not parents:
         return None
@@ -71,16 +69,14 @@ def logged_parent(state: ObjectState, world: Mapping[str, ObjectState]) -> str |
         return None
     parents = [key for key in state.parents if key in world and world[key].type != "Floor"]
     # The innermost one is inside all others. Basins are inside their sinks.
-    innermost = [
-        key
-        for key in parents
-        if all(_within(world, key, other) for other in parents if other != key)
-    ]
-    return innermost[0] if innermost else None
+    for key in parents:
+        if all(_within(world, key, other) for other in parents if other != key):
+            return key
+    return None
 
 
-def _volume(item: ThorObject) -> float:
-    box = item.axis_aligned_bounding_box
+def _volume(obj: ThorObject) -> float:
+    box = obj.axis_aligned_bounding_box
     return math.inf if box is None else box.size.x * box.size.y * box.size.z
 
 

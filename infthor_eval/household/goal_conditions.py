@@ -25,32 +25,31 @@ class GoalConditions(NamedTuple):
 
 
 def goal_conditions(task: Task, view: SimulatorView, treatments: Treatments) -> GoalConditions:
-    """Return the conditions of a task's goal in the current state, given what was washed, heated
-    and cooled."""
-    types = {key: item.object_type for key, item in view.objects.items()}
+    """Return the conditions of a task's goal now, given what was washed, heated and cooled."""
+    types = {key: obj.object_type for key, obj in view.objects.items()}
     parents = dict(room_of(view).start.where)
-    items = {key for key, object_type in types.items() if object_type in task.targets}
+    targets = {key for key, object_type in types.items() if object_type in task.targets}
     two = 2 if task.task_type == TaskType.PLACE_TWO else 1
-    slices = GoalConditions(min(len(items), two), two) if task.sliced else GoalConditions(0, 0)
+    slices = GoalConditions(min(len(targets), two), two) if task.sliced else GoalConditions(0, 0)
     if task.task_type == TaskType.EXAMINE:
-        held = any(view.objects[key].is_picked_up for key in items)
+        held = any(view.objects[key].is_picked_up for key in targets)
         lit = any(
-            item.object_type == task.light and item.is_toggled and item.visible
-            for item in view.objects.values()
+            obj.object_type == task.light and obj.is_toggled and obj.visible
+            for obj in view.objects.values()
         )
         others = [held, lit]
     elif task.task_type == TaskType.STACK:
         carriers = {key for key, object_type in types.items() if object_type == task.movable}
-        filled = {parents[key] for key in items if parents.get(key) in carriers}
+        filled = {parents[key] for key in targets if parents.get(key) in carriers}
         there = {key for key in carriers if types.get(parents.get(key, "")) == task.receptacle}
         others = [bool(filled), bool(there), bool(filled & there)]
     else:
-        placed = {key for key in items if types.get(parents.get(key, "")) == task.receptacle}
+        placed = {key for key in targets if types.get(parents.get(key, "")) == task.receptacle}
         if task.task_type == TaskType.PLACE_TWO:
             n_together = max(Counter(parents[key] for key in placed).values(), default=0)
             others = [n_together >= 1, n_together >= 2]
         elif task.task_type in APPLIANCE:
-            treated = items & _treated(task.task_type, treatments)
+            treated = targets & _treated(task.task_type, treatments)
             others = [bool(placed), bool(treated), bool(placed & treated)]
         else:
             others = [bool(placed) and not (task.task_type == TaskType.PUT_AWAY and view.inventory)]

@@ -1,5 +1,4 @@
-"""Goal conditions of tasks, and the planner's lower bound on the operators that are still
-needed."""
+"""Goal conditions of tasks, and the planner's lower bound on the operators still needed."""
 
 from collections import Counter
 from dataclasses import replace
@@ -55,8 +54,7 @@ def goal_holds(task: Task, view: SimulatorView, treatments: Treatments | None = 
 
 
 def lower_bound(task: Task, room: SymbolicRoom, state: State) -> int:
-    """Return a lower bound on the operators to the goal (admissible, for A*); it is 0 only where
-    the goal holds."""
+    """Return a lower bound on the operators to the goal (admissible, for A*); 0 where it holds."""
     if is_achieved(task, room, state):
         return 0
     here = room.types.get(state.at or "")
@@ -77,15 +75,13 @@ def _n_to_slice(task: Task, room: SymbolicRoom, state: State, held: str | None) 
 
 
 def _n_to_treat(task: Task, state: State, here: str | None) -> int:
-    """Return the operators that washing, heating or cooling needs: going to the appliance, and
-    using it."""
+    """Return the operators of washing, heating or cooling: going to the appliance, and using it."""
     treated = _treated_items(task, state)
     return 0 if treated is None or treated else 1 + (here != APPLIANCE[task.task_type])
 
 
 def _n_to_carry(task: Task, room: SymbolicRoom, state: State, held: str | None) -> int:
-    """Return the pick-ups and puts that are needed; none for a sliced item, which may be sliced at
-    its destination."""
+    """Return the pick-ups and puts needed; none for a sliced item, which may be sliced there."""
     if task.task_type == TaskType.STACK:
         where = dict(state.where)
         carriers = [item for item in where if room.types[item] == task.movable]
@@ -115,8 +111,7 @@ def _treated_items(task: Task, state: State) -> frozenset[str] | None:
 
 
 def _n_placed(task: Task, room: SymbolicRoom, state: State) -> int:
-    """Return how many objects of the required type and treatment are in one receptacle of the
-    required type.
+    """Return how many objects of the required type and treatment one right receptacle holds.
 
     They must be in the same receptacle: two objects on two side tables do not count as two on the
     side table.

@@ -29,8 +29,7 @@ class Grid:
     """The cells that the agent can reach."""
 
     def __init__(self, positions: Iterable[tuple[float, float]]) -> None:
-        """Build the grid of positions (x, z) in metres, spaced by 0.25 m; the first one gives its
-        offset."""
+        """Build the grid of positions (x, z), metres, spaced by 0.25 m; the first is its offset."""
         points = sorted(positions)
         self._origin = (points[0][0] % GRID, points[0][1] % GRID) if points else (0.0, 0.0)
         self.cells = frozenset(self.cell(x, z) for x, z in points)
@@ -57,8 +56,7 @@ class Grid:
         return {stand: length for stand, (length, _) in self._search(start, None).items()}
 
     def distances_to(self, goal: GridPose) -> Mapping[GridPose, int]:
-        """Return the number of actions to a pose from every pose that leads to it; the result is
-        cached.
+        """Return the number of actions to a pose from every pose that leads to it, from a cache.
 
         The goal's cell counts as reachable even if the grid lacks it. Cells beside the grid are
         possible starts, as in `path`: the agent can step from there onto the grid.
@@ -68,8 +66,7 @@ class Grid:
         return self._to[goal]
 
     def path(self, start: GridPose, goal: GridPose) -> list[str] | None:
-        """Return the shortest sequence of MoveAhead, RotateLeft and RotateRight, or None if there
-        is none."""
+        """Return the shortest sequence of MoveAhead, RotateLeft and RotateRight; None if none."""
         reached = self._search(start, goal)
         if goal not in reached:
             return None

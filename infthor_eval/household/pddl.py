@@ -1,5 +1,4 @@
-"""The planner's operators and problems as PDDL, so that others can verify that the plans are
-optimal.
+"""The planner's operators and problems as PDDL, so that others can verify that plans are optimal.
 
 The domain is STRIPS with types, negative preconditions and action costs: every operator costs one.
 PDDL goals refer to objects but tasks to object types, so zero-cost `finish` actions recognise each

@@ -18,14 +18,12 @@ from infthor_eval.household.tasks import Task, TaskType
 
 __all__ = ["is_feasible", "plan", "relevant_items"]
 
-_LIMIT = (
-    60_000  # states of a search; the hardest of the solvable problems tried needed a quarter of it
-)
+# States of a search; the hardest of the solvable problems tried needed a quarter of it.
+_LIMIT = 60_000
 
 
 def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
-    """Return the shortest plan for a task in a room's current state: empty if the goal holds, None
-    if there is none."""
+    """Return the shortest plan for a task: empty if its goal holds now, None if there is none."""
     if not is_feasible(task, room):
         return None
     problem = _Problem(task, room)
@@ -52,22 +50,21 @@ def plan(task: Task, room: SymbolicRoom) -> list[Operator] | None:
 
 
 def is_feasible(task: Task, room: SymbolicRoom) -> bool:
-    """Return False if no item fits into any goal receptacle, or into any movable one that must go
-    there.
+    """Return False if no item fits any goal receptacle, or any movable one that must go there.
 
     Without this check the search would run to its limit.
     """
     if task.receptacle is None:
         return True
-    items = _of_types(room, {task.pickup, *task.targets})
+    items = _items_of_types(room, {task.pickup, *task.targets})
     goals = [key for key in room.receptacles if room.types[key] == task.receptacle]
     if task.movable is None:
         return _any_fits(room, items, goals)
-    carriers = _of_types(room, {task.movable})
+    carriers = _items_of_types(room, {task.movable})
     return _any_fits(room, items, carriers) and _any_fits(room, carriers, goals)
 
 
-def _of_types(room: SymbolicRoom, types: set[str | None]) -> list[str]:
+def _items_of_types(room: SymbolicRoom, types: set[str | None]) -> list[str]:
     return [item for item, _ in room.start.where if room.types[item] in types]
 
 
@@ -78,8 +75,7 @@ def _any_fits(room: SymbolicRoom, items: list[str], receptacles: list[str]) -> b
 
 
 def relevant_items(task: Task, room: SymbolicRoom) -> set[str]:
-    """Return the ids of the items of the task's types, of knives if it slices, and of the items
-    that hold these."""
+    """Return the ids of items of the task's types, knives if it slices, and what holds these."""
     types = {task.pickup, *task.targets, task.movable} | (set(KNIVES) if task.sliced else set())
     where = dict(room.start.where)
     relevant = {item for item in where if room.types[item] in types or item == room.start.held}

@@ -30,32 +30,31 @@ _APPLIANCES = {
 
 
 def tasks_of(room: SymbolicRoom, extra_types: Iterable[str] = ()) -> list[Task]:
-    """Return all tasks that are possible with a room's objects, in a fixed order, which seeded
-    sampling relies on.
+    """Return all tasks possible with a room's objects, in a fixed order, for seeded sampling.
 
     `extra_types` are the types of the objects that are neither items nor places (faucets).
     """
     where = dict(room.start.where)
-    items = {
+    movable_types = {
         room.types[item]
         for item, parent in where.items()
         if parent != ABSENT or item == room.start.held
     }
-    furniture = {room.types[place] for place in room.places & room.receptacles}
+    furniture = {room.types[key] for key in room.places & room.receptacles}
     lamps = {
         room.types[lamp] for lamp in room.places - room.start.lit if room.types[lamp] in LIGHTS
     }
-    known = items | furniture | set(extra_types)
+    known = movable_types | furniture | set(extra_types)
     count = Counter(room.types[item] for item, parent in where.items() if parent != ABSENT)
     tasks: list[Task] = []
-    for pickup in sorted(items & STOWABLE):
-        for sliced in (False, True) if pickup in SLICEABLE and KNIVES & items else (False,):
+    for pickup in sorted(movable_types & STOWABLE):
+        for sliced in (False, True) if pickup in SLICEABLE and KNIVES & movable_types else (False,):
             tasks += [
                 Task(TaskType.EXAMINE, pickup, light=lamp, sliced=sliced) for lamp in sorted(lamps)
             ]
             for receptacle in sorted(furniture):
                 if goes_into(f"{pickup}Sliced" if sliced else pickup, receptacle):
-                    tasks += _placements(pickup, receptacle, sliced, known, items, count)
+                    tasks += _placements(pickup, receptacle, sliced, known, movable_types, count)
     return [task for task in tasks if not task.pickup.endswith("Sliced")]
 
 
@@ -64,7 +63,7 @@ def _placements(
     receptacle: str,
     sliced: bool,
     known: set[str],
-    items: set[str],
+    movable_types: set[str],
     count: Counter[str],
 ) -> Iterator[Task]:
     task = Task(TaskType.PLACE, pickup, receptacle, sliced=sliced)
@@ -79,6 +78,6 @@ def _placements(
             and receptacle not in _APPLIANCES[task_type]
         ):
             yield Task(task_type, pickup, receptacle, sliced=sliced)
-    for movable in sorted(MOVABLE_RECEPTACLES & items - {pickup}):
+    for movable in sorted(MOVABLE_RECEPTACLES & movable_types - {pickup}):
         if goes_into(target, movable) and goes_into(movable, receptacle):
             yield Task(TaskType.STACK, pickup, receptacle, movable=movable, sliced=sliced)

@@ -23,8 +23,7 @@ _FLOOR_PLANS = {
 
 
 def scene_type(scene: str) -> str | None:
-    """Return the room type in the published tables' words ("LivingRoom"), or None for houses and
-    unknown names."""
+    """Return a scene's room type in published words ("LivingRoom"); None for houses and others."""
     number = re.fullmatch(r"FloorPlan(\d+)", scene)
     if number is not None:
         return next(
@@ -34,7 +33,6 @@ def scene_type(scene: str) -> str | None:
 
 
 def usual_tasks(scene: str) -> frozenset[TaskType]:
-    """Return the task types that are drawn from in a scene's room type, or all of these if that is
-    unknown."""
+    """Return the task types drawn from in a scene's room type, or all if that is unknown."""
     room = scene_type(scene)
     return frozenset(name for name in SAMPLED if room is None or room in GOALS_BY_ROOM[name])

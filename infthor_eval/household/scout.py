@@ -12,8 +12,7 @@ from typing import Any
 from infthor_eval.errors import SimulatorError
 from infthor_eval.household.navigation import Grid, GridPose
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector
+from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject, Vector, teleport_call
 
 __all__ = [
     "CAMERA_HEIGHT",
@@ -31,15 +30,13 @@ _REACH = 1.5  # the simulator's visibility distance, metres
 _SIDEWAYS = 32.0  # maximum angle from the camera's axis, degrees; half the field of view is 30
 _TOO_NEAR = 0.5  # metres; closer, a door may hit the agent, and an object fills the frame
 _MAX_TRIALS = 30
-_EXTRA_TRIALS = (
-    4  # trials after the first success, for a viewpoint with the object well inside the frame
-)
+# Trials after the first success, for a viewpoint with the object well inside the frame.
+_EXTRA_TRIALS = 4
 # margin and width of the frame, pixels
 _MARGIN = 15
 _SIDE = 300
-_NO_IMAGE: dict[str, Any] = {
-    "renderImage": False
-}  # the instance image is enough to tell what is in the frame
+# The instance image is enough to tell what is in the frame.
+_NO_IMAGE: dict[str, Any] = {"renderImage": False}
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,7 @@ class Viewpoint:
 def find_viewpoint(
     simulator: Simulator,
     grid: Grid,
-    shown: list[str],
+    targets: list[str],
     inside: str | None = None,
     min_pixels: int = 0,
 ) -> Viewpoint | None:
@@ -65,7 +62,7 @@ def find_viewpoint(
     Args:
         simulator: the simulator; its agent returns to its pose.
         grid: the reachable cells.
-        shown: ids of the objects that must be visible; the agent faces the first.
+        targets: ids of the objects that must be visible; the agent faces the first.
         inside: id of an object hidden in the first one, which must become visible when that is
             opened.
         min_pixels: minimum size of the first object in the frame, pixels.
@@ -74,17 +71,18 @@ def find_viewpoint(
         The viewpoint, or None if no candidate qualifies.
     """
     start = simulator.view
-    focus = start.objects[inside or shown[0]]
+    focus = start.objects[inside or targets[0]]
     distances = grid.distances(grid_pose_of(start.agent, grid))
     best = None
     trials_left = _EXTRA_TRIALS
     for viewpoint in list(_candidates(start, grid, focus, distances))[:_MAX_TRIALS]:
         view = _teleport(simulator, grid, start, viewpoint)
-        qualifies = view.success and _shows(view, shown, min_pixels)
+        qualifies = view.success and _shows(view, targets, min_pixels)
         if qualifies and (
-            inside is None or _comes_into_view(simulator, shown[0], inside, min_pixels)
+            inside is None or _comes_into_view(simulator, targets[0], inside, min_pixels)
         ):
-            is_clear = inside is not None or not focus.pickupable or _is_well_inside(view, shown[0])
+            needs_margin = inside is None and focus.pickupable
+            is_clear = not needs_margin or _is_well_inside(view, targets[0])
             best = viewpoint if is_clear or best is None else best
             if is_clear:
                 break
@@ -108,22 +106,22 @@ def grid_pose_of(pose: AgentPose, grid: Grid) -> GridPose:
     )
 
 
-def _shows(view: SimulatorView, shown: list[str], min_pixels: int) -> bool:
-    if not all(key in view.objects and view.objects[key].visible for key in shown):
+def _shows(view: SimulatorView, targets: list[str], min_pixels: int) -> bool:
+    if not all(key in view.objects and view.objects[key].visible for key in targets):
         return False
-    instances = view.instances
-    return instances is None or (shown[0] in instances and instances[shown[0]].pixels >= min_pixels)
+    if view.instances is None:
+        return True
+    return targets[0] in view.instances and view.instances[targets[0]].pixels >= min_pixels
 
 
-def _is_well_inside(view: SimulatorView, item: str) -> bool:
+def _is_well_inside(view: SimulatorView, object_id: str) -> bool:
     """Return True if an object does not touch the margin of the frame."""
-    instance = (view.instances or {}).get(item)
+    instance = (view.instances or {}).get(object_id)
     return instance is None or all(_MARGIN <= edge < _SIDE - _MARGIN for edge in instance.box)
 
 
 def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels: int) -> bool:
-    """Open a receptacle and close it; return True if the object in it was visible and closing
-    succeeded."""
+    """Open and close a receptacle; return True if the object in it was seen and it closed."""
     view = simulator.query("OpenObject", objectId=holder, **_NO_IMAGE)
     if not view.success:
         return False
@@ -142,8 +140,7 @@ def _comes_into_view(simulator: Simulator, holder: str, inside: str, min_pixels:
 def _candidates(
     view: SimulatorView, grid: Grid, focus: ThorObject, distances: dict[GridPose, int]
 ) -> Iterator[Viewpoint]:
-    """Yield viewpoints from which the object should be in the frame, those with the fewest actions
-    first."""
+    """Yield viewpoints with the object in the frame, those with the fewest actions first."""
     box = focus.axis_aligned_bounding_box
     target = focus.position if box is None else box.center
     eye = view.agent.position.y + CAMERA_HEIGHT

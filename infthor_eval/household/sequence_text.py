@@ -26,7 +26,7 @@ __all__ = [
     "task_goal_part",
 ]
 
-_Item = TypeVar("_Item")
+_Described = TypeVar("_Described")
 ACT = "<|act|>"
 _PLAN = "<|plan|>"
 _GOAL = "<|goal|>"
@@ -95,8 +95,7 @@ def _published_plan(high: HighAction) -> str:
         missing = "place" if template == _PLANS["GotoLocation"] else "object"
         raise DataError(
             f"sub-goal {high.high_idx} ({kind:.40}) names no {missing}, which the published words "
-            "need; take"
-            " --words natural"
+            "need; take --words natural"
         )
     return template.format(*needed)
 
@@ -139,10 +138,10 @@ def action_text(action: ApiAction, words: Words) -> str:
         raise DataError(
             f"the published words do not know the action {name!r:.40}; take --words natural"
         )
-    places = [(action.object_id, "[object]"), (action.receptacle_id, "[receptacle]")]
+    holes = [(action.object_id, "[object]"), (action.receptacle_id, "[receptacle]")]
     names = [
         hole if key is None else words.name_of(key)
-        for key, hole in places[: 1 + (name == "PutObject")]
+        for key, hole in holes[: 1 + (name == "PutObject")]
     ]
     return " ".join((name, *names))
 
@@ -178,14 +177,13 @@ def action_part(action: str) -> str:
 
 
 def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
-    """Return the whole trajectory as text, from its replay's log; of several frames of an action
-    the last counts.
+    """Return the trajectory as text, from its replay's log; of an action's frames the last counts.
 
     The words are the published ones. A sub-goal or action that has none keeps its natural words, so
     that a trajectory is never without its text.
     """
     starts: dict[int, int | None] = {
-        item.low_pddl_idx[0]: item.sub_traj_idx for item in trajectory.sub_trajs
+        part.low_pddl_idx[0]: part.sub_traj_idx for part in trajectory.sub_trajs
     }
     starts = starts or {0: None}
     plans = {high.high_idx: _in_some_words(plan_text, high) for high in trajectory.plan.high_pddl}
@@ -205,11 +203,11 @@ def sequence_text(trajectory: Trajectory, steps: list[Step]) -> str:
     return "".join(parts)
 
 
-def _in_some_words(text_in: Callable[[_Item, Words], str], item: _Item) -> str:
+def _in_some_words(text_in: Callable[[_Described, Words], str], described: _Described) -> str:
     try:
-        return text_in(item, Words.PUBLISHED)
+        return text_in(described, Words.PUBLISHED)
     except DataError:
-        return text_in(item, Words.NATURAL)
+        return text_in(described, Words.NATURAL)
 
 
 def _task(trajectory: Trajectory, index: int | None) -> SubTask | None:

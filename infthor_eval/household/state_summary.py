@@ -15,15 +15,14 @@ _SURROUNDINGS = frozenset({"Floor", "Wall", "Ceiling"})
 
 
 def state_summaries(steps: list[Step], at: set[int]) -> dict[int, str]:
-    """Return the summaries after the low-level actions with some indices, from a log with the
-    fields of a replay."""
+    """Return summaries after the low-level actions of some indices, from the log of a replay."""
     known: dict[str, tuple[ObjectState, str | None]] = {}
     summaries: dict[int, str] = {}
     for step, world in zip(steps, iter_object_states(steps), strict=True):
         held = [noun(state.type) for state in world.values() if state.held and state.exists]
         for key in step.seen or {}:
             if world[key].type not in _SURROUNDINGS:
-                known[key] = (world[key], _place(world, world[key]))
+                known[key] = (world[key], _logged_receptacle(world, world[key]))
         for key in [key for key in known if not world[key].exists or world[key].held]:
             del known[key]
         if step.step in at and step.action is not None:
@@ -38,12 +37,12 @@ def _summary(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) 
         else "Your hands are free."
     ]
     inside: dict[str, list[str]] = {}
-    for state, place in known.values():
-        if place is not None:
-            inside.setdefault(place, []).append(noun(state.type))
-    for place in sorted(inside):
-        items = ", ".join(with_article(item) for item in sorted(inside[place]))
-        sentences.append(f"You saw {items} {preposition(place)} the {noun(place)}.")
+    for state, receptacle in known.values():
+        if receptacle is not None:
+            inside.setdefault(receptacle, []).append(noun(state.type))
+    for receptacle in sorted(inside):
+        contents = ", ".join(with_article(name) for name in sorted(inside[receptacle]))
+        sentences.append(f"You saw {contents} {preposition(receptacle)} the {noun(receptacle)}.")
     opened = sorted({noun(state.type) for state, _ in known.values() if state.is_open})
     lit = sorted(
         {
@@ -57,7 +56,7 @@ def _summary(known: dict[str, tuple[ObjectState, str | None]], held: list[str]) 
     return " ".join(sentences)
 
 
-def _place(world: dict[str, ObjectState], state: ObjectState) -> str | None:
+def _logged_receptacle(world: dict[str, ObjectState], state: ObjectState) -> str | None:
     """Return the type of the receptacle that an object is directly in or on."""
     parent = logged_parent(state, world)
     return None if parent is None else world[parent].type

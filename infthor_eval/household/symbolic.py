@@ -1,5 +1,4 @@
-"""A room as the planner sees it: where the items are, what was done to them, and where the agent
-is.
+"""A room as the planner sees it: where items are, what was done to them, and where the agent is.
 
 A *place* is what the agent can go to: a piece of furniture, a lamp, or an item on the floor. An
 *item* can be carried. Slices are items that start to exist when the whole is sliced; every task
@@ -72,8 +71,7 @@ class SymbolicRoom:
     refused: frozenset[tuple[str, str]] = frozenset()
 
     def place_of(self, item: str, where: dict[str, str]) -> str | None:
-        """Return the place where an item or receptacle can be reached, or None if it is held or
-        does not exist."""
+        """Return where an item or receptacle can be reached, or None if it is held or absent."""
         seen = set()  # in case objects are reported to be inside each other
         while item not in self.places:
             if item in seen or item not in where or where[item] == ABSENT:
@@ -85,8 +83,7 @@ class SymbolicRoom:
         return item
 
     def fits(self, item: str, receptacle: str) -> bool:
-        """Return True if a receptacle is made for an item's type and is not known to have no room
-        for it."""
+        """Return True if a receptacle is made for an item's type and not known to be full."""
         usual = receptacle in self.receptacles and goes_into(
             self.types[item], self.types[receptacle]
         )
@@ -98,18 +95,16 @@ def room_of(
 ) -> SymbolicRoom:
     """Read a room from the simulator's state, with the agent at no place; `blocked` objects cannot
     be acted on."""
-    objects = {key: item for key, item in view.objects.items() if not _is_remains(item)}
-    items = {key: item for key, item in objects.items() if item.pickupable and key not in blocked}
-    places = {key for key, item in objects.items() if _is_place(item)}
-    where = {key: _parent_of(item, objects, places) for key, item in items.items()}
-    types = {
-        key: item.object_type for key, item in objects.items() if key in places or key in items
-    }
-    for key, item in items.items():
-        if item.object_type in SLICEABLE:
+    objects = {key: obj for key, obj in view.objects.items() if not _is_remains(obj)}
+    items = {key: obj for key, obj in objects.items() if obj.pickupable and key not in blocked}
+    places = {key for key, obj in objects.items() if _is_place(obj)}
+    where = {key: _parent_of(obj, objects, places) for key, obj in items.items()}
+    types = {key: obj.object_type for key, obj in objects.items() if key in places or key in items}
+    for key, obj in items.items():
+        if obj.object_type in SLICEABLE:
             for number in range(1, _SLICES + 1):
                 where[slice_item(key, number)] = ABSENT
-                types[slice_item(key, number)] = f"{item.object_type}Sliced"
+                types[slice_item(key, number)] = f"{obj.object_type}Sliced"
     held = next((key for key in view.inventory if key in items), None)
     return SymbolicRoom(
         types=types,
@@ -136,21 +131,21 @@ def slice_item(whole: str, number: int) -> str:
     return f"{whole}#{number}"
 
 
-def _parent_of(item: ThorObject, objects: dict[str, ThorObject], places: Iterable[str]) -> str:
-    if item.is_picked_up:
+def _parent_of(obj: ThorObject, objects: dict[str, ThorObject], places: Iterable[str]) -> str:
+    if obj.is_picked_up:
         return ABSENT
-    parent = direct_parent(item, objects)
+    parent = direct_parent(obj, objects)
     return (
         parent if parent is not None and (parent in places or objects[parent].pickupable) else FLOOR
     )
 
 
-def _is_remains(item: ThorObject) -> bool:
+def _is_remains(obj: ThorObject) -> bool:
     """Return True for what sliced or broken objects leave in the metadata."""
-    return item.is_broken or (item.is_sliced and not item.object_type.endswith("Sliced"))
+    return obj.is_broken or (obj.is_sliced and not obj.object_type.endswith("Sliced"))
 
 
-def _is_place(item: ThorObject) -> bool:
-    furniture = item.receptacle and item.object_type != "Floor"
-    lamp = item.toggleable and item.object_type.endswith("Lamp")
-    return not item.pickupable and bool(furniture or lamp)
+def _is_place(obj: ThorObject) -> bool:
+    furniture = obj.receptacle and obj.object_type != "Floor"
+    lamp = obj.toggleable and obj.object_type.endswith("Lamp")
+    return not obj.pickupable and bool(furniture or lamp)

@@ -1,5 +1,4 @@
-"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one of
-them."""
+"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one."""
 
 from enum import StrEnum
 from typing import Any
@@ -16,8 +15,7 @@ __all__ = ["SAMPLED", "Task", "TaskType", "sub_task", "task_of"]
 
 
 class TaskType(StrEnum):
-    """ALFRED's task types, and PUT_AWAY of the published generator, by their names in
-    trajectories."""
+    """ALFRED's task types, and the published generator's PUT_AWAY, by their trajectories' names."""
 
     PLACE = "pick_and_place_simple"
     PLACE_TWO = "pick_two_obj_and_place"
@@ -29,9 +27,8 @@ class TaskType(StrEnum):
     PUT_AWAY = "put object"
 
 
-SAMPLED = tuple(
-    item for item in TaskType if item != TaskType.PUT_AWAY
-)  # those that a task is drawn from: ALFRED's
+# Those that a task is drawn from: ALFRED's.
+SAMPLED = tuple(task_type for task_type in TaskType if task_type != TaskType.PUT_AWAY)
 
 
 class Task(msgspec.Struct, frozen=True):
@@ -159,12 +156,12 @@ def _object_type(
     object_type = in_info or params.get(name)
     if isinstance(object_type, str) and object_type:
         return modern_type(object_type)
-    places = (
+    sources = (
         f"task_info's {_IN_INFO[name]} or pddl_params' {name}"
         if name in _IN_INFO
         else f"pddl_params' {name}"
     )
-    raise DataError(f"a task of type {task_type} has no {places}; give an object type there")
+    raise DataError(f"a task of type {task_type} has no {sources}; give an object type there")
 
 
 def _is_sliced(params: dict[str, Any]) -> bool:
@@ -178,14 +175,14 @@ def _is_sliced(params: dict[str, Any]) -> bool:
 
 def _describe(task: Task) -> str:
     bare = f"sliced {noun(task.pickup)}" if task.sliced else noun(task.pickup)
-    place = task.receptacle
+    receptacle = task.receptacle
     text = _TEMPLATES[task.task_type].format(
         pickup=task.pickup,
-        receptacle=place,
+        receptacle=receptacle,
         item=with_article(bare),
         items=f"slices of {noun(task.pickup)}" if task.sliced else plural(bare),
         bare=bare,
-        where=f"{preposition(place)} the {noun(place)}" if place else "",
+        where=f"{preposition(receptacle)} the {noun(receptacle)}" if receptacle else "",
         light=noun(task.light) if task.light else "",
         movable=with_article(noun(task.movable)) if task.movable else "",
     )

@@ -66,10 +66,10 @@ def _basin_of(faucet: ThorObject, view: SimulatorView) -> ThorObject | None:
     ALFRED considers only sink basins, so that there filling a bathtub washes what is in a sink
     across the room.
     """
-    basins = [item for item in view.objects.values() if item.object_type in _BASINS]
+    basins = [basin for basin in view.objects.values() if basin.object_type in _BASINS]
     at = astuple(faucet.position)
     return min(
         basins,
-        key=lambda item: (math.dist(astuple(item.position), at), item.object_id),
+        key=lambda basin: (math.dist(astuple(basin.position), at), basin.object_id),
         default=None,
     )

@@ -11,14 +11,8 @@ __all__ = ["canonical_type", "compact_name", "noun", "object_type", "plural", "w
 _VOWEL_SOUND = re.compile(r"^(?:[aeio]|u(?!se|ni))", re.IGNORECASE)
 _WHOLE = {"SinkBasin": "Sink", "BathtubBasin": "Bathtub"}
 _LETTERS = {"CD": "CD", "TVStand": "TV stand", "Television": "television"}
-_BARE = {
-    "blinds",
-    "boots",
-    "bread",
-    "curtains",
-    "lettuce",
-    "toilet paper",
-}  # plural, or not counted
+# Plural, or not counted.
+_BARE = {"blinds", "boots", "bread", "curtains", "lettuce", "toilet paper"}
 _IRREGULAR = {
     "knife": "knives",
     "butter knife": "butter knives",
@@ -33,8 +27,7 @@ def canonical_type(object_type: str) -> str:
 
 
 def noun(object_type: str) -> str:
-    """Return an object type in words: "coffee table" for "CoffeeTable", "sliced apple" for
-    "AppleSliced"."""
+    """Return an object type in words: "coffee table", or "sliced apple" for "AppleSliced"."""
     if object_type in _LETTERS:
         return _LETTERS[object_type]
     if object_type.endswith("Sliced"):
@@ -51,8 +44,7 @@ def object_type(words: str) -> str:
 
 
 def with_article(words: str) -> str:
-    """Return the words after "a" or "an"; plurals ("boots") and uncountable nouns ("bread") get no
-    article."""
+    """Return words after "a" or "an"; plurals ("boots") and uncountable nouns get no article."""
     if words.removeprefix("sliced ") in _BARE:
         return words
     return f"{'an' if _VOWEL_SOUND.match(words) else 'a'} {words}"
@@ -70,6 +62,5 @@ def plural(words: str) -> str:
 
 
 def compact_name(object_type: str) -> str:
-    """Return an object type as the published data write it, in lower case as one word
-    ("coffeetable")."""
+    """Return an object type as the published data write it: lower case, a word ("coffeetable")."""
     return object_type.lower()

@@ -28,9 +28,15 @@ from infthor_eval.manipulation.trajectories import ArmEpisode
 from infthor_eval.thor.frames import FrameKeeper
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.transfer import transfer
-from infthor_eval.thor.view import AgentPose, ArmState, SimulatorView, ThorObject, Vector
+from infthor_eval.thor.view import (
+    AgentPose,
+    ArmState,
+    SimulatorView,
+    ThorObject,
+    Vector,
+    teleport_call,
+)
 from model_adapters import ArmDelta
 
 __all__ = ["ArmEnvironment", "ArmOutcome", "Grasp", "arm_of"]

@@ -1,5 +1,4 @@
-"""What may be remembered of a trajectory, and at what cost: the protocol of memories, and those
-built in."""
+"""What may be remembered of a trajectory, at what cost: memories' protocol, and those built in."""
 
 from infthor_eval.memory.budgets import check_recalled, read_budget
 from infthor_eval.memory.protocol import (

@@ -31,19 +31,18 @@ def check_recalled(
     budget: int | None,
     tokens_per_frame: int | None,
 ) -> None:
-    """Check that what a memory recalled may be shown: texts, and steps that it has observed, within
-    its budget.
+    """Check what a memory recalled: texts, and steps that it observed, within its budget.
 
     Raises:
         ModelError: it may not; the message names the memory.
     """
-    for item in recalled:
-        if isinstance(item, str):
-            if not item.strip():
+    for piece in recalled:
+        if isinstance(piece, str):
+            if not piece.strip():
                 raise ModelError(f"the memory {name} recalls an empty text; leave it out")
-        elif not isinstance(item, Observation) or not 0 <= item.number < len(past):
+        elif not isinstance(piece, Observation) or not 0 <= piece.number < len(past):
             wrong = "which is neither a text nor a step that it has observed"
-            raise ModelError(f"the memory {name} recalls {item!r:.60}, {wrong}")
+            raise ModelError(f"the memory {name} recalls {piece!r:.60}, {wrong}")
     if budget is not None and tokens_per_frame is not None:
         n_tokens = tokens_of(recalled, tokens_per_frame)
         if n_tokens > budget:

@@ -32,8 +32,7 @@ _CLUES = (3, 9)
 
 
 def check_memory(memory: Memory) -> Iterator[CheckResult]:
-    """Yield the result of each check: a memory observes two short trajectories of plain frames, and
-    is asked on them.
+    """Yield each check's result: a memory observes two short trajectories, and is asked on them.
 
     A model that it may ask answers with the number of frames it was given.
     """
@@ -71,16 +70,16 @@ def _check_identity(memory: Memory) -> None:
 
 def _check_recalls(memory: Memory, folder: Path) -> None:
     steps = _observe(memory, "first", folder)
-    for item in memory.recall(_query(memory, steps), None):
-        _require_recallable(item, steps[:-1])
+    for piece in memory.recall(_query(memory, steps), None):
+        _require_recallable(piece, steps[:-1])
 
 
 def _check_empty(memory: Memory, folder: Path) -> None:
     """A question can come at the first step, before anything was observed."""
     steps = _steps(memory, "empty", folder, 1)
     memory.begin(_facts(memory, "empty"))
-    for item in memory.recall(_query(memory, steps), 500):
-        _require_recallable(item, [])
+    for piece in memory.recall(_query(memory, steps), 500):
+        _require_recallable(piece, [])
 
 
 def _check_budget(memory: Memory, folder: Path) -> None:
@@ -115,23 +114,24 @@ def _check_forgets(memory: Memory, folder: Path) -> None:
     before = _observe(memory, "first", folder)
     steps = _observe(memory, "second", folder, n_steps=5)
     known = [step.frame for step in before]
-    for item in memory.recall(_query(memory, steps), None):
-        _require_recallable(item, steps[:-1])
+    for piece in memory.recall(_query(memory, steps), None):
+        _require_recallable(piece, steps[:-1])
         require(
-            isinstance(item, str) or item.frame not in known,
+            isinstance(piece, str) or piece.frame not in known,
             "it recalls a frame of the trajectory before",
         )
 
 
-def _require_recallable(item: Any, past: Sequence[Observation]) -> None:
-    if isinstance(item, str):
-        require(bool(item.strip()), "it recalls an empty text")
+def _require_recallable(piece: Any, past: Sequence[Observation]) -> None:
+    if isinstance(piece, str):
+        require(bool(piece.strip()), "it recalls an empty text")
         return
     require(
-        isinstance(item, Observation), f"it recalls {item!r:.60}, neither a text nor an observation"
+        isinstance(piece, Observation),
+        f"it recalls {piece!r:.60}, neither a text nor an observation",
     )
     require(
-        item in past, "it recalls a step that it has not observed; the current one is shown anyway"
+        piece in past, "it recalls a step that it has not observed; the current one is shown anyway"
     )
 
 

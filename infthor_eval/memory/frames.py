@@ -47,7 +47,7 @@ class FrameMemory(ABC):
     def recall(self, query: Query, budget: int | None) -> Recalled:
         """See `Memory`; in time order."""
         n_frames = min(self._room(budget), len(self.past))
-        return [self.past[place] for place in sorted(self.choose(query, n_frames))]
+        return [self.past[index] for index in sorted(self.choose(query, n_frames))]
 
     @abstractmethod
     def choose(self, query: Query, n_frames: int) -> Sequence[int]:
@@ -64,8 +64,7 @@ class FrameMemory(ABC):
 
 
 class Last(FrameMemory):
-    """The last frames before the current view: recency alone, what a window of so many tokens
-    holds."""
+    """The last frames before the current view: recency alone, a window of so many tokens."""
 
     def choose(self, query: Query, n_frames: int) -> Sequence[int]:
         """See `FrameMemory`."""
@@ -89,8 +88,7 @@ class Random(FrameMemory):
 
 
 class Oracle(FrameMemory):
-    """The clue frames, and others drawn until the frames are as many as other memories recall: the
-    upper bound.
+    """The clue frames, and others drawn until as many as of other memories: the upper bound.
 
     Of more clues than there is room for, those at even distances among them are shown. A question
     without evidence (an absence) has drawn frames alone.
@@ -102,11 +100,11 @@ class Oracle(FrameMemory):
         """See `FrameMemory`."""
         known = set(query.clues or ())
         clues = [
-            place for place, observation in enumerate(self.past) if observation.number in known
+            index for index, observation in enumerate(self.past) if observation.number in known
         ]
         if len(clues) >= n_frames:
             return [clues[number * len(clues) // n_frames] for number in range(n_frames)]
         others = [
-            place for place, observation in enumerate(self.past) if observation.number not in known
+            index for index, observation in enumerate(self.past) if observation.number not in known
         ]
         return [*clues, *self.draw(query).sample(others, n_frames - len(clues))]

@@ -1,5 +1,4 @@
-"""Protocol of memories: what is kept of a trajectory while it is observed, and what of it is
-recalled for a question.
+"""Protocol of memories: what is kept of an observed trajectory, and recalled for a question.
 
 A memory observes a trajectory step by step, and recalls frames and texts within a budget of tokens
 when it is asked. The harness shows these, and the current view, to the model under test. The shape
@@ -115,8 +114,7 @@ Recalled = Sequence[Observation | str]
 
 @runtime_checkable
 class Memory(Protocol):
-    """Keeps what it needs of a trajectory, and recalls some of it. One object serves one trajectory
-    after another.
+    """Keeps and recalls parts of a trajectory. One object serves one trajectory after another.
 
     Its class is called with the options that a user gives (`--memory-args`), each with a default.
     """
@@ -126,8 +124,7 @@ class Memory(Protocol):
         """What the memory needs and is."""
 
     def identity(self) -> Mapping[str, Any]:
-        """Return what can change a recall beside the class and its options, as JSON values: a
-        checkpoint, say."""
+        """Return what can change a recall beside class and options, as JSON: a checkpoint, say."""
 
     def begin(self, facts: TrajectoryFacts) -> None:
         """Forget everything and begin a trajectory."""
@@ -140,8 +137,7 @@ class Memory(Protocol):
         """
 
     def recall(self, query: Query, budget: int | None) -> Recalled:
-        """Return what the model is shown before the current view, in order. Recalling changes
-        nothing.
+        """Return what is shown before the current view, in order. Recalling changes nothing.
 
         Args:
             query: what is asked, and the current step, which has not been observed.
@@ -154,8 +150,7 @@ class Memory(Protocol):
 
 
 def tokens_of(recalled: Recalled, tokens_per_frame: int) -> int:
-    """Return the tokens of what is recalled: those of its frames, and an estimate of those of its
-    texts."""
-    texts = [item for item in recalled if isinstance(item, str)]
+    """Return the tokens of what is recalled: its frames', and an estimate of its texts'."""
+    texts = [piece for piece in recalled if isinstance(piece, str)]
     of_texts = sum(math.ceil(len(text) / CHARACTERS_PER_TOKEN) for text in texts)
     return of_texts + tokens_per_frame * (len(recalled) - len(texts))

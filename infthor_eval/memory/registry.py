@@ -1,5 +1,4 @@
-"""Memories by name: those built in, those of other packages (entry points), and classes in a user's
-own file."""
+"""Memories by name: built in, of other packages (entry points), and classes in a user's file."""
 
 import inspect
 import typing
@@ -11,10 +10,10 @@ from typing import Any
 import msgspec
 
 from infthor_eval.errors import UsageError, UserCodeError, in_one_line, unknown_name, wrap_errors
-from infthor_eval.formats.pairs import read_pairs
 from infthor_eval.memory.protocol import Memory
 from infthor_eval.plugins import PluginTable
 from model_adapters.adapter_identity import package_identity
+from model_adapters.options.parsing import read_pairs
 from model_adapters.own_file import file_identity, load_from_file, name_in_file, names_a_file
 
 __all__ = [
@@ -28,9 +27,9 @@ __all__ = [
     "wrap_memory_errors",
 ]
 
-_FRAMES, _RETRIEVAL, _TEXTS = (
-    f"infthor_eval.memory.{module}" for module in ("frames", "retrieval", "texts")
-)
+_FRAMES = "infthor_eval.memory.frames"
+_RETRIEVAL = "infthor_eval.memory.retrieval"
+_TEXTS = "infthor_eval.memory.texts"
 MEMORIES = PluginTable(
     "memory",
     "infthor_eval.memories",

@@ -30,8 +30,7 @@ class _Nearest(FrameMemory):
         retriever: str = PUBLISHED_RETRIEVER,
         retriever_revision: str | None = None,
     ) -> None:
-        """Set the number of frames where there is no budget, and the CLIP model: a hub id or a
-        folder."""
+        """Set the number of frames without a budget, and the CLIP model: hub id or folder."""
         super().__init__(k)
         self._source = retriever, retriever_revision
 
@@ -56,9 +55,8 @@ class _Nearest(FrameMemory):
 
         if not n_frames:
             return ()
-        return nearest(
-            self.retriever.frames([item.frame for item in self.past]), self.vector(query), n_frames
-        )
+        frames = self.retriever.frames([observation.frame for observation in self.past])
+        return nearest(frames, self.vector(query), n_frames)
 
     @abstractmethod
     def vector(self, query: Query) -> Any:
@@ -66,8 +64,7 @@ class _Nearest(FrameMemory):
 
 
 class Clip(_Nearest):
-    """The frames nearest to a text: the question (the published retrieval of NIEH, k = 10), or the
-    goal.
+    """The frames nearest to a text: NIEH's question (published retrieval, k = 10), or the goal.
 
     `query=goal` with k = 20 and `openai/clip-vit-base-patch32` is the one retrieval for agents in
     the published code (`run_interactive_eval_clip.py`).
@@ -80,8 +77,7 @@ class Clip(_Nearest):
         retriever_revision: str | None = None,
         query: Literal["question", "goal"] = "question",
     ) -> None:
-        """See `_Nearest`; `query` is the text that frames are compared with: an agent's question is
-        goal and plan."""
+        """See `_Nearest`; frames are compared with `query`: an agent's is goal and plan."""
         super().__init__(k, retriever, retriever_revision)
         self._query = query
 
@@ -101,8 +97,7 @@ class Clip(_Nearest):
 
 
 class ClipView(_Nearest):
-    """The frames nearest to the current view: ours, where a trajectory does not name the frames of
-    an image memory.
+    """The frames nearest to the current view: ours, for trajectories without an image memory.
 
     The paper's image memory (k = 20) came from `retrieved_image` of the trajectories' files; what
     chose it is not in the published code.

@@ -1,5 +1,4 @@
-"""Memories that recall texts: what an exact observer would write down, and the model's own
-notes."""
+"""Memories that recall texts: an exact observer's log, and the model's own notes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar
@@ -41,8 +40,7 @@ class _Texts:
 
 
 class TextLog(_Texts):
-    """A log that an exact observer would write: each goal and action, and the objects seen, from
-    the metadata.
+    """An exact observer's log: each goal and action, and objects seen, from the metadata.
 
     A line says what is new: the types that come into view, what is open, in the hand, and in or on
     what is seen. Of a log beyond the budget the last lines are recalled.
@@ -89,14 +87,13 @@ class Notes(_Texts):
             raise ValueError("notes need a model that writes them")
         steps = _steps(window[0].number, window[-1].number)
         note = self.facts.write(
-            [*(item.frame for item in window), note_request(steps)], self._tokens
+            [*(observation.frame for observation in window), note_request(steps)], self._tokens
         )
         return f"{steps}: {' '.join(note.split())}\n"
 
 
 def note_request(steps: str) -> str:
-    """Return the text that follows the frames of a window ("Steps 0-19") and asks for a note on
-    them."""
+    """Return the text behind a window's frames ("Steps 0-19"), which asks for a note on them."""
     return (
         f"\n{steps} of an embodied agent's trajectory, one view per step in time order. You will "
         "be asked about them later without seeing them. Note in a few short phrases which room it "
@@ -126,12 +123,12 @@ def _lines(steps: Sequence[Observation]) -> Iterator[str]:
     goal = None
     before = ObjectLog()
     for step in steps:
-        said = [f"goal: {step.goal}"] if step.goal != goal and step.goal else []
-        said += [step.action] if step.action else []
+        sentences = [f"goal: {step.goal}"] if step.goal != goal and step.goal else []
+        sentences += [step.action] if step.action else []
         log = step.log or ObjectLog()
-        said += _news(before, log)
-        if said:
-            yield f"Step {step.number}: {'; '.join(said)}.\n"
+        sentences += _news(before, log)
+        if sentences:
+            yield f"Step {step.number}: {'; '.join(sentences)}.\n"
         goal = step.goal
         before = log
 

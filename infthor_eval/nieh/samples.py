@@ -24,7 +24,7 @@ from infthor_eval.nieh.frame_ablations import FrameAblation
 from infthor_eval.nieh.prompts import PUBLISHED_MAIN
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.runs.limiting import spread
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 __all__ = ["TaskSamples", "find_samples", "find_set", "open_set"]
 

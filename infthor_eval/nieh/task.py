@@ -16,7 +16,7 @@ from infthor_eval.nieh.options import NiehOptions
 from infthor_eval.nieh.samples import TaskSamples, find_samples, find_set
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.generation_kwargs import decoding_of
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from model_adapters import Decoding, cut_at_stop
 
 __all__ = ["NiehTask", "PreparedTask", "check_task_file"]

@@ -17,8 +17,8 @@ _NAMES = ("127.0.0.1", "localhost")
 # Pages run their own scripts and load nothing from elsewhere; no other page holds them in a frame.
 _HEADERS = {
     "Content-Security-Policy": "default-src 'none'; img-src 'self' data:; style-src 'self'; "
-    "script-src 'self'; "
-    "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'",
+    "script-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; "
+    "frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",  # the address holds the token
@@ -27,8 +27,7 @@ _HEADERS = {
 
 
 class Guard:
-    """An application that answers for another one: it refuses requests of others, and adds the
-    headers of every page.
+    """An application around another: it refuses requests of others, and adds every page's headers.
 
     Args:
         application: what answers the requests that are not refused.
@@ -67,8 +66,8 @@ class Guard:
         # from elsewhere.
         if headers.get("origin", f"http://{host}") != f"http://{host}":
             return "another page asked"
-        given = path.removeprefix("/").partition("/")[0]
-        if not secrets.compare_digest(given.encode(), self._token):
+        token = path.removeprefix("/").partition("/")[0]
+        if not secrets.compare_digest(token.encode(), self._token):
             return (
                 "the address does not hold the token of this server; open the address that the "
                 "command printed"

@@ -1,5 +1,4 @@
-"""A server of local pages: reached from this machine alone, and only by who was given the address
-(`guard`)."""
+"""A server of local pages: only for this machine, and who was given the address (`guard`)."""
 
 from __future__ import annotations
 
@@ -74,8 +73,7 @@ def serve_pages(routes: Sequence[BaseRoute], *, port: int = 0) -> Iterator[PageS
 
 
 def file_route(path: str, package: str, name: str) -> Route:
-    """Return the route of a file that comes with a package (.html, .css or .js): its path, and
-    where the file is.
+    """Return the route of a package's file (.html, .css or .js): its path, and its location.
 
     Example: `file_route("/report.css", "infthor_eval.report.web", "report.css")`.
     """

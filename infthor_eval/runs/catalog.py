@@ -17,7 +17,7 @@ from typing import Any
 from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.yaml_files import PlainLoader, read_yaml
 from infthor_eval.storage.digests import canonical_json
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 __all__ = ["ENTRY_POINTS", "Catalog", "TaskFile"]
 

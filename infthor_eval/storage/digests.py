@@ -37,8 +37,7 @@ def digest_of_file(path: Path) -> str:
 
 
 def digest_of_files(paths: Iterable[Path]) -> str:
-    """Return the hash of the names and contents of several files, in the order given (hex, 32
-    characters).
+    """Return the hash of names and contents of files, in the order given (hex, 32 characters).
 
     Raises:
         OSError: a file cannot be read.

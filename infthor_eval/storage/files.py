@@ -24,8 +24,7 @@ _PROBE = b"x" * 4096  # a full disk still creates an empty file, so content is w
 
 
 def prepare_folder(path: Path, option: str = "--out") -> Path:
-    """Create the folder of an option and check that it can be written to, before results would be
-    lost otherwise.
+    """Create an option's folder, and check that it is writable before results would be lost.
 
     Raises:
         DataError: the path is a file, or the folder cannot be created or written to.
@@ -87,8 +86,7 @@ def refuse_overwrite(path: Path, content: bytes) -> None:
 
 @contextmanager
 def write_atomically(path: Path) -> Iterator[Path]:
-    """Write a file or a folder under a temporary name beside `path`, and rename it when it is
-    complete.
+    """Write a file or folder under a temporary name beside `path`; rename it when it is complete.
 
     Args:
         path: the final path; an existing file is replaced, a folder must not exist.

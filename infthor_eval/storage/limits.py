@@ -41,14 +41,14 @@ class Limit:
         Raises:
             UsageError: the variable is not a whole number above 0.
         """
-        given = os.environ.get(self.name)
-        if given is None:
+        text = os.environ.get(self.name)
+        if text is None:
             return self.default
-        if not (given.isascii() and given.isdecimal() and len(given) <= 18 and int(given) > 0):
+        if not (text.isascii() and text.isdecimal() and len(text) <= 18 and int(text) > 0):
             raise UsageError(
-                f"{self.name}={given[:40]}: not a whole number above 0; set it to one, or unset it"
+                f"{self.name}={text[:40]}: not a whole number above 0; set it to one, or unset it"
             )
-        return int(given)
+        return int(text)
 
     @property
     def hint(self) -> str:
@@ -57,32 +57,23 @@ class Limit:
 
 
 FILE_MB = Limit("INFTHOR_EVAL_MAX_FILE_MB", 2048)  # size of a file, unpacked
-LINE_MB = Limit(
-    "INFTHOR_EVAL_MAX_LINE_MB", 256
-)  # size of one line in files that are read line by line
+# Size of one line in files that are read line by line.
+LINE_MB = Limit("INFTHOR_EVAL_MAX_LINE_MB", 256)
 IMAGE_MEGAPIXELS = Limit("INFTHOR_EVAL_MAX_IMAGE_MEGAPIXELS", 50)
-IMAGE_ASPECT = Limit(
-    "INFTHOR_EVAL_MAX_IMAGE_ASPECT", 100
-)  # longer side over shorter; image processors refuse 200
-ALIAS_NODES = Limit(
-    "INFTHOR_EVAL_MAX_YAML_NODES", 100_000
-)  # values of a YAML document with all aliases expanded
-OBJECT_POSES = Limit(
-    "INFTHOR_EVAL_MAX_OBJECT_POSES", 1000
-)  # recorded poses of one scene; real ones have up to 60
-TRAJECTORIES = Limit(
-    "INFTHOR_EVAL_MAX_TRAJECTORIES", 1_000_000
-)  # trajectories that one command may generate
-TEMPLATE_SECONDS = Limit(
-    "INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", 60
-)  # processor time of a chat template, per text
+# Longer side over shorter; image processors refuse 200.
+IMAGE_ASPECT = Limit("INFTHOR_EVAL_MAX_IMAGE_ASPECT", 100)
+# Values of a YAML document with all aliases expanded.
+ALIAS_NODES = Limit("INFTHOR_EVAL_MAX_YAML_NODES", 100_000)
+# Recorded poses of one scene; real ones have up to 60.
+OBJECT_POSES = Limit("INFTHOR_EVAL_MAX_OBJECT_POSES", 1000)
+# Trajectories that one command may generate.
+TRAJECTORIES = Limit("INFTHOR_EVAL_MAX_TRAJECTORIES", 1_000_000)
+# Processor time of a chat template, per text.
+TEMPLATE_SECONDS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_SECONDS", 60)
 TEMPLATE_MB = Limit("INFTHOR_EVAL_MAX_TEMPLATE_MB", 2048)  # memory of a chat template, per text
-TEMPLATE_CHARACTERS = Limit(
-    "INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS", 16_000_000
-)  # length of the text it produces
-ACTION_SECONDS = Limit(
-    "INFTHOR_EVAL_MAX_ACTION_SECONDS", 30
-)  # time of one action in the embedded simulator
-UNITY_ACTION_SECONDS = Limit(
-    "INFTHOR_EVAL_MAX_UNITY_ACTION_SECONDS", 100
-)  # in Unity; AI2-THOR's own limit
+# Length of the text it produces.
+TEMPLATE_CHARACTERS = Limit("INFTHOR_EVAL_MAX_TEMPLATE_CHARACTERS", 16_000_000)
+# Time of one action in the embedded simulator.
+ACTION_SECONDS = Limit("INFTHOR_EVAL_MAX_ACTION_SECONDS", 30)
+# In Unity; AI2-THOR's own limit.
+UNITY_ACTION_SECONDS = Limit("INFTHOR_EVAL_MAX_UNITY_ACTION_SECONDS", 100)

@@ -54,8 +54,8 @@ class ScratchFolder:
 
 
 @cache
-def _remove_abandoned(place: Path) -> None:
-    for lock in place.glob(f"{_PREFIX}*/{_LOCK}"):
+def _remove_abandoned(parent: Path) -> None:
+    for lock in parent.glob(f"{_PREFIX}*/{_LOCK}"):
         try:
             with lock.open("rb") as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -29,13 +29,13 @@ __all__ = [
 ]
 
 _APPLIES: dict[str, Callable[[ThorObject], bool | UnsetType]] = {
-    "OpenObject": lambda item: item.openable and not item.is_open,
-    "CloseObject": lambda item: item.openable and item.is_open,
-    "PickupObject": lambda item: item.pickupable and not item.is_picked_up,
-    "PutObject": lambda item: item.receptacle and not item.is_picked_up,
-    "ToggleObjectOn": lambda item: item.toggleable and not item.is_toggled,
-    "ToggleObjectOff": lambda item: item.toggleable and item.is_toggled,
-    "SliceObject": lambda item: item.sliceable and not item.is_sliced,
+    "OpenObject": lambda obj: obj.openable and not obj.is_open,
+    "CloseObject": lambda obj: obj.openable and obj.is_open,
+    "PickupObject": lambda obj: obj.pickupable and not obj.is_picked_up,
+    "PutObject": lambda obj: obj.receptacle and not obj.is_picked_up,
+    "ToggleObjectOn": lambda obj: obj.toggleable and not obj.is_toggled,
+    "ToggleObjectOff": lambda obj: obj.toggleable and obj.is_toggled,
+    "SliceObject": lambda obj: obj.sliceable and not obj.is_sliced,
 }
 _PLAIN = {"RotateLeft", "RotateRight", "MoveAhead", "LookUp", "LookDown", "NoOp"}
 _LOOK_DEGREES = 30.0
@@ -51,8 +51,7 @@ class Misuse(StrEnum):
 
 
 class UngroundedError(ValueError):
-    """A text has no known action, lacks an argument, or matches no visible object; the message says
-    which."""
+    """A text without a known action, an argument or a visible object; the message says which."""
 
     def __init__(self, misuse: Misuse, message: str) -> None:
         super().__init__(message)
@@ -96,10 +95,9 @@ def text_of(
     receptacle_id: str | None = None,
     words: Words = Words.NATURAL,
 ) -> ActionText:
-    """Return the text of a call; the object of PutObject is the one that is put into the
-    receptacle."""
-    ids = [item for item in (object_id, receptacle_id) if item is not None]
-    return ActionText(action, tuple(words.name_of(item) for item in ids))
+    """Return the text of a call; PutObject's object is the one put into the receptacle."""
+    ids = [key for key in (object_id, receptacle_id) if key is not None]
+    return ActionText(action, tuple(words.name_of(key) for key in ids))
 
 
 def ground(
@@ -128,7 +126,7 @@ def ground(
         return {"action": text.action, "degrees": degrees}
     if text.action in _PLAIN:
         return {"action": text.action}
-    named = {key: _names_of(item, words) for key, item in view.objects.items()}
+    named = {key: _names_of(obj, words) for key, obj in view.objects.items()}
     known = set[str]().union(*named.values())
     for name in text.names:
         if name not in known:
@@ -137,7 +135,7 @@ def ground(
         text.names[0] in named.get(key, ()) for key in view.inventory
     ):
         raise UngroundedError(Misuse.NOT_POSSIBLE, f"{text}: no {text.names[0]} in the hand")
-    meant = [item for key, item in view.objects.items() if text.names[-1] in named[key]]
+    meant = [obj for key, obj in view.objects.items() if text.names[-1] in named[key]]
     return {"action": text.action, "objectId": _choose_object(text, meant, preferred).object_id}
 
 
@@ -151,7 +149,7 @@ def applicable_calls(view: SimulatorView, degrees: float = _LOOK_DEGREES) -> lis
     by `degrees`."""
     calls = [ground(ActionText(name), view, degrees) for name in sorted(_PLAIN)]
     visible = sorted(
-        (item.object_type, item.object_id) for item in view.objects.values() if item.visible
+        (obj.object_type, obj.object_id) for obj in view.objects.values() if obj.visible
     )
     for action, applies in _APPLIES.items():
         if action == "PutObject" and not view.inventory:
@@ -173,10 +171,9 @@ def text_of_call(
     return text_of(call["action"], key, words=words)
 
 
-def _names_of(item: ThorObject, words: Words) -> set[str]:
-    """Return the names by which an agent may call an object: its name in these words, and its
-    type."""
-    return {words.name_of(item.object_id), item.object_type}
+def _names_of(obj: ThorObject, words: Words) -> set[str]:
+    """Return the names by which an agent may call an object: in these words, and its type."""
+    return {words.name_of(obj.object_id), obj.object_type}
 
 
 def _choose_object(
@@ -185,8 +182,8 @@ def _choose_object(
     """Return the object of a text among those that its last name can mean."""
     name = text.names[-1]
     applies = _APPLIES[text.action]
-    visible = [item for item in meant if item.visible]
-    possible = [item for item in visible if applies(item)]
+    visible = [obj for obj in meant if obj.visible]
+    possible = [obj for obj in visible if applies(obj)]
     if not visible:
         raise UngroundedError(Misuse.NOT_IN_VIEW, f"{text}: {name}: none in sight")
     if not possible:
@@ -194,5 +191,5 @@ def _choose_object(
             Misuse.NOT_POSSIBLE, f"{text}: {name}: none of those in sight allows it"
         )
     return min(
-        possible, key=lambda item: (item.object_id not in preferred, item.distance, item.object_id)
+        possible, key=lambda obj: (obj.object_id not in preferred, obj.distance, obj.object_id)
     )

@@ -1,5 +1,4 @@
-"""Object axes of AI2-THOR 2.1.0 and 5.x: the models of some long objects are turned by 90 or 270
-degrees in 5.x.
+"""Object axes of AI2-THOR 2.1.0 and 5.x: some long objects are turned by 90 or 270 degrees in 5.x.
 
 So rotations recorded in 2.1.0 (ALFRED, the published trajectories) need a turn about the object's
 own vertical axis. The turns below are those that fit the boxes recorded in ALFRED's training
@@ -19,8 +18,7 @@ _TURNS = {**dict.fromkeys(_ACROSS, 90.0), "Spatula": 270.0}  # degrees
 
 
 def modern_rotation(object_type: str, rotation: Mapping[str, float]) -> dict[str, float]:
-    """Convert Euler angles of 2.1.0 (Unity's x, y, z, degrees) to those with which the 5.x object
-    looks the same."""
+    """Convert Euler angles of 2.1.0 (Unity's x, y, z, degrees) to those of the same look in 5.x."""
     turn = _TURNS.get(object_type, 0.0)
     if not turn:
         return dict(rotation)
@@ -29,7 +27,7 @@ def modern_rotation(object_type: str, rotation: Mapping[str, float]) -> dict[str
 
 def _matrix(rotation: Mapping[str, float]) -> NDArray[np.float64]:
     """Return the rotation matrix of Unity's Euler angles: about z first, then x, then y."""
-    x, y, z = (math.radians(rotation[axis]) for axis in "xyz")
+    x, y, z = [math.radians(rotation[axis]) for axis in "xyz"]
     about_x = np.array([[1, 0, 0], [0, math.cos(x), -math.sin(x)], [0, math.sin(x), math.cos(x)]])
     about_y = np.array([[math.cos(y), 0, math.sin(y)], [0, 1, 0], [-math.sin(y), 0, math.cos(y)]])
     about_z = np.array([[math.cos(z), -math.sin(z), 0], [math.sin(z), math.cos(z), 0], [0, 0, 1]])

@@ -46,9 +46,8 @@ class FrameFolder:
         path = self._folder / f"{self._n_frames:09d}.png"
         self._n_frames += 1
         try:
-            Image.fromarray(view.frame).save(
-                path, compress_level=1
-            )  # temporary: speed matters more than size
+            # Temporary: speed matters more than size.
+            Image.fromarray(view.frame).save(path, compress_level=1)
         except OSError as error:
             raise DataError(
                 f"{path}: cannot be written ({error.strerror}); make room, or set TMPDIR"

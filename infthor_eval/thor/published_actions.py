@@ -1,5 +1,4 @@
-"""From an agent's text to a call, as the published script goes (`interact_with_env`,
-`post_processing_action`).
+"""From an agent's text to a call, by the published `interact_with_env`, `post_processing_action`.
 
 A name is sought as a part of the objects' names, case apart, and the first visible object that has
 the property is taken, whatever its state. What cannot be grounded is sent nevertheless: without an
@@ -20,10 +19,10 @@ __all__ = ["current_call", "ground_published", "published_call"]
 _Has = Callable[[ThorObject], bool | UnsetType]
 
 _HAS: Mapping[str, _Has] = {
-    "OpenObject": lambda item: item.openable,
-    "CloseObject": lambda item: item.is_open,
-    "PickupObject": lambda item: item.pickupable,
-    "SliceObject": lambda item: item.sliceable,
+    "OpenObject": lambda obj: obj.openable,
+    "CloseObject": lambda obj: obj.is_open,
+    "PickupObject": lambda obj: obj.pickupable,
+    "SliceObject": lambda obj: obj.sliceable,
 }
 _WITHOUT_OBJECT = {
     *("MoveAhead", "MoveBack", "MoveLeft", "MoveRight", "RotateLeft", "RotateRight"),
@@ -34,8 +33,7 @@ _TOGGLE = "ToggleObject"
 
 
 def ground_published(text: str, objects: Iterable[ThorObject]) -> tuple[str | None, str | None]:
-    """Return the action and the object's id that a text with "Object" in it stands for; None where
-    there is none.
+    """Return the action and object id of a text with "Object" in it; None where there is none.
 
     Args:
         text: what the agent said.
@@ -43,9 +41,9 @@ def ground_published(text: str, objects: Iterable[ThorObject]) -> tuple[str | No
     """
     try:
         if text.startswith(_PUT):
-            return _PUT, _first(objects, _last_word(text), lambda item: item.receptacle)
+            return _PUT, _first(objects, _last_word(text), lambda obj: obj.receptacle)
         if text.startswith(_TOGGLE):  # on and off alike
-            return _TOGGLE, _first(objects, _last_word(text), lambda item: item.toggleable)
+            return _TOGGLE, _first(objects, _last_word(text), lambda obj: obj.toggleable)
         for action, has in _HAS.items():
             if text.startswith(action):
                 return action, _first(objects, text.rsplit(action, maxsplit=1)[-1].strip(), has)
@@ -86,13 +84,13 @@ class _UnreportedError(LookupError):
 def _first(objects: Iterable[ThorObject], name: str, has: _Has) -> str | None:
     """Return the id of the first visible object with this text in its name that has a property."""
     wanted = name.lower()
-    for item in objects:
-        if wanted in item.name.lower() and item.visible:
-            value = has(item)
+    for obj in objects:
+        if wanted in obj.name.lower() and obj.visible:
+            value = has(obj)
             if value is UNSET:
-                raise _UnreportedError(item.object_id)
+                raise _UnreportedError(obj.object_id)
             if value:
-                return item.object_id
+                return obj.object_id
     return None
 
 

@@ -1,5 +1,4 @@
-"""Conversion of recorded low-level actions (AI2-THOR 2.1.0, as in ALFRED and ∞-THOR) to calls of
-the 5.x API."""
+"""Conversion of recorded actions (AI2-THOR 2.1.0, as in ALFRED and ∞-THOR) to calls of 5.x."""
 
 from typing import Any
 
@@ -9,12 +8,8 @@ from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["MissingObjectError", "degrees_of", "translate"]
 
-_TURNS = {
-    "RotateLeft": 90.0,
-    "RotateRight": 90.0,
-    "LookUp": 30.0,
-    "LookDown": 30.0,
-}  # default angles of 2.1.0, degrees
+# Default angles of 2.1.0, degrees.
+_TURNS = {"RotateLeft": 90.0, "RotateRight": 90.0, "LookUp": 30.0, "LookDown": 30.0}
 
 
 class MissingObjectError(LookupError):

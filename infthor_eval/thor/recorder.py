@@ -15,12 +15,10 @@ _PNG_LEVEL = 4  # higher levels take several times as long and hardly shrink ren
 
 
 class Recorder:
-    """Turns simulator states into log entries (`steps`, one per frame), and into images if a folder
-    is given."""
+    """Turns simulator states into log entries (`steps`, one a frame), and images into a folder."""
 
     def __init__(self, images: Path | None = None) -> None:
-        """Start without a frame; `images` is an existing folder for the frames, None keeps only the
-        log."""
+        """Start without a frame; `images` is an existing folder for frames, None for no files."""
         self._images = images
         self._states: dict[str, ObjectState] = {}
         self.steps: list[Step] = []
@@ -69,7 +67,7 @@ class Recorder:
         return entry
 
     def _changes(self, view: SimulatorView) -> dict[str, ObjectState]:
-        states = {key: state_of(item) for key, item in view.objects.items()}
+        states = {key: state_of(obj) for key, obj in view.objects.items()}
         changes = {key: state for key, state in states.items() if self._states.get(key) != state}
         for key in self._states.keys() - states.keys():
             changes[key] = ObjectState(self._states[key].type, exists=False)
@@ -86,44 +84,42 @@ class Recorder:
 
 
 def object_log(view: SimulatorView) -> ObjectLog:
-    """Return the published fields of a log entry: object types, each once, in alphabetical
-    order."""
-    visible = [item for item in view.objects.values() if item.visible]
+    """Return the published fields of a log entry: object types, each once, alphabetically."""
+    visible = [obj for obj in view.objects.values() if obj.visible]
     inside: dict[str, set[str]] = {}
-    for item in visible:
-        for parent in item.parent_receptacles or ():
+    for obj in visible:
+        for parent in obj.parent_receptacles or ():
             if parent in view.objects and view.objects[parent].visible:
-                inside.setdefault(view.objects[parent].object_type, set()).add(item.object_type)
+                inside.setdefault(view.objects[parent].object_type, set()).add(obj.object_type)
     return ObjectLog(
         visible=_types(visible),
-        pickupable=_types([item for item in visible if item.pickupable]),
-        is_open=_types([item for item in visible if item.openable and item.is_open]),
+        pickupable=_types([obj for obj in visible if obj.pickupable]),
+        is_open=_types([obj for obj in visible if obj.openable and obj.is_open]),
         inven_obj=sorted(object_type_of(key) for key in view.inventory),
-        receptacles=_types([item for item in visible if item.receptacle]),
+        receptacles=_types([obj for obj in visible if obj.receptacle]),
         recep_objs={object_type: sorted(types) for object_type, types in sorted(inside.items())},
     )
 
 
-def state_of(item: ThorObject) -> ObjectState:
-    """Return the part of an object's metadata that is logged, with the position to the
-    millimetre."""
-    at = item.position
+def state_of(obj: ThorObject) -> ObjectState:
+    """Return the logged part of an object's metadata, with the position to the millimetre."""
+    at = obj.position
     return ObjectState(
-        type=item.object_type,
-        parents=tuple(item.parent_receptacles or ()),
+        type=obj.object_type,
+        parents=tuple(obj.parent_receptacles or ()),
         position=(round(at.x, 3), round(at.y, 3), round(at.z, 3)),
-        held=item.is_picked_up,
-        is_open=bool(item.is_open) if item.openable else None,
-        is_on=item.is_toggled if item.toggleable else None,
-        is_sliced=item.is_sliced,
-        is_dirty=item.is_dirty,
-        is_cooked=item.is_cooked,
-        temperature=item.temperature,
+        held=obj.is_picked_up,
+        is_open=bool(obj.is_open) if obj.openable else None,
+        is_on=obj.is_toggled if obj.toggleable else None,
+        is_sliced=obj.is_sliced,
+        is_dirty=obj.is_dirty,
+        is_cooked=obj.is_cooked,
+        temperature=obj.temperature,
     )
 
 
-def _types(items: list[ThorObject]) -> list[str]:
-    return sorted({item.object_type for item in items})
+def _types(objects: list[ThorObject]) -> list[str]:
+    return sorted({obj.object_type for obj in objects})
 
 
 def _pose(view: SimulatorView) -> LoggedPose:

@@ -13,8 +13,7 @@ from infthor_eval.formats.object_ids import modern_type
 from infthor_eval.formats.trajectory import ObjectPose, Scene
 from infthor_eval.thor.axes import modern_rotation
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
+from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
 __all__ = ["RestoreReport", "restore"]
 
@@ -58,7 +57,8 @@ def _state_calls(scene: Scene) -> list[dict[str, Any]]:
     calls: list[dict[str, Any]] = []
     if scene.object_toggles:
         toggles = [
-            {"objectType": item.object_type, "isOn": item.is_on} for item in scene.object_toggles
+            {"objectType": toggle.object_type, "isOn": toggle.is_on}
+            for toggle in scene.object_toggles
         ]
         calls.append({"action": "SetObjectToggles", "objectToggles": toggles})
     if scene.dirty_and_empty:
@@ -75,10 +75,10 @@ def _poses(
     recorded: list[ObjectPose], view: SimulatorView
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """Return the poses with this scene's object names, and the recorded names without an object."""
-    known = {item.name for item in view.objects.values()}
+    known = {obj.name for obj in view.objects.values()}
     spare = defaultdict(list)
-    for item in sorted(view.objects.values(), key=lambda item: item.name):
-        spare[item.object_type].append(item.name)
+    for obj in sorted(view.objects.values(), key=lambda obj: obj.name):
+        spare[obj.object_type].append(obj.name)
     renamed: dict[str, str] = {}
     poses = []
     dropped = []

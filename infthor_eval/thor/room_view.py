@@ -1,5 +1,4 @@
-"""Where to stand to see a room: of the places that can be reached, the one that shows most of what
-is in it."""
+"""Where to stand to see a room: the reachable position that shows most of what is in it."""
 
 import math
 from collections.abc import Sequence
@@ -9,12 +8,11 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, SimulatorView, Vector
+from infthor_eval.thor.view import AgentPose, SimulatorView, Vector, teleport_call
 
 __all__ = ["find_room_view"]
 
-_N_PLACES = 24
+_N_POSITIONS = 24
 _HEADINGS = (0.0, 45.0, 90.0, 135.0, 180.0, 225.0, 270.0, 315.0)
 _HORIZONS = (0.0, 20.0)  # degrees below the horizontal
 _N_TRIALS = 2  # headings that are tried at a place
@@ -33,14 +31,14 @@ def find_room_view(simulator: Simulator, positions: Sequence[Vector], n_pixels: 
 
     Args:
         simulator: the simulator, with a scene; it renders instances.
-        positions: places that the agent can reach.
+        positions: positions that the agent can reach.
         n_pixels: number of pixels of a frame.
     """
     start = simulator.view
     poses = [
-        replace(start.agent, position=place, rotation=heading, horizon=horizon)
-        for place in _far_apart(positions)
-        for heading in _promising_headings(start, place)
+        replace(start.agent, position=position, rotation=heading, horizon=horizon)
+        for position in _far_apart(positions)
+        for heading in _promising_headings(start, position)
         for horizon in _HORIZONS
     ]
     best = max([start.agent, *poses], key=lambda pose: _score(simulator, pose, n_pixels))
@@ -49,28 +47,27 @@ def find_room_view(simulator: Simulator, positions: Sequence[Vector], n_pixels: 
 
 
 def _far_apart(positions: Sequence[Vector]) -> list[Vector]:
-    """Choose places one by one, each as far as possible from those before it: corners come
-    first."""
+    """Choose positions one by one, each as far as possible from the others: corners first."""
     if not positions:
         return []
-    points = np.array([(place.x, place.z) for place in positions])
+    points = np.array([(position.x, position.z) for position in positions])
     distances: NDArray[np.float64] = np.hypot(*(points - points.mean(axis=0)).T)
     chosen = []
-    for _ in range(min(_N_PLACES, len(positions))):
-        place = int(distances.argmax())
-        chosen.append(positions[place])
-        distances = np.minimum(distances, np.hypot(*(points - points[place]).T))
+    for _ in range(min(_N_POSITIONS, len(positions))):
+        farthest = int(distances.argmax())
+        chosen.append(positions[farthest])
+        distances = np.minimum(distances, np.hypot(*(points - points[farthest]).T))
     return chosen
 
 
-def _promising_headings(view: SimulatorView, place: Vector) -> list[float]:
-    return sorted(_HEADINGS, key=lambda heading: -_n_before(view, place, heading))[:_N_TRIALS]
+def _promising_headings(view: SimulatorView, position: Vector) -> list[float]:
+    return sorted(_HEADINGS, key=lambda heading: -_n_before(view, position, heading))[:_N_TRIALS]
 
 
-def _n_before(view: SimulatorView, place: Vector, heading: float) -> int:
+def _n_before(view: SimulatorView, position: Vector, heading: float) -> int:
     """Return the number of objects in the field of view, walls aside."""
     offsets = [
-        (item.position.x - place.x, item.position.z - place.z) for item in view.objects.values()
+        (obj.position.x - position.x, obj.position.z - position.z) for obj in view.objects.values()
     ]
     return sum(
         math.hypot(dx, dz) >= _NEAREST

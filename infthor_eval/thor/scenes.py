@@ -10,15 +10,13 @@ from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.floor_plans import write_floor_plan
 from infthor_eval.thor.room_view import find_room_view
 from infthor_eval.thor.simulator import Simulator
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import SimulatorView, Vector
+from infthor_eval.thor.view import SimulatorView, Vector, teleport_call
 
 __all__ = ["dump_scene", "scene_pictures"]
 
 
 def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the scene from above, and from where most of it is seen: RGB, uint8, [height, width,
-    3].
+    """Return the scene from above, and from where most of it is seen: uint8 [height, width, 3].
 
     Raises:
         SimulatorError: the simulator does not have the scene, or sends no frames.
@@ -28,11 +26,11 @@ def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8],
         raise SimulatorError(
             f"scene {scene}: the simulator sends no frames; start it with rendering"
         )
-    places = [
-        msgspec.convert(place, Vector)
-        for place in _query(simulator, "GetReachablePositions").result
+    positions = [
+        msgspec.convert(position, Vector)
+        for position in _query(simulator, "GetReachablePositions").result
     ]
-    pose = find_room_view(simulator, places, first.shape[0] * first.shape[1])
+    pose = find_room_view(simulator, positions, first.shape[0] * first.shape[1])
     room = simulator.query(**teleport_call(pose)).frame
     above = _query(simulator, "ToggleMapView").frame
     assert room is not None
@@ -41,8 +39,7 @@ def scene_pictures(simulator: Simulator, scene: str) -> tuple[NDArray[np.uint8],
 
 
 def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool = False) -> int:
-    """Record a scene's objects and reachable positions in a folder of floor plans; return the
-    number of objects.
+    """Record a scene's objects and positions as a floor plan; return its number of objects.
 
     Args:
         overwrite: True to replace a different recording of the scene.
@@ -54,9 +51,8 @@ def dump_scene(simulator: Simulator, scene: str, folder: Path, overwrite: bool =
     simulator.reset(scene)
     objects = simulator.metadata["objects"]
     reachable = _query(simulator, "GetReachablePositions").result
-    write_floor_plan(
-        folder, scene, objects, [(place["x"], place["z"]) for place in reachable], overwrite
-    )
+    cells = [(position["x"], position["z"]) for position in reachable]
+    write_floor_plan(folder, scene, objects, cells, overwrite)
     return len(objects)
 
 

@@ -1,5 +1,4 @@
-"""The simulator that all other packages use: scenes, actions, typed states, and recovery from
-crashes.
+"""The simulator that all other rooms use: scenes, actions, typed states, recovery from crashes.
 
 All actions since the last scene change are recorded. If the process dies, hangs or breaks the
 protocol, a new one is started and the episode is repeated action by action, so that callers notice
@@ -15,9 +14,8 @@ from typing import Any, Self
 from infthor_eval.errors import SceneError, SimulatorError
 from infthor_eval.thor.controller import SafeController
 from infthor_eval.thor.launch import Launch
-from infthor_eval.thor.teleport import teleport_call
 from infthor_eval.thor.transport import PeerFault
-from infthor_eval.thor.view import SimulatorView, view_of
+from infthor_eval.thor.view import SimulatorView, teleport_call, view_of
 
 __all__ = ["Simulator", "SimulatorMark"]
 
@@ -43,8 +41,7 @@ _WALKING = {
 
 @dataclass(frozen=True, eq=False)
 class SimulatorMark:
-    """A point of an episode to which the simulator can return: the actions up to it, and the state
-    there."""
+    """A point of an episode to return to: the actions up to it, and the state there."""
 
     episode: tuple["_CallResult", ...]
     view: SimulatorView
@@ -125,8 +122,7 @@ class Simulator:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Raw metadata of the last reply, which `view` has typed; raises SimulatorError if no scene
-        is loaded."""
+        """Raw metadata of the last reply (see `view`); SimulatorError if no scene is loaded."""
         if self._controller is None or self._controller.last_event is None:
             raise SimulatorError("no scene is loaded; reset the simulator to one first")
         return dict(self._controller.last_event.metadata)
@@ -154,8 +150,7 @@ class Simulator:
                 self._recover_from(fault)
 
     def step(self, action: str, **arguments: Any) -> SimulatorView:
-        """Run one action and return the state after it, whose `success` and `error` tell whether it
-        was refused.
+        """Run an action and return the state after it; `success` and `error` tell of a refusal.
 
         Raises:
             SimulatorError: the simulator failed more often than `max_restarts`, or an action of the
@@ -199,13 +194,11 @@ class Simulator:
         return mark
 
     def stores(self, mark: SimulatorMark) -> bool:
-        """Return True if the state at a mark is stored, so that `rewind` need not repeat the
-        episode."""
+        """Return True if a mark's state is stored, so that `rewind` repeats no episode."""
         return mark in self._copies
 
     def rewind(self, mark: SimulatorMark, *, exactly: bool = False) -> SimulatorView:
-        """Return to the state at a mark of the current scene, whether or not it is in the current
-        episode's past.
+        """Return to the state at a mark of this scene, in the current episode's past or not.
 
         Args:
             mark: the mark.

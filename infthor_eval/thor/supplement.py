@@ -65,8 +65,7 @@ def supplement_file(trajectories: Iterable[Trajectory]) -> Iterator[Path]:
 
 
 def agent_path(trajectory: Trajectory) -> list[tuple[float, float]]:
-    """Return the (x, z) positions, metres, of the agent if all actions succeed, including the
-    first."""
+    """Return the agent's (x, z) positions, metres, if all actions succeed; the first too."""
     start = trajectory.scene.init_action
     x = start.x
     z = start.z

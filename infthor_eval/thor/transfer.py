@@ -22,8 +22,7 @@ _ROUNDS = 3  # passes over all objects: moving a receptacle also moves what is i
 
 
 class _State(NamedTuple):
-    """A state of objects that calls can change; `on` and `off` set and unset it, empty if no call
-    does."""
+    """A state of objects; the calls `on` and `off` set and unset it, empty if no call does."""
 
     read: Callable[[ThorObject], Any]
     on: dict[str, Any]
@@ -31,14 +30,12 @@ class _State(NamedTuple):
 
 
 _STATES = (
-    _State(lambda item: item.is_broken, {"action": "BreakObject"}, {}),
+    _State(lambda obj: obj.is_broken, {"action": "BreakObject"}, {}),
+    _State(lambda obj: obj.is_toggled, {"action": "ToggleObjectOn"}, {"action": "ToggleObjectOff"}),
+    _State(lambda obj: obj.is_dirty, {"action": "DirtyObject"}, {"action": "CleanObject"}),
+    _State(lambda obj: obj.is_cooked, {"action": "CookObject"}, {}),
     _State(
-        lambda item: item.is_toggled, {"action": "ToggleObjectOn"}, {"action": "ToggleObjectOff"}
-    ),
-    _State(lambda item: item.is_dirty, {"action": "DirtyObject"}, {"action": "CleanObject"}),
-    _State(lambda item: item.is_cooked, {"action": "CookObject"}, {}),
-    _State(
-        lambda item: item.is_filled_with_liquid,
+        lambda obj: obj.is_filled_with_liquid,
         {"action": "FillObjectWithLiquid", "fillLiquid": "water"},
         {"action": "EmptyLiquidFromObject"},
     ),
@@ -46,8 +43,7 @@ _STATES = (
 
 
 def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
-    """Give all objects the states and poses that they have in another simulator; the agent stays
-    where it is.
+    """Give all objects their states and poses in another simulator; the agent stays where it is.
 
     An object held by the other agent floats where that agent holds it.
 
@@ -57,9 +53,8 @@ def transfer(simulator: Simulator, target: SimulatorView) -> list[str]:
     Raises:
         SimulatorError: the simulator fails.
     """
-    for key in _objects_to_slice(
-        simulator.view, target
-    ):  # first, so that the slices exist when objects are moved
+    # First, so that the slices exist when objects are moved.
+    for key in _objects_to_slice(simulator.view, target):
         simulator.step("SliceObject", objectId=key, forceAction=True)
     for call in _door_calls(simulator.view, target):
         simulator.step(**call)
@@ -79,29 +74,28 @@ def _objects_to_slice(current: SimulatorView, target: SimulatorView) -> list[str
     sliced = {key.rpartition("|")[0] for key in target.objects.keys() - current.objects.keys()}
     return [
         key
-        for key, item in current.objects.items()
-        if key in sliced and item.sliceable and not item.is_sliced
+        for key, obj in current.objects.items()
+        if key in sliced and obj.sliceable and not obj.is_sliced
     ]
 
 
 def _set_state(simulator: Simulator, target: SimulatorView, state: _State) -> None:
     for key, goal in target.objects.items():
-        item = simulator.view.objects.get(key)
+        obj = simulator.view.objects.get(key)
         call = state.on if state.read(goal) else state.off
-        if item is not None and call and state.read(item) != state.read(goal):
+        if obj is not None and call and state.read(obj) != state.read(goal):
             simulator.step(**call, objectId=key, forceAction=True)
 
 
 def _door_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[str, Any]]:
     for key, goal in target.objects.items():
-        item = current.objects.get(key)
-        if item is None or not goal.openable or item.openness == goal.openness:
+        obj = current.objects.get(key)
+        if obj is None or not goal.openable or obj.openness == goal.openness:
             continue
-        if (
-            item.is_toggled and goal.is_open
-        ):  # a running appliance cannot be opened; `_STATES` switches it on again
+        # A running appliance cannot be opened; `_STATES` switches it on again.
+        if obj.is_toggled and goal.is_open:
             yield {"action": "ToggleObjectOff", "objectId": key, "forceAction": True}
-        if item.is_open:  # AI2-THOR changes `openness` only of closed objects
+        if obj.is_open:  # AI2-THOR changes `openness` only of closed objects
             yield {"action": "CloseObject", "objectId": key, "forceAction": True}
         if goal.is_open:
             yield {
@@ -115,12 +109,8 @@ def _door_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[
 def _move_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[str, Any]]:
     # Receptacles before their contents, which move along with them.
     for key, goal in sorted(target.objects.items(), key=lambda pair: not pair[1].receptacle):
-        item = current.objects.get(key)
-        if (
-            item is None
-            or not goal.pickupable
-            or (_is_at(item, goal) and _is_turned_like(item, goal))
-        ):
+        obj = current.objects.get(key)
+        if obj is None or not goal.pickupable or (_is_at(obj, goal) and _is_turned_like(obj, goal)):
             continue
         yield {
             "action": "TeleportObject",
@@ -134,15 +124,15 @@ def _move_calls(current: SimulatorView, target: SimulatorView) -> Iterator[dict[
 
 def _misplaced_objects(current: SimulatorView, target: SimulatorView) -> Iterator[str]:
     for key, goal in target.objects.items():
-        item = current.objects.get(key)
-        if item is None or (goal.pickupable and not _is_at(item, goal)):
+        obj = current.objects.get(key)
+        if obj is None or (goal.pickupable and not _is_at(obj, goal)):
             yield key
 
 
-def _is_at(item: ThorObject, goal: ThorObject) -> bool:
-    return math.dist(astuple(item.position), astuple(goal.position)) <= _NEAR
+def _is_at(obj: ThorObject, goal: ThorObject) -> bool:
+    return math.dist(astuple(obj.position), astuple(goal.position)) <= _NEAR
 
 
-def _is_turned_like(item: ThorObject, goal: ThorObject) -> bool:
-    turns = zip(astuple(item.rotation), astuple(goal.rotation), strict=True)
+def _is_turned_like(obj: ThorObject, goal: ThorObject) -> bool:
+    turns = zip(astuple(obj.rotation), astuple(goal.rotation), strict=True)
     return all(abs((a - b + 180.0) % 360.0 - 180.0) <= _ALIKE for a, b in turns)

@@ -23,9 +23,8 @@ from infthor_eval.errors import SimulatorError
 __all__ = ["PeerFault", "SafeFifoServer"]
 
 _WATCH_SECONDS = 0.1  # interval at which a waiting read or write checks the child process
-_PIPE_BYTES = (
-    1 << 20
-)  # a frame with ids and depth has 0.9 MB; the default of 64 KiB would cost many wake-ups
+# A frame with ids and depth has 0.9 MB; the default of 64 KiB would cost many wake-ups.
+_PIPE_BYTES = 1 << 20
 _LARGEST_BODY = 1 << 30
 _NOT_PROTOCOL = (
     KeyError,
@@ -145,9 +144,8 @@ class SafeFifoServer(FifoServer):
                 self._connected = True
                 return count
             if count == 0 and self._connected:
-                raise self._fail(
-                    "died", self._exit_message()
-                )  # end of file: the simulator closed its end
+                # End of file: the simulator closed its end.
+                raise self._fail("died", self._exit_message())
             # No writer yet (0), or nothing to read (-1). Without a writer `select` would return at
             # once, so sleep.
             self._check()
@@ -192,9 +190,8 @@ class SafeFifoServer(FifoServer):
         if self.unity_proc is None:
             return "closed its pipe"
         try:
-            code = self.unity_proc.wait(
-                timeout=1.0
-            )  # pipes close a moment before the process can be reaped
+            # Pipes close a moment before the process can be reaped.
+            code = self.unity_proc.wait(timeout=1.0)
         except subprocess.TimeoutExpired:
             return "closed its pipe while still running"
         return f"died (exit status {code})"

@@ -1,4 +1,4 @@
-"""Typed metadata that the simulator reports after an action."""
+"""Typed metadata that the simulator reports after an action, and the call back to a pose."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import msgspec
 import numpy as np
 from msgspec import UNSET, UnsetType
+from msgspec.structs import asdict
 from numpy.typing import NDArray
 
 from infthor_eval.errors import SimulatorError, in_one_line
@@ -21,6 +22,7 @@ __all__ = [
     "ThorObject",
     "Vector",
     "instances_of",
+    "teleport_call",
     "view_of",
 ]
 
@@ -153,8 +155,7 @@ class ArmState(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Instance:
-    """The pixels that show one object: their number and [xmin, ymin, xmax, ymax], both ends
-    inclusive."""
+    """The pixels that show an object: number, and [xmin, ymin, xmax, ymax], ends inclusive."""
 
     pixels: int
     box: tuple[int, int, int, int]
@@ -215,8 +216,8 @@ def view_of(event: Any) -> SimulatorView:
         arm = msgspec.convert(metadata.get("arm"), ArmState | None)
         # The inventory of arm agents is always empty; what they hold is in the arm's state.
         in_hand = [
-            item.object_id
-            for item in msgspec.convert(metadata["inventoryObjects"], list[_InHand] | None) or ()
+            held.object_id
+            for held in msgspec.convert(metadata["inventoryObjects"], list[_InHand] | None) or ()
         ]
         outcome = msgspec.convert(metadata, _Outcome)
     except (ValueError, KeyError, TypeError) as error:  # msgspec's errors are ValueErrors
@@ -227,7 +228,7 @@ def view_of(event: Any) -> SimulatorView:
     return SimulatorView(
         frame=None if event.frame is None else np.ascontiguousarray(event.frame),
         depth=None if event.depth_frame is None else np.ascontiguousarray(event.depth_frame),
-        objects={item.object_id: item for item in objects},
+        objects={obj.object_id: obj for obj in objects},
         agent=agent,
         inventory=tuple(in_hand if arm is None else arm.held),
         success=outcome.success,
@@ -241,8 +242,7 @@ def view_of(event: Any) -> SimulatorView:
 
 
 def instances_of(codes: NDArray[np.uint32]) -> dict[int, Instance]:
-    """Return the number of pixels and the box of each code, given one code per pixel [height,
-    width]."""
+    """Return each code's number of pixels and box, given a code per pixel [height, width]."""
     width = codes.shape[1]
     # This works on runs of equal pixels within a row, of which there are a few thousand instead of
     # 90,000 pixels.
@@ -287,3 +287,15 @@ def _instances(event: Any) -> dict[str, Instance] | None:
         for code, instance in instances.items()
         if code in names and "|" in names[code]
     }
+
+
+def teleport_call(pose: AgentPose, *, force: bool = True) -> dict[str, Any]:
+    """Return the 5.x call that teleports the agent to a pose; unforced, a collision refuses it."""
+    call: dict[str, Any] = {
+        "action": "TeleportFull",
+        "position": asdict(pose.position),
+        "rotation": {"x": 0.0, "y": pose.rotation, "z": 0.0},
+        "horizon": pose.horizon,
+        "forceAction": force,
+    }
+    return call if pose.standing is None else {**call, "standing": pose.standing}

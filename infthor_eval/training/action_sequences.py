@@ -14,7 +14,7 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.plans.actors.habits import expert_texts
 from infthor_eval.plans.history.segments import PlanSegment, restart_at, segment_parts
 from infthor_eval.plans.plan import plans_of, tasks_of
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from model_adapters.hf.prompting.prompt import n_tokens
 
 __all__ = ["recorded_segments", "single_plans", "windows"]
@@ -59,10 +59,10 @@ def recorded_segments(
         begins = not segments or plans[plan.index - 1].task != plan.task
         goal = tasks[plan.task].text if begins else None
         texts = expert_texts(trajectory, plan, words)
-        shown = [after[number] for number in range(*plan.low)]
+        frames = [after[number] for number in range(*plan.low)]
         segments.append(
             PlanSegment(
-                plan.text, goal, before, tuple(zip(texts, shown, strict=True)), plan.in_task
+                plan.text, goal, before, tuple(zip(texts, frames, strict=True)), plan.in_task
             )
         )
         before = segments[-1].steps[-1][1]
@@ -71,9 +71,8 @@ def recorded_segments(
 
 def windows(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
-) -> Iterator[TrainingSequence | SkippedItem]:
-    """Cut a history into sequences, each with as many whole plans as fit; every plan is in one of
-    them.
+) -> Iterator[TrainingSequence | SkippedSequence]:
+    """Cut a history into sequences of as many whole plans as fit; every plan is in one of them.
 
     Args:
         encoder: builds the sequences.
@@ -90,7 +89,7 @@ def windows(
     while first < len(segments):
         end = _window_end(encoder, segments, first, limit)
         if end == first:
-            yield SkippedItem(f"{name}, plan {first + 1}", f"longer than {limit} tokens")
+            yield SkippedSequence(f"{name}, plan {first + 1}", f"longer than {limit} tokens")
             first += 1
             continue
         numbers = f"plan {end}" if end == first + 1 else f"plans {first + 1} to {end}"
@@ -101,8 +100,7 @@ def windows(
 def single_plans(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment]
 ) -> Iterator[TrainingSequence]:
-    """Cut a history into sequences of one plan each, with its goal and the frame that it begins
-    with.
+    """Cut a history into sequences of one plan each, with its goal and the frame it begins with.
 
     Raises:
         DataError: a frame cannot be read, or a text of the history contains a mark.

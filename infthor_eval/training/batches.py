@@ -80,16 +80,14 @@ def _labels(sequence: TrainingSequence, ids: torch.Tensor) -> torch.Tensor:
 def _positions(
     sequences: Sequence[TrainingSequence], ids: Sequence[torch.Tensor], family: Family
 ) -> torch.Tensor:
-    """Return the positions of whole sequences, each from 0; padding has position 0, which never
-    lengthens RoPE."""
-    rows = [
-        family.positions(own, [frame.size for frame in sequence.frames], 0)
-        for sequence, own in zip(sequences, ids, strict=True)
-    ]
+    """Return the positions of sequences, each from 0; padding has 0, which never lengthens RoPE."""
+    rows = []
+    for sequence, own in zip(sequences, ids, strict=True):
+        sizes = [frame.size for frame in sequence.frames]
+        rows.append(family.positions(own, sizes, 0))
     longest = max(len(own) for own in ids)
-    return torch.cat(
-        [torch.nn.functional.pad(row, (0, longest - row.shape[-1])) for row in rows], dim=-2
-    )
+    padded = [torch.nn.functional.pad(row, (0, longest - row.shape[-1])) for row in rows]
+    return torch.cat(padded, dim=-2)
 
 
 def _slots(sequence: TrainingSequence, slot_id: int) -> torch.Tensor:

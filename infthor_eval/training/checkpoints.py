@@ -23,8 +23,7 @@ _HINT = "restore it, or remove the folder to restart"
 
 @dataclass(frozen=True)
 class Checkpoints:
-    """The last state of a run, in a folder `step-NUMBER`: weights, the optimizer's moments, and the
-    run's settings.
+    """The last state of a run, in `step-NUMBER`: weights, optimizer's moments, and settings.
 
     Nothing else is stored: order of sequences, learning rate and random numbers follow from
     settings and step.
@@ -43,12 +42,12 @@ class Checkpoints:
         Raises:
             DataError: the state cannot be written.
         """
-        place = prepare_folder(self.folder) / f"step-{step:06d}"
+        path = prepare_folder(self.folder) / f"step-{step:06d}"
         with (
             wrap_errors(
-                f"{place}: cannot be written", "free some space; the last checkpoint is still there"
+                f"{path}: cannot be written", "free some space; the last checkpoint is still there"
             ),
-            write_atomically(place) as folder,
+            write_atomically(path) as folder,
         ):
             folder.mkdir()
             save_model(model, str(folder / _WEIGHTS))
@@ -56,7 +55,7 @@ class Checkpoints:
             state = {"step": step, "about": self.about}
             (folder / _STATE).write_text(json.dumps(state, indent=2) + "\n", encoding="utf-8")
         for older in self._places():
-            if older != place:
+            if older != path:
                 shutil.rmtree(older)
 
     def restore(self, model: torch.nn.Module, optimizer: torch.optim.Optimizer) -> int:
@@ -66,10 +65,10 @@ class Checkpoints:
             DataError: the state is damaged.
             UsageError: the state is of another run.
         """
-        places = self._places()
-        if not places:
+        states = self._places()
+        if not states:
             return 0
-        last = places[-1]
+        last = states[-1]
         with wrap_errors(f"{last}: cannot be read", _HINT, catch=Exception):
             state = json.loads((last / _STATE).read_text(encoding="utf-8"))
             step = int(state["step"])
@@ -95,6 +94,6 @@ class Checkpoints:
                 )
 
 
-def _number(place: Path) -> int:
-    with wrap_errors(f"{place}: not a checkpoint", "remove it", catch=ValueError):
-        return int(place.name.removeprefix("step-"))
+def _number(path: Path) -> int:
+    with wrap_errors(f"{path}: not a checkpoint", "remove it", catch=ValueError):
+        return int(path.name.removeprefix("step-"))

@@ -1,5 +1,4 @@
-"""Context parallelism: sequences that are too long for one process, split over the ranks of a
-process group.
+"""Context parallelism: sequences too long for one process, split over ranks of a process group.
 
 Positions are computed for the whole sequence and features are put into their slots before it is
 split. So every family that can be trained can be split, including Qwen2.5-VL with its three-axis
@@ -109,11 +108,10 @@ class ContextParallel:
         return self._model.embed(ids, own_slots, [features[rows.to(features.device)]])
 
     def _features(self, frames: Sequence[Frame]) -> list[Tensor]:
-        """Return the features of each frame, (slots, hidden); every rank runs the vision tower on
-        some frames."""
+        """Return each frame's features, (slots, hidden); every rank computes those of some."""
         distinct = list(dict.fromkeys(frames))
         shares = [distinct[rank :: self._n_ranks] for rank in range(self._n_ranks)]
-        sizes = [[self._model.n_slots(frame) for frame in share] for share in shares]
+        sizes = [list(map(self._model.n_slots, share)) for share in shares]
         own = self._own_features(shares[self._rank], max(map(sum, sizes)))
         by_frame: dict[Frame, Tensor] = {}
         for share, lengths, features in zip(
@@ -171,18 +169,12 @@ class ContextParallel:
             )
         keys, values = _GatherTokens.apply(torch.stack([key, value]), self._group)
         n_tokens = query.shape[-2] // 2
-        outputs = [
-            causal_attention(
-                own,
-                keys[..., : end * n_tokens, :],
-                values[..., : end * n_tokens, :],
-                dropout,
-                scaling,
+        outputs = []
+        for own, number in zip(query.chunk(2, dim=-2), self._split.chunks, strict=True):
+            end = (number + 1) * n_tokens
+            outputs.append(
+                causal_attention(own, keys[..., :end, :], values[..., :end, :], dropout, scaling)
             )
-            for own, end in zip(
-                query.chunk(2, dim=-2), (number + 1 for number in self._split.chunks), strict=True
-            )
-        ]
         return torch.cat(outputs, dim=-2).transpose(1, 2), None
 
 
@@ -209,8 +201,7 @@ def context_parallel(model: SequenceModel, group: dist.ProcessGroup) -> Iterator
 def causal_attention(
     query: Tensor, key: Tensor, value: Tensor, dropout: float, scaling: float | None
 ) -> Tensor:
-    """Return causal attention of the last tokens of a sequence to the whole sequence, in the shape
-    of the queries.
+    """Return causal attention of a sequence's last tokens to all, in the shape of the queries.
 
     Args:
         query: queries of the last tokens, (batch, heads, last tokens, head size).
@@ -254,7 +245,8 @@ def _masked_attention(
         n_columns - n_rows
     )
     n_groups = query.shape[1] // key.shape[1]
-    key, value = (states.repeat_interleave(n_groups, dim=1) for states in (key, value))
+    key = key.repeat_interleave(n_groups, dim=1)
+    value = value.repeat_interleave(n_groups, dim=1)
     return scaled_dot_product_attention(query, key, value, mask, dropout, scale=scaling)
 
 

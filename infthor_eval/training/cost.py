@@ -43,8 +43,7 @@ class TrainingCost:
         return self.weights + self.gradients + self.optimizer + self.activations
 
     def hours(self, tflops: float) -> float:
-        """Return the hours that the run takes at this speed of all processes together, in TFLOP per
-        second."""
+        """Return the hours of the run at this speed of all processes together, in TFLOP/s."""
         return self.flop / (tflops * 1e12) / 3600
 
 
@@ -74,22 +73,22 @@ def estimate_cost(
 def _flop(
     recipe: Recipe, network: SequenceModel, data: TrainingData, parts: dict[str, Any]
 ) -> float:
-    """Return the operations of one epoch: forward, backward through layers and to weights, and
-    recomputation."""
+    """Return the operations of an epoch: forward, backward to layers and weights, recomputation."""
     config = network.decoder.config
     n_weights = sum(parameter.numel() for parameter in parts["decoder"])
     width = config.num_attention_heads * getattr(
         config, "head_dim", config.hidden_size // config.num_attention_heads
     )
+    lengths = [sequence.n_tokens for sequence in data.sequences]
     forward = sum(
-        2 * n_weights * item.n_tokens + 2 * config.num_hidden_layers * width * item.n_tokens**2
-        for item in data.sequences
+        2 * n_weights * n_tokens + 2 * config.num_hidden_layers * width * n_tokens**2
+        for n_tokens in lengths
     )
     trains_decoder = recipe.lora is None and any(
         parameter.requires_grad for parameter in parts["decoder"]
     )
     times = 2 + int(trains_decoder) + int(recipe.gradient_checkpointing)
-    n_frames = sum(len(item.frames) for item in data.sequences)
+    n_frames = sum(len(sequence.frames) for sequence in data.sequences)
     return times * forward + n_frames * _flop_of_frame(network) * (
         3 if network.trains_vision else 1
     )
@@ -105,8 +104,7 @@ def _flop_of_frame(network: SequenceModel) -> float:
 
 
 def _activations(recipe: Recipe, network: SequenceModel, n_tokens: float) -> float:
-    """Return the activations of one sequence: each layer's input and one layer's activations, or
-    all layers'."""
+    """Return a sequence's activations: each layer's input and one layer's own, or all layers'."""
     config = network.decoder.config
     size = network.model.dtype.itemsize
     heads = config.num_key_value_heads / config.num_attention_heads

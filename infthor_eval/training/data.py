@@ -14,7 +14,7 @@ from infthor_eval.formats.trajectory import Trajectory, iter_trajectories
 from infthor_eval.nieh.samples import find_samples
 from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.training.action_sequences import recorded_segments, windows
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from infthor_eval.training.goal_sequences import goal_windows
 from infthor_eval.training.memory_sequences import memory_sequences
 from infthor_eval.training.question_sequences import question_sequences
@@ -39,7 +39,7 @@ class TrainingData:
     """
 
     sequences: Sequence[TrainingSequence]
-    skipped: Sequence[SkippedItem]
+    skipped: Sequence[SkippedSequence]
 
     @property
     def n_tokens(self) -> int:
@@ -53,12 +53,11 @@ class TrainingData:
 
     def skip_reasons(self) -> Counter[str]:
         """Return the number of skipped items by reason."""
-        return Counter(item.reason for item in self.skipped)
+        return Counter(sequence.reason for sequence in self.skipped)
 
 
 def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]) -> TrainingData:
-    """Build the sequences of a recipe from replayed sets; trajectories and questions that cannot be
-    used are skipped.
+    """Build a recipe's sequences from replayed sets; what cannot be used is skipped.
 
     Args:
         recipe: recipe with the kinds of sequences.
@@ -71,9 +70,9 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
         DataError: a folder is not a set, or no sequence is left.
         ModelError: the model's template refuses the sequences.
     """
-    items = [item for folder in folders for item in _read_set(recipe, encoder, folder)]
-    sequences = [item for item in items if isinstance(item, TrainingSequence)]
-    skipped = [item for item in items if isinstance(item, SkippedItem)]
+    encoded = [sequence for folder in folders for sequence in _read_set(recipe, encoder, folder)]
+    sequences = [sequence for sequence in encoded if isinstance(sequence, TrainingSequence)]
+    skipped = [sequence for sequence in encoded if isinstance(sequence, SkippedSequence)]
     if not sequences:
         why = skipped[0].reason if skipped else "there are no trajectories and no questions"
         raise DataError(
@@ -84,7 +83,7 @@ def read_training_data(recipe: Recipe, encoder: Encoder, folders: Sequence[Path]
 
 def _read_set(
     recipe: Recipe, encoder: Encoder, folder: Path
-) -> Iterator[TrainingSequence | SkippedItem]:
+) -> Iterator[TrainingSequence | SkippedSequence]:
     if recipe.actions is not None:
         yield from _sample_share(
             _action_items(recipe, recipe.actions, encoder, NiehSet(folder, needs_questions=False)),
@@ -95,13 +94,13 @@ def _read_set(
         settings = {"seed": recipe.seed} | recipe.questions.settings | {"data": str(folder)}
         for context in recipe.questions.contexts:
             samples = find_samples({**settings, "context": context})
-            items = question_sequences(encoder, samples, recipe.max_tokens)
-            yield from _sample_share(items, recipe.questions.share, recipe.seed)
+            encoded = question_sequences(encoder, samples, recipe.max_tokens)
+            yield from _sample_share(encoded, recipe.questions.share, recipe.seed)
 
 
 def _action_items(
     recipe: Recipe, actions: ActionData, encoder: Encoder, data: NiehSet
-) -> Iterator[TrainingSequence | SkippedItem]:
+) -> Iterator[TrainingSequence | SkippedSequence]:
     if actions.form == "plans":
         yield from action_sequences(data, encoder, recipe.max_tokens, recipe.words)
         return
@@ -115,14 +114,13 @@ def _action_items(
                     encoder, data, trajectory, segments, actions.form, recipe.max_tokens
                 )
         except DataError as error:
-            yield SkippedItem(name, str(error))
+            yield SkippedSequence(name, str(error))
 
 
 def action_sequences(
     data: NiehSet, encoder: Encoder, limit: int, words: Words
-) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield the windows of every trajectory of a set, and the items that could not become a
-    sequence.
+) -> Iterator[TrainingSequence | SkippedSequence]:
+    """Yield the windows of each trajectory of a set, and the items that became no sequence.
 
     The set has to contain the trajectories; `limit` is the most tokens of a sequence, frames
     expanded.
@@ -131,7 +129,7 @@ def action_sequences(
         try:
             yield from windows(encoder, name, read_history(data, name, words)[1], limit)
         except DataError as error:
-            yield SkippedItem(name, str(error))
+            yield SkippedSequence(name, str(error))
 
 
 def trajectory_names(data: NiehSet) -> list[str]:
@@ -154,10 +152,10 @@ def read_history(data: NiehSet, name: str, words: Words) -> tuple[Trajectory, li
 
 
 def _sample_share(
-    items: Iterable[TrainingSequence | SkippedItem], share: float, seed: int
-) -> Iterator[TrainingSequence | SkippedItem]:
+    encoded: Iterable[TrainingSequence | SkippedSequence], share: float, seed: int
+) -> Iterator[TrainingSequence | SkippedSequence]:
     """Yield a random share of the sequences, and all skipped items."""
     rng = random.Random(seed)
-    for item in items:
-        if isinstance(item, SkippedItem) or share >= 1 or rng.random() < share:
-            yield item
+    for sequence in encoded:
+        if isinstance(sequence, SkippedSequence) or share >= 1 or rng.random() < share:
+            yield sequence

@@ -16,7 +16,7 @@ from model_adapters import Part, Turn
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Frame, Piece, Prompter, n_tokens
 
-__all__ = ["Encoder", "SkippedItem", "TrainingSequence", "within"]
+__all__ = ["Encoder", "SkippedSequence", "TrainingSequence", "within"]
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class TrainingSequence:
 
 
 @dataclass(frozen=True)
-class SkippedItem:
+class SkippedSequence:
     """A part of the data that could not become a sequence.
 
     Attributes:
@@ -62,11 +62,10 @@ class SkippedItem:
     reason: str
 
 
-def within(sequence: TrainingSequence, limit: int) -> TrainingSequence | SkippedItem:
-    """Return the sequence, or a skipped item if it has more tokens than the limit, frames
-    expanded."""
+def within(sequence: TrainingSequence, limit: int) -> TrainingSequence | SkippedSequence:
+    """Return the sequence, or a skipped item if it has more tokens than the limit, all expanded."""
     return (
-        SkippedItem(sequence.name, f"longer than {limit} tokens")
+        SkippedSequence(sequence.name, f"longer than {limit} tokens")
         if sequence.n_tokens > limit
         else sequence
     )
@@ -148,8 +147,7 @@ class Encoder:
     def answer(
         self, name: str, parts: Sequence[Part], answer: str, system: str | None = None
     ) -> TrainingSequence:
-        """Encode a question and its answer, with loss on the answer and the token that ends the
-        turn.
+        """Encode question and answer, with loss on the answer and the token that ends the turn.
 
         Raises:
             DataError: a frame cannot be read.

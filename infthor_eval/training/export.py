@@ -8,9 +8,9 @@ from torch.distributed.tensor import DTensor
 
 from infthor_eval.errors import wrap_errors
 from infthor_eval.formats.object_ids import Words
+from model_adapters.hf.global_settings import hide_transformers_output
 from model_adapters.hf.loading.card import WORDS
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
-from model_adapters.hf.loading.quiet import hide_transformers_output
 from model_adapters.hf.loading.tower_names import with_published_names
 
 __all__ = ["export", "gather_weights"]
@@ -36,8 +36,8 @@ def gather_weights(model: torch.nn.Module) -> dict[str, torch.Tensor] | None:
     if not any(isinstance(tensor, DTensor) for tensor in weights.values()):
         return None
     return {
-        name: item.full_tensor().cpu() if isinstance(item, DTensor) else item
-        for name, item in weights.items()
+        name: tensor.full_tensor().cpu() if isinstance(tensor, DTensor) else tensor
+        for name, tensor in weights.items()
     }
 
 
@@ -49,8 +49,7 @@ def export(
     words: Words,
     weights: Mapping[str, torch.Tensor] | None = None,
 ) -> None:
-    """Write weights by their published names (safetensors), configs, tokenizer with template, image
-    processor, card.
+    """Write weights by published names (safetensors), configs, tokenizer, image processor, card.
 
     The template is that of training, so that evaluation renders the same prompts. The card has the
     title of the recipe and the words of plans and actions. The folder is created. `weights` are the

@@ -54,7 +54,8 @@ class TrainingRun:
     def document(self) -> dict[str, Any]:
         """Return everything that identifies the run, as JSON values."""
         names = "\n".join(
-            f"{item.name} {item.n_tokens} {item.n_loss_tokens}" for item in self.data.sequences
+            f"{sequence.name} {sequence.n_tokens} {sequence.n_loss_tokens}"
+            for sequence in self.data.sequences
         )
         return {
             "recipe": msgspec.to_builtins(self.recipe),
@@ -132,7 +133,7 @@ def _train(run: TrainingRun, network: SequenceModel, states: Path, on_step: Step
     if recipe.parallel.context == 1:
         to_batch = partial(collate, family=run.loaded.family, pad_id=pad_id)
         train_with_trainer(
-            network, sequences, lambda items: dict(to_batch(items)), recipe, states, on_step
+            network, sequences, lambda batch: dict(to_batch(batch)), recipe, states, on_step
         )
         return
     if recipe.lora is not None:
@@ -171,8 +172,7 @@ def _processes() -> Iterator[None]:
 
 
 def _claim_folder(out: Path, document: dict[str, Any]) -> None:
-    """Write the description of the run into its folder, or check that the folder belongs to this
-    run."""
+    """Write the run's description into its folder, or check that the folder belongs to it."""
     path = out / _DESCRIPTION
     if not path.exists():
         with write_atomically(path) as partial_file:

@@ -1,5 +1,4 @@
-"""Sequences of goals, actions and frames in one turn: what the Qwen2.5-VL behind the final tasks
-was trained on.
+"""Sequences of goals, actions and frames in one turn, as for the Qwen2.5-VL of the final tasks.
 
 They are those of `infini_thor_dataset.py` (branch `dev`), in text, frames and ends: no text of a
 plan, a system prompt, one turn of the user. Later windows begin with the goal and the last frame of
@@ -14,7 +13,7 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.household.sequence_text import ACT, action_part, task_goal_part
 from infthor_eval.plans.history.segments import Part, PlanSegment
 from infthor_eval.plans.published.system_prompts import system_prompt
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 
 __all__ = ["goal_windows", "goals_of_actions"]
 
@@ -36,9 +35,8 @@ class _Window:
 
 def goal_windows(
     encoder: Encoder, name: str, segments: Sequence[PlanSegment], limit: int
-) -> Iterator[TrainingSequence | SkippedItem]:
-    """Cut a history into sequences of goals, actions and frames; plans outside every task are left
-    out, as published.
+) -> Iterator[TrainingSequence | SkippedSequence]:
+    """Cut a history into sequences of goals, actions and frames, as published: without loose plans.
 
     Args:
         encoder: builds the sequences.

@@ -1,5 +1,4 @@
-"""Training on one process or many, with sequences distributed over data groups and split within
-them.
+"""Training on one process or many, with sequences over data groups and split within them.
 
 The loss of a step is the mean over all tokens with loss of all its sequences, so the number of
 processes changes nothing but rounding.
@@ -22,9 +21,8 @@ from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.checkpoints import Checkpoints
 from infthor_eval.training.context_parallel import context_parallel
 from infthor_eval.training.encoding import TrainingSequence
-from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.network import SequenceModel
-from infthor_eval.training.ranks import Ranks
+from infthor_eval.training.ranks import Ranks, sum_gradients
 from infthor_eval.training.schedule import LoopSettings
 
 __all__ = ["Loop", "LoopSettings", "Progress"]
@@ -196,8 +194,7 @@ class Loop:
             dist.barrier()
 
     def _run_settings(self) -> dict[str, object]:
-        """Return the settings that identify a run; saving and the number of processes do not
-        count."""
+        """Return the settings that identify a run, without saving and number of processes."""
         settings = asdict(self._settings)
         del settings["save_every"]
         names = digest(

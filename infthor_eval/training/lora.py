@@ -10,8 +10,7 @@ __all__ = ["add_adapters"]
 
 
 def add_adapters(network: SequenceModel, settings: Lora) -> Any:
-    """Add adapters to the decoder's linear layers, freeze everything else, and return peft's model
-    of them.
+    """Add adapters to the decoder's linear layers, freeze the rest, and return peft's model.
 
     Raises:
         UsageError: peft is not installed, or the decoder has none of the target layers.

@@ -1,5 +1,4 @@
-"""Sequences of one action behind a memory: what the published memories for final tasks were trained
-on.
+"""Sequences of one action behind a memory, as the published memories for final tasks learned.
 
 They are those of `infini_dataset_history.py` and `infini_dataset_clip.py` (branch `dev`): the goal,
 the state in words or the retrieved frames that the trajectory's file has for the action, the
@@ -21,11 +20,11 @@ from infthor_eval.household.sequence_text import action_text
 from infthor_eval.plans.history.segments import Part, PlanSegment
 from infthor_eval.plans.plan import tasks_of
 from infthor_eval.plans.published.system_prompts import system_prompt
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence, within
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence, within
 
-__all__ = ["MemoryForm", "memory_sequences"]
+__all__ = ["MemoryKind", "memory_sequences"]
 
-MemoryForm = Literal["text", "frames"]
+MemoryKind = Literal["text", "frames"]
 _NAMES = "top20"  # the list of the published trainer
 
 
@@ -43,40 +42,39 @@ def memory_sequences(
     data: NiehSet,
     trajectory: Trajectory,
     segments: Sequence[PlanSegment],
-    form: MemoryForm,
+    kind: MemoryKind,
     limit: int,
-) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield a sequence for each action that the trajectory's file has a memory for, in the file's
-    order.
+) -> Iterator[TrainingSequence | SkippedSequence]:
+    """Yield a sequence for each action that the file has a memory for, in the file's order.
 
     Args:
         encoder: builds the sequences.
         data: set of the trajectory, with its frames.
         trajectory: the trajectory, with its memory.
         segments: its history.
-        form: which memory.
+        kind: which memory.
         limit: most tokens of a sequence, frames expanded; longer ones are skipped.
 
     Raises:
         DataError: it has no memory, or one of another form; a frame cannot be read.
         ModelError: the template refuses the turns.
     """
-    memory = _State(data, trajectory) if form == "text" else _Retrieved(data, trajectory)
+    memory = _State(data, trajectory) if kind == "text" else _Retrieved(data, trajectory)
     frames = [segments[0].before, *(frame for segment in segments for _, frame in segment.steps)]
     goals = _goals(trajectory)
     for action in memory.actions:
         name = f"{trajectory.traj_id}, action {action}"
         if action not in goals:
-            yield SkippedItem(name, "belongs to no task")
+            yield SkippedSequence(name, "belongs to no task")
             continue
         try:
             before = _before(action, memory)
         except DataError as error:
-            yield SkippedItem(name, str(error))
+            yield SkippedSequence(name, str(error))
             continue
         parts = [f"Your task is: {goals[action]}.\n", *before, frames[action], " Next action: "]
         reply = action_text(trajectory.plan.low_actions[action].api_action, Words.PUBLISHED)
-        yield within(encoder.answer(name, parts, reply, system_prompt(form)), limit)
+        yield within(encoder.answer(name, parts, reply, system_prompt(kind)), limit)
 
 
 class _State:
@@ -100,18 +98,17 @@ class _State:
 
 
 class _Retrieved:
-    """The frames that were retrieved; where the list is empty, those of all actions before, first
-    and last of each."""
+    """The retrieved frames; if none, each earlier action's first and last frame."""
 
     def __init__(self, data: NiehSet, trajectory: Trajectory) -> None:
-        place = f"trajectory {trajectory.traj_id}"
+        location = f"trajectory {trajectory.traj_id}"
         hint = "restore the file"
         if not trajectory.retrieved_image:
             raise DataError(
                 "the trajectory has no retrieved_image, which actions of the form frames need"
             )
         with wrap_errors(
-            f"{place}: retrieved_image is no list {_NAMES} for each action",
+            f"{location}: retrieved_image is no list {_NAMES} for each action",
             hint,
             catch=msgspec.ValidationError,
         ):
@@ -119,7 +116,7 @@ class _Retrieved:
                 trajectory.retrieved_image, dict[int, _Entry], strict=False
             )
         with wrap_errors(
-            f"{place}: images is no list of low_idx and image_name",
+            f"{location}: images is no list of low_idx and image_name",
             hint,
             catch=msgspec.ValidationError,
         ):
@@ -153,12 +150,12 @@ def _before(action: int, memory: _State | _Retrieved) -> Sequence[Part]:
 
 def _by_action(images: Sequence[_Image]) -> Mapping[int, Sequence[str]]:
     """Return the first and the last frame of each action, or the one that it has."""
-    found: dict[int, list[str]] = {}
+    names_by_action: dict[int, list[str]] = {}
     for image in images:
-        found.setdefault(image.low_idx, []).append(image.image_name)
+        names_by_action.setdefault(image.low_idx, []).append(image.image_name)
     return {
         action: names if len(names) == 1 else [names[0], names[-1]]
-        for action, names in found.items()
+        for action, names in names_by_action.items()
     }
 
 

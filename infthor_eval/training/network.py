@@ -17,9 +17,8 @@ from model_adapters.hf.prompting.prompt import Frame
 __all__ = ["PARTS", "SequenceModel", "decay_groups", "freeze", "next_labels", "parameters_by_part"]
 
 PARTS = ("vision", "embeddings", "decoder", "head")
-_FRAME_BATCH = (
-    32  # frames in the vision tower at once; 1,000 frames would need more memory than the decoder
-)
+# Frames in the vision tower at once; 1,000 frames would need more memory than the decoder.
+_FRAME_BATCH = 32
 _LOGIT_ROWS = 1024  # rows of logits at once; each has as many values as the vocabulary
 
 
@@ -144,8 +143,7 @@ class SequenceModel(torch.nn.Module):
         return output.last_hidden_state
 
     def loss_sum(self, hidden: Tensor, targets: Tensor) -> Tensor:
-        """Return the sum of the cross entropies of all tokens with a target, in nats; a float32
-        scalar.
+        """Return the sum of the cross entropies of all tokens with a target: nats, float32 scalar.
 
         Logits are computed only for targets and in chunks, which are recomputed for the gradient:
         all logits of a long sequence would need more memory than the model.
@@ -173,8 +171,7 @@ class SequenceModel(torch.nn.Module):
     def gradient_checkpointing_enable(
         self, gradient_checkpointing_kwargs: Mapping[str, Any] | None = None, **settings: Any
     ) -> None:
-        """Keep only the inputs of each layer and recompute the rest for the gradient, in training
-        mode.
+        """Keep each layer's inputs alone and recompute the rest for the gradient, in training mode.
 
         Args:
             gradient_checkpointing_kwargs: arguments of `torch.utils.checkpoint.checkpoint`;

@@ -1,5 +1,4 @@
-"""Import of the published trainer's checkpoints: torch's distributed checkpoints of a model from
-the hub.
+"""Import of the published trainer's checkpoints: torch's distributed ones, of models of the hub.
 
 Of the published code, branch `dev` alone exports them, and Qwen2.5-VL alone. Here their weights are
 put into the model that training started from, which is then written like any other checkpoint.
@@ -58,9 +57,9 @@ def import_weights(loaded: LoadedCheckpoint, folder: Path) -> ImportedWeights:
         reader = dcp.FileSystemReader(folder)
         stored: Mapping[str, Any] = reader.read_metadata().state_dict_metadata
         sizes = {
-            name: item.size
-            for name, item in stored.items()
-            if isinstance(item, TensorStorageMetadata)
+            name: entry.size
+            for name, entry in stored.items()
+            if isinstance(entry, TensorStorageMetadata)
         }
     weights = loaded.model.state_dict()
     stored_names = _stored_names(sizes, loaded.model, folder)
@@ -94,12 +93,12 @@ def _stored_names(sizes: Mapping[str, Any], model: Any, folder: Path) -> Mapping
     }
     tables = [
         {name: name for name in weights},
-        {of_hub[id(item)]: name for name, item in weights.items() if id(item) in of_hub},
+        {of_hub[id(weight)]: name for name, weight in weights.items() if id(weight) in of_hub},
     ]
-    found = max((_with_prefix(sizes, table) for table in tables), key=len)
-    if not found:
+    prefixed = max((_with_prefix(sizes, table) for table in tables), key=len)
+    if not prefixed:
         raise DataError(f"{folder}: has no weight of this model; {_HINT}")
-    return found
+    return prefixed
 
 
 def _with_prefix(sizes: Mapping[str, Any], names: Mapping[str, str]) -> Mapping[str, str]:

@@ -1,5 +1,4 @@
-"""Training sequences for answering: NIEH questions as in evaluation, with their reference
-answers."""
+"""Training sequences for answering: NIEH questions as evaluated, with reference answers."""
 
 from collections.abc import Iterator
 
@@ -8,16 +7,15 @@ from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import TaskSamples
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence, within
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence, within
 
 __all__ = ["question_sequences"]
 
 
 def question_sequences(
     encoder: Encoder, task: TaskSamples, limit: int
-) -> Iterator[TrainingSequence | SkippedItem]:
-    """Yield a sequence for each sample of a task in one context, or a skipped item if it cannot be
-    used.
+) -> Iterator[TrainingSequence | SkippedSequence]:
+    """Yield a sequence for each sample of a task in a context, or a skipped item if unusable.
 
     Args:
         encoder: builds the sequences.
@@ -29,13 +27,13 @@ def question_sequences(
         ModelError: the template refuses the turns.
     """
     for skipped in task.skipped:
-        yield SkippedItem(_name(skipped.question.id, skipped.variant), skipped.reason)
+        yield SkippedSequence(_name(skipped.question.id, skipped.variant), skipped.reason)
     for sample in task.samples:
         name = _name(sample.question.id, sample.variant)
         try:
             sequence = _sequence(encoder, task, sample, name)
         except DataError as error:
-            yield SkippedItem(name, str(error))
+            yield SkippedSequence(name, str(error))
             continue
         yield within(sequence, limit)
 
@@ -44,9 +42,8 @@ def _sequence(encoder: Encoder, task: TaskSamples, sample: Sample, name: str) ->
     context, text = task.request(sample)
     if sample.awaits_recall:
         raise UsageError("training has no memory; use another context")
-    return encoder.answer(
-        name, [*as_images(context), text], doc_target(sample.question)
-    )  # it has no video input
+    # It has no video input.
+    return encoder.answer(name, [*as_images(context), text], doc_target(sample.question))
 
 
 def _name(question: str, variant: str) -> str:

@@ -1,12 +1,15 @@
-"""Division of a training run among processes."""
+"""Division of a training run among processes, and the sum of their gradients."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+import torch
 import torch.distributed as dist
+from torch.nn import Parameter
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["Ranks", "assign_ranks"]
+__all__ = ["Ranks", "assign_ranks", "sum_gradients"]
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,7 @@ class Ranks:
 
 
 def assign_ranks(n_context: int = 1) -> Ranks:
-    """Return this process's position; neighbouring ranks, which have the fastest links, share
-    sequences.
+    """Return this process's position; neighbouring ranks, with the fastest links, share sequences.
 
     All processes of the default process group have to call this. Without a group, the process is
     alone.
@@ -62,3 +64,26 @@ def assign_ranks(n_context: int = 1) -> Ranks:
     groups = [dist.new_group(list(range(first, first + n_context))) for first in firsts]
     group = groups[data_rank] if groups else None
     return Ranks(rank, data_rank, world // n_context, context_rank, n_context, group)
+
+
+def sum_gradients(parameters: Iterable[Parameter], group: dist.ProcessGroup | None = None) -> None:
+    """Replace every rank's gradients by the sum over all ranks.
+
+    A parameter without a gradient on any rank stays without one, as in a single process: the
+    optimizer then skips it, including its weight decay.
+
+    Args:
+        parameters: the parameters, in the same order on every rank.
+        group: the ranks; all of them where None.
+    """
+    trained = [parameter for parameter in parameters if parameter.requires_grad]
+    if not trained:
+        return
+    has_gradient = [parameter.grad is not None for parameter in trained]
+    anywhere = torch.tensor(has_gradient, dtype=torch.int32, device=trained[0].device)
+    dist.all_reduce(anywhere, dist.ReduceOp.MAX, group=group)
+    for parameter, is_present in zip(trained, anywhere.tolist(), strict=True):
+        if is_present:
+            if parameter.grad is None:
+                parameter.grad = torch.zeros_like(parameter)
+            dist.all_reduce(parameter.grad, group=group)

@@ -1,5 +1,4 @@
-"""Recipes: data and settings of training, as YAML files; `infthor_eval/training/recipes/` has the
-paper's."""
+"""Recipes: data and settings of training, in YAML; the paper's are in `recipes/` beside this."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +9,7 @@ import msgspec
 from infthor_eval.errors import DataError, UsageError, unknown_name, wrap_errors
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.yaml_files import read_yaml
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.training.nano.settings import NanoRecipe
 
 __all__ = [

@@ -12,8 +12,7 @@ __all__ = ["LoopSettings", "linear_share"]
 
 
 def linear_share(step: int, n_steps: int, warmup_ratio: float) -> float:
-    """Return the share of the highest learning rate in a step, by the published trainer's linear
-    schedule.
+    """Return a step's share of the highest learning rate, by the published linear schedule.
 
     Steps count from 0. The first step of a warm-up has a part of the rate already, unlike in
     transformers' schedule.

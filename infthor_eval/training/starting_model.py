@@ -59,9 +59,8 @@ def _add_marks(loaded: LoadedCheckpoint) -> None:
         model.resize_token_embeddings(len(loaded.tokenizer), mean_resizing=False)
     ids = loaded.tokenizer.convert_tokens_to_ids(new)
     layers = (model.get_input_embeddings(), model.get_output_embeddings())
-    tables = {
-        id(layer.weight): layer.weight for layer in layers if layer is not None
-    }  # one if the head is tied
+    # One if the head is tied.
+    tables = {id(layer.weight): layer.weight for layer in layers if layer is not None}
     with torch.no_grad():
         for weight in tables.values():
             weight[ids] = weight[: min(ids)].float().mean(dim=0).to(weight)

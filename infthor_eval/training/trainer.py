@@ -28,8 +28,7 @@ _WEIGHTS = "model.safetensors"
 
 
 class _SequenceTrainer(transformers.Trainer):
-    """Saves the weights of the transformers model only, with tied weights stored once, as
-    transformers does.
+    """Saves the transformers model's weights only, with tied ones once, as transformers does.
 
     Weight decay and schedule are those of the published trainer: all weights decay, and
     `linear_share`.
@@ -82,9 +81,11 @@ class _ReportSteps(transformers.TrainerCallback):
         if not (state.is_world_process_zero and logs and "loss" in logs):
             return
         now = time.perf_counter()
-        loss, rate, norm = (float(logs[name]) for name in ("loss", "learning_rate", "grad_norm"))
         speed = self._tokens_per_step / (now - self._start)
         self._start = now
+        loss = float(logs["loss"])
+        rate = float(logs["learning_rate"])
+        norm = float(logs["grad_norm"])
         self._report(Progress(state.global_step, state.max_steps, loss, rate, norm, speed))
 
 
@@ -127,20 +128,19 @@ def train_with_trainer(
 
 
 def _last_complete_checkpoint(out: Path) -> str | None:
-    """Return the last checkpoint that was written completely; a run may be killed while writing
-    one.
+    """Return the last checkpoint written completely; a run may be killed while writing one.
 
     The Trainer itself would use the last folder, whatever it contains, and continue without the
     optimizer if that is missing. The state file is the last to be written.
     """
-    for place in sorted(
+    for folder in sorted(
         out.glob("checkpoint-*"), key=lambda path: int(path.name.rpartition("-")[2]), reverse=True
     ):
         try:
-            json.loads((place / "trainer_state.json").read_text(encoding="utf-8"))
+            json.loads((folder / "trainer_state.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue
-        return str(place)
+        return str(folder)
     return None
 
 

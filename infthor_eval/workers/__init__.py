@@ -1,5 +1,4 @@
-"""Workers that share jobs: processes of this machine, or actors of a Ray cluster. Nothing here
-knows evaluations."""
+"""Workers that share jobs: this machine's processes, or a Ray cluster's actors."""
 
 from infthor_eval.workers.host import WorkerHost
 from infthor_eval.workers.jobs import run_jobs

@@ -17,8 +17,7 @@ def run_jobs(
     worker_settings: WorkerSettings,
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, Any | InfthorError]]:
-    """Yield the number of each job with its result, or with an error if worker after worker was
-    lost at it.
+    """Yield each job's number with its result, or an error if worker after worker was lost at it.
 
     Args:
         open_worker: creates a worker, which gives one result for each job.

@@ -22,8 +22,7 @@ class Worker(Protocol):
         """What the driver learns before the first job; it can be pickled."""
 
     def do(self, job: Any) -> Iterator[Any]:
-        """Do a job and yield its results, which can be pickled. The caller may stop after any of
-        them."""
+        """Do a job and yield its results, for pickling. The caller may stop after any of them."""
 
     def close(self) -> None:
         """Release all resources."""
@@ -37,8 +36,7 @@ class OpenWorker(Protocol):
 
 
 class Link(Protocol):
-    """The driver's link to one worker. One thread opens it and gives it jobs; another may stop
-    it."""
+    """The driver's link to one worker. One thread opens it and gives jobs; another may stop it."""
 
     def open(self) -> Any:
         """Start the worker, or start it again after it was lost, and return its greeting.

@@ -1,5 +1,4 @@
-"""Jobs done by several workers: a job goes to whoever is free, and again to another if its worker
-is lost."""
+"""Jobs done by several workers: each goes to who is free, and again if its worker is lost."""
 
 import contextlib
 from collections import Counter, deque
@@ -120,9 +119,8 @@ class Pool:
         self._accept = accept
         self._jobs = _JobQueue()
         self._events: SimpleQueue[Event | _JobEnded | Exception] = SimpleQueue()
-        self._ready: SimpleQueue[Any] = (
-            SimpleQueue()
-        )  # greetings; an exception once no worker can be opened
+        # Greetings; an exception once no worker can be opened.
+        self._ready: SimpleQueue[Any] = SimpleQueue()
         self._max_losses = _MAX_LOSSES
         self._losses: Counter[int] = Counter()  # by job, since its last new result
         self._n_results: Counter[int] = Counter()  # by job, most of all its workers
@@ -224,8 +222,7 @@ class Pool:
             self._events.put(error)
 
     def _open_worker(self, number: int, link: Link) -> bool:
-        """Open a worker, several times if it is lost meanwhile; return whether it is ready for
-        jobs."""
+        """Open a worker, several times if lost meanwhile; return whether it is ready for jobs."""
         reason: InfthorError = WorkerLostError("the pool is closed")
         for _ in range(_MAX_LOSSES):
             if self._jobs.closed:
@@ -234,9 +231,8 @@ class Pool:
                 greeting = link.open()
             except WorkerLostError as error:
                 reason = error
-            except (
-                InfthorError
-            ) as error:  # it says why it cannot be created: another try would end the same way
+            except InfthorError as error:
+                # It says why it cannot be created: another try would end the same way.
                 reason = error
                 break
             else:
@@ -252,15 +248,13 @@ class Pool:
         return False
 
     def _do_jobs(self, number: int, link: Link) -> bool:
-        """Have a worker do jobs; return True when there are no more, False when the worker was
-        lost."""
+        """Have a worker do jobs; return True when none is left, False when it was lost."""
         while (taken := self._jobs.take()) is not None:
             job, create = taken
             try:
                 for count, result in enumerate(link.do(create()), 1):
-                    if (
-                        count > self._n_results[job]
-                    ):  # results that another worker gave before are no progress
+                    # Results that another worker gave before are no progress.
+                    if count > self._n_results[job]:
                         self._n_results[job] = count
                         self._losses.pop(job, None)
                     self._events.put(JobResult(number, job, result))

@@ -1,4 +1,4 @@
-"""Workers as processes of this machine."""
+"""Workers as processes of this machine, each with a share of its threads and GPUs."""
 
 import os
 import signal
@@ -6,10 +6,10 @@ import sys
 from collections.abc import Iterator
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
-from infthor_eval.workers.devices import limit_devices
 from infthor_eval.workers.host import WorkerHost, to_portable_error
 from infthor_eval.workers.link import Connect, OpenWorker, WorkerLostError
 
@@ -19,6 +19,9 @@ _STOP = "stop"
 _EXIT_WAIT_S = 10.0  # for a process to end
 # Spawned, not forked: a fork of a process with threads, a GPU or a simulator does not work.
 _SPAWN = get_context("spawn")
+_VISIBLE = "CUDA_VISIBLE_DEVICES"
+_THREADS = "OMP_NUM_THREADS"
+_DRIVER = Path("/proc/driver/nvidia/gpus")
 
 
 def processes(open_worker: OpenWorker, count: int) -> Connect:
@@ -34,9 +37,8 @@ class ProcessLink:
         self._number = number
         self._count = count
         self._changing = Lock()  # one thread opens the link, another closes it
-        self._process: Any = (
-            None  # of multiprocessing's spawn context, whose class has no public name
-        )
+        # Of multiprocessing's spawn context, whose class has no public name.
+        self._process: Any = None
         self._connection: Connection[Any, Any] | None = None
 
     def open(self) -> Any:
@@ -62,8 +64,7 @@ class ProcessLink:
             self._send(_STOP)
 
     def close(self) -> None:
-        """See `Link`. The connection stays open: a thread may be reading it, and must see its
-        end."""
+        """See `Link`. The connection stays open: a thread that reads it must see its end."""
         with self._changing:
             if self._process is None:
                 return
@@ -92,8 +93,7 @@ class ProcessLink:
             raise self._lost_error() from error
 
     def _receive(self) -> tuple[bool, Any]:
-        """Return True while the job goes on, and what the worker sent; raise what the worker
-        raised."""
+        """Return whether the job goes on, and what the worker sent; raise what it raised."""
         assert self._connection is not None
         try:
             message = self._connection.recv()
@@ -110,13 +110,11 @@ class ProcessLink:
 
 
 def _serve(connection: "Connection[Any, Any]", number: int, count: int) -> None:
-    """Run a worker's process: create the worker that it is sent, and do jobs until the driver is
-    gone."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # a terminal sends Ctrl-C to all processes; the driver decides
+    """Run a worker's process: create the worker it is sent; do jobs until the driver is gone."""
+    # A terminal sends Ctrl-C to all processes; the driver decides.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    limit_devices(number, count)  # before imports that read them only once
+    _limit_devices(number, count)  # before imports that read them only once
     Thread(target=_end_with_driver, daemon=True).start()
     try:
         host = WorkerHost(connection.recv(), number)
@@ -169,3 +167,22 @@ def _end_with_driver() -> None:
     if parent is not None:
         wait([parent.sentinel])
         os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _visible_gpus() -> list[str]:
+    """Return this process's GPUs, as CUDA names them, without torch, which would occupy them."""
+    visible = os.environ.get(_VISIBLE)
+    if visible is not None:
+        return [name.strip() for name in visible.split(",") if name.strip()]
+    return (
+        [str(number) for number in range(len(list(_DRIVER.iterdir())))] if _DRIVER.is_dir() else []
+    )
+
+
+def _limit_devices(number: int, count: int) -> None:
+    """Limit this process to the share of a worker (from 1) of `count`; a number of threads already
+    set is kept."""
+    os.environ.setdefault(_THREADS, str(max(1, (os.cpu_count() or 1) // count)))
+    all_gpus = _visible_gpus()
+    if all_gpus and count > 1:
+        os.environ[_VISIBLE] = ",".join(all_gpus[(number - 1) % len(all_gpus) :: count])

@@ -106,9 +106,8 @@ class RayLink:
         import ray
 
         if self._actor is not None:
-            with contextlib.suppress(
-                ray.exceptions.RayError
-            ):  # it is gone, or busy; it is killed in either case
+            # It is gone, or busy; it is killed in either case.
+            with contextlib.suppress(ray.exceptions.RayError):
                 ray.get(self._actor.close.remote(), timeout=_CLOSE_WAIT_S)
             ray.kill(self._actor)
 

@@ -7,12 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.clauses import raises, require
-from model_adapters.check.questions import (
+from model_adapters.check.clauses import (
     GREEDY,
     NEW_TOKENS,
     QUESTION,
     ask,
+    raises,
+    require,
     same_reply,
     start_conversation,
 )

@@ -1,4 +1,4 @@
-"""Building blocks that the checks of models and of policies share."""
+"""What the checks share: clauses, their error, and the questions that are asked."""
 
 import json
 import tempfile
@@ -10,16 +10,26 @@ from typing import Any, Generic, Protocol
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.protocols import Conversation, Model, Policy
+from model_adapters.protocols import Conversation, Decoding, Model, Part, Policy, Reply
 
 __all__ = [
+    "GREEDY",
+    "NEW_TOKENS",
+    "QUESTION",
     "ContractError",
+    "ask",
     "check_identity",
     "check_members",
     "frames_of_one_colour",
     "raises",
     "require",
+    "same_reply",
+    "start_conversation",
 ]
+
+NEW_TOKENS = 8
+GREEDY = Decoding(max_new_tokens=NEW_TOKENS)
+QUESTION = "\nQuestion: What do you see? Answer with a single word."
 
 
 class ContractError(AssertionError):
@@ -59,8 +69,7 @@ def check_members(adapter: Any) -> None:
 
 
 def check_identity(adapter: Model | Policy) -> None:
-    """Check name, identity and capabilities; raise `ContractError` for a clause that does not
-    hold."""
+    """Check name, identity and capabilities; `ContractError` for a clause that does not hold."""
     identity = adapter.identity()
     try:
         again = json.loads(json.dumps(identity))
@@ -75,18 +84,17 @@ def check_identity(adapter: Model | Policy) -> None:
 
 @contextmanager
 def frames_of_one_colour(size: tuple[int, int]) -> Iterator[tuple[FrameRef, FrameRef]]:
-    """Yield a black and a white frame of this width and height, whose files exist within the
-    context."""
+    """Yield a black and a white frame of this width and height, with files in the context."""
     with tempfile.TemporaryDirectory() as folder:
-        black, white = (Path(folder) / f"{colour}.png" for colour in ("black", "white"))
+        black = Path(folder) / "black.png"
+        white = Path(folder) / "white.png"
         for path in (black, white):
             Image.new("RGB", size, path.stem).save(path)
         yield FrameRef(black), FrameRef(white)
 
 
 def _require_members(instance: object, protocol: type) -> None:
-    """Raise `ContractError` if an object lacks public members of a protocol; no property is
-    evaluated."""
+    """Raise `ContractError` if an object lacks members of a protocol; no property is evaluated."""
     bases = [base for base in protocol.__mro__ if base not in (Protocol, Generic, object)]
     names = {name for base in bases for name in vars(base) if not name.startswith("_")}
     missing = sorted(names - set(dir(instance)))
@@ -94,3 +102,20 @@ def _require_members(instance: object, protocol: type) -> None:
         not missing,
         f"{type(instance).__name__} lacks a member of {protocol.__name__}: {', '.join(missing)}",
     )
+
+
+def start_conversation(model: Model, *parts: Part) -> Conversation:
+    """Return a new conversation with a user turn of these parts."""
+    conversation = model.conversation()
+    conversation.append(*parts)
+    return conversation
+
+
+def ask(model: Model, *parts: Part, decoding: Decoding = GREEDY) -> Reply:
+    """Return the reply to a user turn of these parts in a new conversation."""
+    return start_conversation(model, *parts).reply(decoding)
+
+
+def same_reply(one: Reply, other: Reply) -> bool:
+    """Return whether text and token ids of two replies are equal."""
+    return (one.text, one.token_ids) == (other.text, other.token_ids)

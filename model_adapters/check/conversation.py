@@ -5,8 +5,14 @@ Each check raises `ContractError`, which names the clause that does not hold.
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.clauses import raises, require
-from model_adapters.check.questions import GREEDY, QUESTION, same_reply, start_conversation
+from model_adapters.check.clauses import (
+    GREEDY,
+    QUESTION,
+    raises,
+    require,
+    same_reply,
+    start_conversation,
+)
 from model_adapters.protocols import Conversation, Model
 
 __all__ = ["check_counts", "check_marks", "check_parts", "check_turns"]
@@ -111,8 +117,7 @@ def _check_system(model: Model, frame: FrameRef) -> None:
 
 
 def _alike(model: Model, one: Conversation, other: Conversation) -> bool:
-    """Return whether two conversations look the same: by token count, or else by a deterministic
-    reply."""
+    """Return whether two conversations look the same: by tokens, or else a deterministic reply."""
     if model.capabilities.counts_tokens:
         return one.n_tokens == other.n_tokens
     return not model.capabilities.deterministic or same_reply(

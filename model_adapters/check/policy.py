@@ -16,8 +16,7 @@ _INSTRUCTION = "pick up the mug"
 def policy_checks(
     policy: Policy, black: FrameRef, white: FrameRef
 ) -> dict[str, Callable[[], None]]:
-    """Return all checks of a policy by name; each raises `ContractError` if a clause does not
-    hold."""
+    """Return all checks of a policy by name; each raises `ContractError` for a broken clause."""
     return {
         "members": partial(check_members, policy),
         "identity": partial(check_identity, policy),

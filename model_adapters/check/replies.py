@@ -4,12 +4,12 @@ Each check raises `ContractError`, which names the clause that does not hold.
 """
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.check.clauses import require
-from model_adapters.check.questions import (
+from model_adapters.check.clauses import (
     GREEDY,
     NEW_TOKENS,
     QUESTION,
     ask,
+    require,
     same_reply,
     start_conversation,
 )

@@ -8,10 +8,10 @@ import torch
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters.backend import BackendConversation
+from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.limits import wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.prompt import Piece, Prompter, n_tokens
-from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 
@@ -79,8 +79,7 @@ class HfModel(CheckpointModel):
 
     @property
     def capabilities(self) -> Capabilities:
-        """Sampling and choices, one request at a time, `_batch_size` continuations of a shared
-        prefix together."""
+        """Sampling and choices, a request at a time, `_batch_size` continuations together."""
         text_config = self._loaded.model.config.get_text_config()
         return Capabilities(
             sampling=True,
@@ -94,8 +93,7 @@ class HfModel(CheckpointModel):
         )
 
     def identity(self) -> dict[str, Any]:
-        """Return checkpoint, precision, kernels, versions and generation settings, as JSON
-        values."""
+        """Return checkpoint, precision, kernels, versions, generation settings, as JSON values."""
         options = self._options
         generation = self._loaded.generation
         return self._loaded.identity | {

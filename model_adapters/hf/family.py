@@ -14,8 +14,7 @@ Size = tuple[int, int]  # width, height in pixels
 
 @dataclass(frozen=True)
 class ClipShape:
-    """All that tokens and positions of a clip depend on: successive frames of a video that are
-    encoded together.
+    """All that a clip's tokens and positions depend on: a video's frames, encoded together.
 
     Attributes:
         size: width and height of the video's frames, in pixels.
@@ -51,8 +50,7 @@ class VideoInput(Protocol):
     def features(
         self, clips: Sequence[tuple[ClipShape, Sequence[Image.Image]]]
     ) -> list[torch.Tensor]:
-        """Return the embeddings for the tokens of each clip, (tokens, hidden), on the embedding
-        layer's device."""
+        """Return embeddings for each clip's tokens, (tokens, hidden), on the embeddings' device."""
 
 
 class Family(Protocol):
@@ -76,8 +74,7 @@ class Family(Protocol):
         families, markers."""
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the embeddings for the slots of each image, (slots, hidden), on the embedding
-        layer's device.
+        """Return embeddings for each image's slots, (slots, hidden), on the embeddings' device.
 
         They carry gradients, for training; inference calls this under `torch.inference_mode`.
         """

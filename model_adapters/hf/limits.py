@@ -17,8 +17,7 @@ _FAILURES = (RuntimeError, ValueError, IndexError, ArithmeticError, MemoryError)
 def check_limit(
     name: str, n_context: int, max_new_tokens: int, limit: int | None, option: str = "max_tokens"
 ) -> None:
-    """Check that context and reply, in tokens, are within the limit of both together; None for
-    none.
+    """Check that context and reply, in tokens, are within their common limit; None for none.
 
     `option` is the model's option that sets the limit, for the message.
 
@@ -34,8 +33,7 @@ def check_limit(
 
 @contextmanager
 def wrap_model_errors(name: str) -> Iterator[None]:
-    """Turn an error of a model or its processor on one request into one line, so that the run goes
-    on.
+    """Turn a model's or its processor's error on a request into one line, so that the run goes on.
 
     Raises:
         ModelError: the model failed on the request.
@@ -61,9 +59,8 @@ def wrap_memory_errors(name: str, n_context: int) -> Iterator[None]:
     try:
         yield
     except (RuntimeError, MemoryError) as error:
-        traceback.clear_frames(
-            error.__traceback__
-        )  # its local variables hold the request's cache and activations
+        # Its local variables hold the request's cache and activations.
+        traceback.clear_frames(error.__traceback__)
         # torch has its own exception for GPUs only; on the CPU, only the allocator's name
         # identifies the error.
         cpu = isinstance(error, MemoryError) or "DefaultCPUAllocator" in str(error)

@@ -18,7 +18,7 @@ import transformers
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.digests import digest
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 from model_adapters.hf.loading.checkpoint import (
     origin,
     resolve_device,
@@ -39,8 +39,7 @@ class Retriever:
     are cosines."""
 
     def __init__(self, name: str, revision: str | None = None) -> None:
-        """Load a checkpoint from a folder or the hub; the hub's default branch where the revision
-        is None.
+        """Load a checkpoint from a folder or the hub; its default branch where revision is None.
 
         Raises:
             UsageError: the checkpoint cannot be found or loaded, or is not one of CLIP.
@@ -92,8 +91,7 @@ class Retriever:
         return self._vectors.get([frame.digest for frame in frames])
 
     def text(self, text: str) -> np.ndarray:
-        """Return the vector of a text, (dimensions,); the text is truncated to CLIP's limit (77
-        tokens)."""
+        """Return a text's vector, (dimensions,); it is truncated to CLIP's limit (77 tokens)."""
         key = digest(f"text: {text}")
         if key not in self._vectors:
             limit = self._model.config.text_config.max_position_embeddings

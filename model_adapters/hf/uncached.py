@@ -1,5 +1,4 @@
-"""Any image-text-to-text model, run by its own processor and `generate` without a cache between
-replies.
+"""Any image-text-to-text model, run by its processor and `generate`, with no cache for replies.
 
 It is slow and correct for every architecture, including those that cannot share prefixes: attention
 in both directions over images, or vision features that enter at several layers.
@@ -23,10 +22,10 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters.hf.cached.decoding import ReplyState, extend_replies
 from model_adapters.hf.cached.replies import begin_reply, end_reply
 from model_adapters.hf.checkpoint_model import HfModel
+from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.prompting.rendering import Marks, render, starts_with_bos
-from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Capabilities, Decoding, Reply, Turn
 

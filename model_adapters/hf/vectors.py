@@ -56,9 +56,8 @@ class VectorFile:
         fcntl.flock(self._file, fcntl.LOCK_EX)
         try:
             size = os.fstat(self._file.fileno()).st_size
-            self._file.truncate(
-                size - size % self._row_type.itemsize
-            )  # drops a killed process's unfinished row
+            # Drops a killed process's unfinished row.
+            self._file.truncate(size - size % self._row_type.itemsize)
             self._file.write(rows.tobytes())
             self._file.flush()
         except OSError as error:

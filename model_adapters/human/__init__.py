@@ -1,2 +1,1 @@
-"""A person as a model: what a model would be given is shown on a local page, and the person's
-answer is the reply."""
+"""A person as a model: a local page shows what a model would be given, and takes the reply."""

@@ -1,15 +1,13 @@
-"""Where a question waits for its answer: the run asks in one thread, and the page answers in
-others."""
+"""Where a question waits for its answer: a run's thread asks, the page's threads answer."""
 
 import itertools
 import threading
 import time
 from dataclasses import dataclass
 
-from model_adapters.attended import Notice
-from model_adapters.protocols import Decoding, Turn
+from model_adapters.protocols import Decoding, Notice, Turn
 
-__all__ = ["Answer", "Asked", "Desk", "Question", "StaleError"]
+__all__ = ["Answer", "Desk", "Inquiry", "Question", "StaleError"]
 
 # seconds between two looks at signals: conditions wait without, and Ctrl-C must end a run at once
 _WAKE_S = 0.2
@@ -20,7 +18,7 @@ class StaleError(Exception):
 
 
 @dataclass(frozen=True)
-class Asked:
+class Inquiry:
     """What is put before a person: the turns that a model would be given, the decoding, and what is
     told beside."""
 
@@ -43,7 +41,7 @@ class Question:
     it was put."""
 
     number: int
-    asked: Asked
+    inquiry: Inquiry
     since: float
 
 
@@ -86,14 +84,14 @@ class Desk:
         """Whether nothing will be asked any more."""
         return self._is_closed
 
-    def ask(self, asked: Asked) -> Answer:
+    def ask(self, inquiry: Inquiry) -> Answer:
         """Put a question, and wait until it is answered.
 
         Raises:
             KeyboardInterrupt: the person stops the run from the page.
         """
         with self._changed:
-            self._question = Question(next(self._numbers), asked, time.monotonic())
+            self._question = Question(next(self._numbers), inquiry, time.monotonic())
             self._answer = None
             self._change()
             try:
@@ -136,8 +134,7 @@ class Desk:
             self._changed.notify_all()
 
     def wait_until_told(self, timeout_s: float) -> None:
-        """Wait until a page has learned that it is over, if there is one, for so many seconds at
-        most."""
+        """Wait until a page, if there is one, knows that it is over: so many seconds at most."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_told or not self._has_readers, timeout_s)
 

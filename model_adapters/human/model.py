@@ -5,13 +5,12 @@ from contextlib import ExitStack
 from typing import Any
 
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.attended import Notice
 from model_adapters.backend import BackendConversation
-from model_adapters.human.desk import Asked, Desk
-from model_adapters.human.options import HumanOptions
+from model_adapters.human.adapter import HumanOptions
+from model_adapters.human.desk import Desk, Inquiry
 from model_adapters.human.serving import serve_desk
-from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn
-from model_adapters.stopping import cut_at_stop
+from model_adapters.protocols import Capabilities, Conversation, Decoding, Notice, Reply, Turn
+from model_adapters.thinking import cut_at_stop
 
 __all__ = ["HumanModel"]
 
@@ -56,7 +55,7 @@ class HumanModel:
     def answer(self, turns: Sequence[Turn], decoding: Decoding) -> Reply:
         """Show what a model would be given, and wait for the answer; see `Conversation.reply`."""
         self._open()
-        answer = self._desk.ask(Asked(tuple(turns), decoding, self._notice))
+        answer = self._desk.ask(Inquiry(tuple(turns), decoding, self._notice))
         before_stop = None if decoding.choices else cut_at_stop(answer.text, decoding.stop)
         return Reply(
             answer.text if before_stop is None else before_stop, n_watched=answer.n_watched

@@ -14,8 +14,8 @@ from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
 from infthor_eval.pages.server import file_route, serve_pages
+from model_adapters.human.adapter import HumanOptions
 from model_adapters.human.desk import Answer, Desk, StaleError
-from model_adapters.human.options import HumanOptions
 from model_adapters.human.view import frames_of, state_of
 
 __all__ = ["desk_routes", "serve_desk"]
@@ -26,7 +26,7 @@ _LONGEST = 2000  # characters of an answer
 _PACKAGE = "model_adapters.human"
 
 
-class _Given(msgspec.Struct):
+class _AnswerForm(msgspec.Struct):
     """An answer as the page sends it."""
 
     number: int
@@ -51,73 +51,75 @@ def serve_desk(desk: Desk, options: HumanOptions) -> Iterator[None]:
 
 def desk_routes(desk: Desk) -> list[BaseRoute]:
     """Return the routes of a desk's page."""
+    page = _Page(desk)
+    return [
+        file_route("/", _PACKAGE, "page.html"),
+        *(file_route(f"/{name}", _PACKAGE, name) for name in ("page.css", "page.js", "strip.js")),
+        Route("/state.json", page.state),
+        Route("/frames/{number:int}/{index:int}", page.frame),
+        Route("/answer", page.answer, methods=["POST"]),
+        Route("/stop", page.stop, methods=["POST"]),
+    ]
 
-    async def state(request: Request) -> Response:
+
+class _Page:
+    """The answers to a page's requests."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+
+    async def state(self, request: Request) -> Response:
         """What is asked now; waits for another version than the one that the page has."""
         seen = request.query_params.get("seen", "")
         if seen.isdecimal():
-            await run_in_threadpool(desk.wait_for_change, int(seen), _WAIT_S)
-        told = state_of(desk)
-        return JSONResponse(
-            told, background=BackgroundTask(desk.tell_closed) if told["closed"] else None
-        )
+            await run_in_threadpool(self._desk.wait_for_change, int(seen), _WAIT_S)
+        state = state_of(self._desk)
+        told = BackgroundTask(self._desk.tell_closed) if state["closed"] else None
+        return JSONResponse(state, background=told)
 
-    async def frame(request: Request) -> Response:
+    async def frame(self, request: Request) -> Response:
         """One frame of the question of a number."""
-        question = desk.question
+        question = self._desk.question
         if question is None or question.number != request.path_params["number"]:
             return _problem("this question is not asked any more", 409)
-        frames = frames_of(question.asked.turns)
-        if request.path_params["place"] >= len(frames):
+        frames = frames_of(question.inquiry.turns)
+        index = request.path_params["index"]
+        if index >= len(frames):
             return _problem("there is no such frame", 404)
-        path = frames[request.path_params["place"]].path
-        return (
-            FileResponse(path)
-            if path.is_file()
-            else _problem(f"{path.name}: the frame is not there", 404)
-        )
+        path = frames[index].path
+        if not path.is_file():
+            return _problem(f"{path.name}: the frame is not there", 404)
+        return FileResponse(path)
 
-    async def answer(request: Request) -> Response:
+    async def answer(self, request: Request) -> Response:
         """Take an answer."""
         try:
-            given = msgspec.json.decode(await request.body(), type=_Given)
+            form = msgspec.json.decode(await request.body(), type=_AnswerForm)
         except (msgspec.ValidationError, msgspec.DecodeError):
             return _problem("not an answer", 400)
-        return _take(desk, given)
+        return _take(self._desk, form)
 
-    async def stop(_request: Request) -> Response:
+    async def stop(self, _request: Request) -> Response:
         """End the run, which can go on later."""
-        desk.stop()
+        self._desk.stop()
         return JSONResponse({})
 
-    pages: list[BaseRoute] = [
-        file_route("/" if name == "page.html" else f"/{name}", _PACKAGE, name)
-        for name in ("page.html", "page.css", "page.js", "strip.js")
-    ]
-    return [
-        *pages,
-        Route("/state.json", state),
-        Route("/frames/{number:int}/{place:int}", frame),
-        Route("/answer", answer, methods=["POST"]),
-        Route("/stop", stop, methods=["POST"]),
-    ]
 
-
-def _take(desk: Desk, given: _Given) -> Response:
+def _take(desk: Desk, form: _AnswerForm) -> Response:
     question = desk.question
-    text = given.text.strip()
+    text = form.text.strip()
     if not text:
         return _problem("write an answer first", 400)
     if len(text) > _LONGEST:
         return _problem(f"an answer has at most {_LONGEST} characters", 400)
     if (
         question is not None
-        and question.asked.decoding.choices
-        and text not in question.asked.decoding.choices
+        and question.inquiry.decoding.choices
+        and text not in question.inquiry.decoding.choices
     ):
         return _problem("only the listed replies are possible here", 400)
     try:
-        desk.give(given.number, Answer(text, max(0, given.watched)))
+        desk.give(form.number, Answer(text, max(0, form.watched)))
     except StaleError:
         return _problem("this question was answered already, perhaps in another tab", 409)
     return JSONResponse({})
@@ -128,8 +130,7 @@ def _problem(text: str, status: int) -> JSONResponse:
 
 
 def _has_screen() -> bool:
-    """Return whether a browser can open a window; in a terminal without one it would take the
-    terminal."""
+    """Return whether a browser can open a window; without one it would take the terminal."""
     return sys.platform in ("darwin", "win32") or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )

@@ -45,8 +45,8 @@ def _parts(turns: tuple[Turn, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _question(question: Question) -> dict[str, Any]:
-    asked = question.asked
-    notice = question.asked.notice
+    inquiry = question.inquiry
+    notice = question.inquiry.notice
     return {
         "number": question.number,
         "seconds": round(time.monotonic() - question.since, 1),
@@ -54,7 +54,7 @@ def _question(question: Question) -> dict[str, Any]:
         "facts": [list(fact) for fact in notice.facts],
         "news": notice.news,
         "words": list(notice.words),
-        "replies": list(asked.decoding.choices or notice.replies),
-        "only": bool(asked.decoding.choices),
-        "parts": list(_parts(asked.turns)),
+        "replies": list(inquiry.decoding.choices or notice.replies),
+        "only": bool(inquiry.decoding.choices),
+        "parts": list(_parts(inquiry.turns)),
     }

@@ -1,2 +1,1 @@
-"""Models behind a server that speaks OpenAI's chat completions: vLLM, SGLang, `transformers serve`,
-commercial ones."""
+"""Models behind a server of OpenAI's chat completions: vLLM, SGLang, transformers, commercial."""

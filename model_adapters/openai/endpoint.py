@@ -12,8 +12,8 @@ import openai
 
 from infthor_eval.errors import ModelError, in_one_line
 from model_adapters.openai.options import OpenAIOptions
-from model_adapters.openai.rate import RateLimiter
 from model_adapters.openai.secret import Secret
+from model_adapters.openai.spend import RateLimiter
 from model_adapters.openai.wire import UnreadableError, Wire
 
 __all__ = ["Endpoint"]
@@ -63,7 +63,8 @@ class Endpoint:
 
     After a request has failed in all its attempts, later requests get one attempt each until one
     succeeds: otherwise every sample of a run would wait through all retries of a server that is
-    down.
+    down. The client's own retries would neither be recorded, nor count in the rate limit, nor be
+    known to the other threads, and they wait for at most 8 s.
     """
 
     def __init__(self, options: OpenAIOptions, secret: Secret) -> None:
@@ -161,8 +162,7 @@ def _hint_of(body: bytes) -> str | None:
 
 
 def _pause_s(n_faults: int, fault: _TransientError) -> float:
-    """Return the server's pause, or one that doubles; a random part spreads threads that failed
-    together."""
+    """Return the server's pause, or one that doubles, plus a random part to spread threads."""
     pause = min(_FIRST_WAIT_S * 2 ** (n_faults - 1), _LONGEST_WAIT_S) * (1 + random.random() / 4)
     return pause if fault.wait_s is None else fault.wait_s + random.random() * _FIRST_WAIT_S
 

@@ -39,9 +39,8 @@ class EncodedFrames:
         Raises:
             DataError: the frame cannot be read.
         """
-        with (
-            self._lock
-        ):  # held while encoding: threads with the same frames wait instead of encoding them again
+        # Held while encoding: threads with the same frames wait instead of encoding them again.
+        with self._lock:
             url = self._cache.get(frame.digest)
             if url is None:
                 url = self._encode(frame)
@@ -54,8 +53,7 @@ class EncodedFrames:
             return url
 
     def _encode(self, frame: FrameRef) -> str:
-        """Encode the pixels, not the file: servers differ in how they read palettes and
-        transparency."""
+        """Encode the pixels, not the file: servers read palettes and transparency in many ways."""
         content = BytesIO()
         frame.load().save(content, self._format, **_SETTINGS[self._format])
         encoded = base64.b64encode(content.getvalue()).decode("ascii")
@@ -78,9 +76,8 @@ def to_messages(
 def _content(
     name: str, turn: Turn, frames: EncodedFrames, detail: str | None
 ) -> str | list[dict[str, Any]]:
-    if all(
-        isinstance(part, str) for part in turn.parts
-    ):  # some servers accept only a string in system turns
+    # Some servers accept only a string in system turns.
+    if all(isinstance(part, str) for part in turn.parts):
         return "".join(map(str, turn.parts))
     if turn.role != "user":
         raise ModelError(

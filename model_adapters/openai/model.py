@@ -11,11 +11,10 @@ from model_adapters.openai.completions import Completion, TokenUsage, read_compl
 from model_adapters.openai.endpoint import Endpoint
 from model_adapters.openai.messages import EncodedFrames, to_messages
 from model_adapters.openai.options import OpenAIOptions
-from model_adapters.openai.rate import RateLimiter
 from model_adapters.openai.secret import Secret
-from model_adapters.openai.spend import Caps, Charge, Prices, Spend
+from model_adapters.openai.spend import Caps, Charge, Prices, RateLimiter, Spend
 from model_adapters.protocols import Capabilities, Conversation, Decoding, Reply, Turn
-from model_adapters.stopping import cut_at_stop
+from model_adapters.thinking import cut_at_stop
 
 __all__ = ["ServedModel"]
 

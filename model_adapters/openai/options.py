@@ -144,8 +144,8 @@ class OpenAIOptions:
             if getattr(self, name) is not None and not getattr(self, name) >= 0:
                 raise ValueError(f"{name}={getattr(self, name)} is below 0")
         needed = (self.price_per_m_input, self.price_per_m_output)
-        given = [name for name in ("max_cost", *_PRICES) if getattr(self, name) is not None]
-        if given and None in needed:
+        money_options = [name for name in ("max_cost", *_PRICES) if getattr(self, name) is not None]
+        if money_options and None in needed:
             raise ValueError(
-                f"{given[0]} needs price_per_m_input and price_per_m_output; give both"
+                f"{money_options[0]} needs price_per_m_input and price_per_m_output; give both"
             )

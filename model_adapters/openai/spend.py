@@ -1,13 +1,14 @@
-"""Tokens and cost of requests, and caps on both."""
+"""Tokens and cost of requests, caps on both, and rate limits."""
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from threading import Condition
+from threading import Condition, Lock
 
 from infthor_eval.errors import ModelError
 
-__all__ = ["Caps", "Charge", "Prices", "Spend"]
+__all__ = ["Caps", "Charge", "Prices", "RateLimiter", "Spend"]
 
 _MILLION = 1_000_000
 
@@ -35,8 +36,7 @@ class Prices:
 
 @dataclass(frozen=True)
 class Caps:
-    """Caps on the tokens of a run's requests and replies, and on its cost in US dollars; None for
-    no cap."""
+    """Caps on a run's tokens, of requests and replies, and cost in US dollars; None for no cap."""
 
     tokens: int | None = None
     cost: float | None = None
@@ -77,8 +77,7 @@ class Spend:
 
     @contextmanager
     def request(self) -> Iterator[Charge]:
-        """Account for one request; what is filled into the charge counts even if the request fails
-        later.
+        """Account for one request; what the charge is filled with counts even if it fails later.
 
         Raises:
             ModelError: a cap is reached or cannot be enforced; the request must not be sent.
@@ -148,3 +147,31 @@ class Spend:
 
 def _is_reached(used: float, cap: float | None) -> bool:
     return cap is not None and used >= cap
+
+
+class RateLimiter:
+    """Grants a number of units per minute, evenly: after each grant, the next one waits until its
+    time has passed.
+
+    Servers count in their own windows, often shorter than a minute, so unused units are not saved
+    up for a burst. Several threads may use it at once. A rate of None sets no limit.
+    """
+
+    def __init__(self, per_minute: float | None) -> None:
+        self._seconds_per_unit = 0.0 if per_minute is None else 60.0 / per_minute
+        self._free_at = 0.0  # on the clock of time.monotonic
+        self._lock = Lock()
+
+    def wait(self, amount: float = 1.0) -> None:
+        """Wait for some units and take them."""
+        with self._lock:
+            now = time.monotonic()
+            begin = max(now, self._free_at)
+            self._free_at = begin + amount * self._seconds_per_unit
+        if begin > now:
+            time.sleep(begin - now)
+
+    def take(self, amount: float) -> None:
+        """Take units that were used already, without waiting; a negative amount returns them."""
+        with self._lock:
+            self._free_at = max(time.monotonic(), self._free_at) + amount * self._seconds_per_unit

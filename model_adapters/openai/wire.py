@@ -1,5 +1,4 @@
-"""Requests by the official client, without redirects, limited in bytes and in time whatever the
-server does."""
+"""Requests by the official client, without redirects, limited in bytes and in time."""
 
 import asyncio
 import logging
@@ -20,10 +19,8 @@ __all__ = ["UnreadableError", "Wire"]
 
 _LARGEST = 4 * 2**20  # bytes of the largest accepted reply
 _CONNECT_S = 30.0  # limit for a connection
-_LOGGERS = (
-    "httpcore2",
-    "httpx2",
-)  # they log headers of replies, in which a server may repeat the key
+# They log headers of replies, in which a server may repeat the key.
+_LOGGERS = ("httpcore2", "httpx2")
 
 
 class UnreadableError(Exception):

@@ -61,8 +61,7 @@ class Placement:
     threads: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse attention that transformers does not know, or would download from the hub and
-        run."""
+        """Refuse attention that transformers does not know, or would run from the hub."""
         if self.threads is not None and not 1 <= self.threads <= _MOST_THREADS:
             raise ValueError(f"threads={self.threads} is not from 1 to {_MOST_THREADS}")
         name = self.attn_implementation

@@ -1,15 +1,15 @@
-"""Parsing of an adapter's options from the `k=v` strings of the command line."""
+"""Parsing of options from the `k=v` strings of the command line."""
 
 import dataclasses
 import difflib
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from infthor_eval.errors import UsageError
 
-__all__ = ["NoOptions", "describe", "parse"]
+__all__ = ["NoOptions", "describe", "parse", "read_pairs"]
 
 _LARGEST = 2**63  # limit of the numbers in a run config
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -30,27 +30,27 @@ def describe(options: type) -> str:
     return ", ".join(texts) or "no options"
 
 
-def parse(model: str, options: type, given: Mapping[str, str]) -> Any:
+def parse(model: str, options: type, texts: Mapping[str, str]) -> Any:
     """Return an instance of the options with the given values, converted by the annotations.
 
     Args:
         model: name of the model, for the message.
         options: a dataclass with defaults, whose fields are str, int, float, bool, or one of these
             or None.
-        given: option names to values as typed.
+        texts: option names to values as typed.
 
     Raises:
         UsageError: an option is unknown (the message has the nearest one), or a value does not fit
             its type.
     """
     hints = typing.get_type_hints(options)
-    for name in given:
+    for name in texts:
         if name not in hints:
             near = difflib.get_close_matches(name, hints, n=1)
             hint = f"; did you mean {near[0]}?" if near else ";"
             raise UsageError(f"{model} has no option {name}{hint} it takes: {describe(options)}")
     try:
-        return options(**{name: _value(name, hints[name], text) for name, text in given.items()})
+        return options(**{name: _value(name, hints[name], text) for name, text in texts.items()})
     except ValueError as error:
         raise UsageError(f"{model}: {error}; it takes: {describe(options)}") from error
 
@@ -68,3 +68,20 @@ def _value(name: str, hint: Any, text: str) -> Any:
     except (KeyError, ValueError) as error:
         expected = "true or false" if convert is bool else convert.__name__
         raise ValueError(f"option {name}={text} is not {expected}") from error
+
+
+def read_pairs(texts: Iterable[str], option: str) -> dict[str, str]:
+    """Return keys and values written as `k=v`; messages name the option that they belong to.
+
+    Raises:
+        UsageError: an item is not `k=v`, or a key is given twice.
+    """
+    pairs: dict[str, str] = {}
+    for text in filter(None, (part.strip() for part in texts)):
+        key, equals, value = text.partition("=")
+        if not equals or not key.strip():
+            raise UsageError(f"{option}: {text!r} is not of the form key=value")
+        if key.strip() in pairs:
+            raise UsageError(f"{option}: {key.strip()!r} is given twice")
+        pairs[key.strip()] = value.strip()
+    return pairs

@@ -1,5 +1,4 @@
-"""Vision-language-action policies: native ports of published checkpoints, and a client for any
-policy behind a server.
+"""Vision-language-action policies: ports of published checkpoints, and a client of any server.
 
 Remote code, timm and torchvision are not needed: the keys of a checkpoint are mapped to modules of
 this package or of transformers.

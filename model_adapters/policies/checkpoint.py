@@ -61,13 +61,13 @@ class PolicyCheckpoint:
                 "`infthor-eval ls models`"
             )
 
-    def read(self, name: str, form: type[T]) -> T:
+    def read(self, name: str, data_type: type[T]) -> T:
         """Read one of the JSON files as an instance of a type.
 
         Raises:
             DataError: the file is missing, is not JSON, or has another form.
         """
-        return read_json(self.folder / name, _HINT, form)
+        return read_json(self.folder / name, _HINT, data_type)
 
     def has_file(self, name: str) -> bool:
         """Return whether the checkpoint has this file."""

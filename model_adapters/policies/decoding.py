@@ -11,8 +11,7 @@ __all__ = ["decode_greedily", "embed_ids"]
 
 
 def embed_ids(model: Any, ids: Sequence[int]) -> torch.Tensor:
-    """Return the embeddings of ids, (1, ids, hidden), as input of a transformers model's first
-    layer."""
+    """Return embeddings of ids, (1, ids, hidden), as input of a transformers model."""
     layer = model.get_input_embeddings()
     return cast(torch.Tensor, layer(torch.tensor([ids], device=layer.weight.device)))
 
@@ -39,16 +38,15 @@ def decode_greedily(
     """
     ids: list[int] = []
     logits = first
-    for place, allowed in enumerate(action_ids):
+    for position, allowed in enumerate(action_ids):
         scores = logits[allowed.start : allowed.stop] if constrained else logits
         if not torch.isfinite(scores.max()):  # the maximum is NaN if any score is
             raise ModelError(
-                f"action token {place + 1} has no finite score (NaN); try dtype=float32"
+                f"action token {position + 1} has no finite score (NaN); try dtype=float32"
             )
         token = int(scores.argmax()) + (allowed.start if constrained else 0)
-        ids.append(
-            min(max(token, allowed.start), allowed.stop - 1)
-        )  # the model is fed the token without clipping
-        if place + 1 < len(action_ids):
+        # The model is fed the token without clipping.
+        ids.append(min(max(token, allowed.start), allowed.stop - 1))
+        if position + 1 < len(action_ids):
             logits = step(token)
     return ids

@@ -1,5 +1,4 @@
-"""Temporal ensembling: averages of the predictions that overlapping chunks make for the same
-step."""
+"""Temporal ensembling: averages of overlapping chunks' predictions for the same step."""
 
 from collections import deque
 
@@ -13,8 +12,7 @@ _RATE = 0.8
 
 
 class ExponentialEnsemble:
-    """Averages the predictions of this and earlier chunks for the current step, with the largest
-    weight on the newest.
+    """Averages this and earlier chunks' predictions of a step; the newest has the most weight.
 
     The weight of prediction i, counted from the oldest, is exp(0.8 i), as in the published
     evaluations of SpatialVLA (SimplerEnv's ActionEnsembler with a temperature of -0.8).

@@ -113,8 +113,7 @@ def compare_policies(
     instructions: Sequence[str],
     tolerance: float,
 ) -> ParityReport:
-    """Compare the actions of both on the same frames and instructions, each frame as the first of
-    an episode.
+    """Compare both's actions on the same frames and instructions, each the first of an episode.
 
     Raises:
         ModelError: one of them cannot act.

@@ -1,6 +1,6 @@
 """A loaded network as a `Policy`: scaling, averaging and checking of its actions."""
 
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import torch
@@ -8,14 +8,15 @@ from PIL import Image
 
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
-from model_adapters.hf.threads import torch_threads
-from model_adapters.options.policies import ActionOptions
+from model_adapters.hf.global_settings import torch_threads
+from model_adapters.options.policies import ActionOptions, CheckpointPolicyOptions
+from model_adapters.policies.checkpoint import PolicyCheckpoint, find_policy_checkpoint
 from model_adapters.policies.ensemble import ExponentialEnsemble
 from model_adapters.policies.statistics import ACTION_SIZE, Actions, ActionStatistics
 from model_adapters.protocols import ArmDelta, Capabilities
 from model_adapters.refusals import wrap_request_errors
 
-__all__ = ["Network", "VlaPolicy", "arm_deltas"]
+__all__ = ["Network", "PolicyAdapter", "VlaPolicy", "arm_deltas"]
 
 
 class Network(Protocol):
@@ -110,9 +111,8 @@ class VlaPolicy:
             image = frame.load()
             chunk = self._network.predict(image, instruction, constrained=self._options.constrained)
             actions = self._statistics.unnormalise(chunk)
-            arm_deltas(
-                self.name, actions
-            )  # refuses a bad chunk before it is averaged into later steps
+            # Refuses a bad chunk before it is averaged into later steps.
+            arm_deltas(self.name, actions)
             steps = self._ensemble.step(actions) if self._options.ensemble == "exp" else actions
             return arm_deltas(self.name, steps[: self._options.execute])
 
@@ -121,3 +121,29 @@ class VlaPolicy:
         del self._network
         if torch.cuda.is_available():
             torch.cuda.empty_cache()
+
+
+class PolicyAdapter:
+    """Base of the adapters of one family of policies.
+
+    Attributes:
+        Options: options of the family, with its default checkpoint.
+    """
+
+    Options: ClassVar[type]
+
+    @staticmethod
+    def load(name: str, checkpoint: PolicyCheckpoint, options: Any) -> VlaPolicy:
+        """Load a checkpoint of the family from its folder."""
+        raise NotImplementedError
+
+    @classmethod
+    def build(cls, name: str, options: CheckpointPolicyOptions, seed: int) -> VlaPolicy:  # noqa: ARG003
+        """Load a checkpoint; the seed is not used.
+
+        Raises:
+            ModelError: the checkpoint cannot be loaded, or is of another family.
+            UsageError: the unnorm_key, the device or the dtype is unknown.
+            DataError: a file beside the weights is missing or damaged.
+        """
+        return cls.load(name, find_policy_checkpoint(options.pretrained, options.revision), options)

@@ -17,7 +17,6 @@ def resize(image: Image.Image, size: int) -> torch.Tensor:
 def normalise(
     pixels: torch.Tensor, mean: tuple[float, float, float], std: tuple[float, float, float]
 ) -> torch.Tensor:
-    """Return pixels, (..., 3, height, width), minus the mean and divided by the deviation of each
-    channel."""
+    """Return pixels, (..., 3, height, width), minus each channel's mean, by its deviation."""
     shape = (3, 1, 1)
     return (pixels - pixels.new_tensor(mean).view(shape)) / pixels.new_tensor(std).view(shape)

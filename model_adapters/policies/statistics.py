@@ -1,5 +1,4 @@
-"""De-normalisation of actions: from numbers between -1 and 1 to the metres and radians of a
-dataset's robot."""
+"""De-normalisation of actions: from -1 to 1 to the metres and radians of a dataset's robot."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -32,8 +31,7 @@ class ActionStatistics(msgspec.Struct, frozen=True):
     mask: list[bool] | None = None
 
     def unnormalise(self, actions: Actions) -> Actions:
-        """Return actions, (steps, 7), in the dataset's units: metres and radians per step for robot
-        arms.
+        """Return actions, (steps, 7), in the dataset's units: metres and radians a step, for arms.
 
         Training mapped q01 and q99 to -1 and 1, so this is the inverse; values beyond are not
         clipped.

@@ -1,4 +1,3 @@
-"""Tiny twins of the model families: the real classes with random weights, for tests and for trying
-the harness."""
+"""Tiny twins of model families: the real classes, random weights, for tests and trials."""
 
 import model_adapters.lean_transformers  # noqa: F401 - before any module imports transformers

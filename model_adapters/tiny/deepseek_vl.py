@@ -1,5 +1,4 @@
-"""A DeepSeek-VL hybrid of two layers with random weights; frames take as many tokens as in the real
-one.
+"""A DeepSeek-VL hybrid of two layers with random weights; frames take the real number of tokens.
 
 Its high-resolution tower reads 256 pixels instead of 1024, and its features are interpolated to the
 same 24 x 24.

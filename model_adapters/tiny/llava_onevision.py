@@ -1,5 +1,4 @@
-"""A LLaVA-OneVision of two layers with random weights; frames take as many tokens as in the real
-one."""
+"""A LLaVA-OneVision of two layers, random weights; frames take the real number of tokens."""
 
 from collections.abc import Mapping
 from typing import Any

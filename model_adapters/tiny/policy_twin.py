@@ -1,5 +1,4 @@
-"""Tiny twins of policies: a checkpoint in the published layout with random weights, read by the
-family's loader."""
+"""Tiny twins of policies: published layout, random weights, read by the family's loader."""
 
 import json
 import math

@@ -1,5 +1,4 @@
-"""A Qwen2.5-VL of two layers with random weights: the real classes, template and frame tokens,
-without a download."""
+"""A Qwen2.5-VL of two layers with random weights, and the real template and frame tokens."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -102,6 +101,5 @@ class Qwen25VLTiny(TinyAdapter):
 
 
 def save_tiny_checkpoint(folder: Path, seed: int) -> None:
-    """Write the tiny Qwen2.5-VL as a checkpoint, which `qwen2.5-vl` and transformers' auto classes
-    load."""
+    """Write the tiny Qwen2.5-VL as a checkpoint for `qwen2.5-vl` and transformers' auto classes."""
     Qwen25VLTiny.twin.save(folder, seed)

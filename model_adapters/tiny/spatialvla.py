@@ -156,9 +156,8 @@ def _tokenizer() -> Tokenizer:
 
 
 def _layout() -> Layout:
-    config = msgspec.convert(
-        deepcopy(_CONFIG), SpatialVLAConfig
-    )  # transformers' configs may change nested ones
+    # transformers' configs may change nested ones.
+    config = msgspec.convert(deepcopy(_CONFIG), SpatialVLAConfig)
     with empty_parameters():
         return SpatialVLAWeights(config, "eager").layout()
 

@@ -1,5 +1,4 @@
-"""Tiny twins of model families: the real classes, random weights, a tokenizer trained on the
-spot."""
+"""Tiny twins of model families: real classes, random weights, a tokenizer trained on the spot."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -12,8 +11,8 @@ from transformers import AutoModelForImageTextToText, GenerationConfig, PreTrain
 
 from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.family import MakeFamily
+from model_adapters.hf.global_settings import hide_transformers_output
 from model_adapters.hf.loading.checkpoint import assemble, resolve_device, resolve_dtype
-from model_adapters.hf.loading.quiet import hide_transformers_output
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.hf.loading.tower_names import with_published_names
 from model_adapters.hf.prompting.templates import plain_template

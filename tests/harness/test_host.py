@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, samples
 
 PEERS = Path(sys.prefix) / "test-peers"

@@ -9,7 +9,7 @@ import pytest
 
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import read_run
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from tests.harness.conftest import LM_EVAL, only, samples
 from tests.plans.cut import FORK, MUG, cut, write
 

@@ -214,11 +214,11 @@ def _append_in_any_role(self: Any, *parts: Part, role: Any = "user") -> None:
 
 
 def _turns_without_joints(self: Any, continuation: Sequence[Part]) -> tuple[Turn, ...]:
-    return tuple(Turn(role, (part,)) for role, part in self._items)
+    return tuple(Turn(role, (part,)) for role, part in self._spoken)
 
 
 def _rewind_anywhere(self: Any, mark: Mark) -> None:
-    del self._items[mark.n_parts :]
+    del self._spoken[mark.n_parts :]
 
 
 @pytest.mark.parametrize(

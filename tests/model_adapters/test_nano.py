@@ -4,9 +4,9 @@ import pytest
 
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from model_adapters import Decoding, check_adapter, load
-from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
+from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +19,7 @@ def test_it_keeps_the_contract(nano):
 
 
 def test_it_is_small_and_has_a_card():
-    folder = packaged_folder(FOLDER)
+    folder = packaged_folder(NANO_FOLDER)
     assert sum(path.stat().st_size for path in folder.iterdir()) < 10e6
     assert "cannot" in (folder / "README.md").read_text()
 

@@ -408,7 +408,7 @@ def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
     prepared, monkeypatch
 ):
     from infthor_eval.errors import ModelError
-    from infthor_eval.plans.actors.protocols import baselines
+    from infthor_eval.plans.actors import baselines
 
     act = baselines._ExpertActor.act
 

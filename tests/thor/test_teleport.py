@@ -1,5 +1,4 @@
-from infthor_eval.thor.teleport import teleport_call
-from infthor_eval.thor.view import AgentPose, Vector
+from infthor_eval.thor.view import AgentPose, Vector, teleport_call
 
 POSE = AgentPose(Vector(1.0, 0.9, -2.0), 90.0, 30.0, standing=False)
 

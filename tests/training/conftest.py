@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.training.encoding import Encoder
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters.hf.loading.loaded import LoadedCheckpoint

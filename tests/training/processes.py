@@ -19,10 +19,9 @@ from infthor_eval.formats.frames import FrameRef
 from infthor_eval.training.batches import Batch, collate, n_labels
 from infthor_eval.training.context_parallel import context_parallel
 from infthor_eval.training.export import gather_weights
-from infthor_eval.training.gradients import sum_gradients
 from infthor_eval.training.loop import Loop, LoopSettings, Progress
 from infthor_eval.training.network import SequenceModel, freeze
-from infthor_eval.training.ranks import Ranks, assign_ranks
+from infthor_eval.training.ranks import Ranks, assign_ranks, sum_gradients
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 
 from .twins import PAD, everywhere, loaded, sequence

@@ -17,7 +17,7 @@ from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import ACT
 from infthor_eval.plans.history.segments import PlanSegment, segment_parts
 from infthor_eval.training.action_sequences import recorded_segments, single_plans, windows
-from infthor_eval.training.encoding import SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import SkippedSequence, TrainingSequence
 from model_adapters.hf.prompting.prompt import Frame
 
 _ACTION = re.compile(r"<\|act\|>(.*?)<\|act\|>")
@@ -125,7 +125,7 @@ def test_a_plan_that_is_too_long_is_left_out_and_told(bundled_set, encoder):
     least = min(len(segment.steps) for segment in history)
     limit = 150 + least * 130
     windows_of_history = list(windows(encoder, name, history, limit))
-    left = [item for item in windows_of_history if isinstance(item, SkippedItem)]
+    left = [item for item in windows_of_history if isinstance(item, SkippedSequence)]
     kept = [item for item in windows_of_history if isinstance(item, TrainingSequence)]
     assert left
     assert {item.reason for item in left} == {f"longer than {limit} tokens"}

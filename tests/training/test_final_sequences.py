@@ -20,7 +20,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.plans.published.system_prompts import system_prompt
 from infthor_eval.training.data import read_history, read_training_data
-from infthor_eval.training.encoding import Encoder, SkippedItem
+from infthor_eval.training.encoding import Encoder, SkippedSequence
 from infthor_eval.training.goal_sequences import goals_of_actions
 from infthor_eval.training.recipe import ActionData, Recipe, read_recipe
 from infthor_eval.training.starting_model import load_starting_model
@@ -205,9 +205,9 @@ def test_actions_that_cannot_be_used_are_left_out_and_told(make_set, encoder, go
     )
     assert len(data.sequences) == len(retrieved)
     assert set(data.skipped) == {
-        SkippedItem("t, action 7", "belongs to no task"),
-        SkippedItem("t, action 99", "belongs to no task"),
-        SkippedItem("t, action 3", "its retrieved frame '000000099.png' is not in the set"),
+        SkippedSequence("t, action 7", "belongs to no task"),
+        SkippedSequence("t, action 99", "belongs to no task"),
+        SkippedSequence("t, action 3", "its retrieved frame '000000099.png' is not in the set"),
     }
 
 

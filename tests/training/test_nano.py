@@ -20,10 +20,14 @@ from infthor_eval.training.export import export
 from infthor_eval.training.nano.architecture import TOKENS, build_untrained, image_processor
 from infthor_eval.training.nano.frame_dataset import _cell_coverage, _type, read_frame_dataset
 from infthor_eval.training.nano.network import NanoNetwork, spellings
-from infthor_eval.training.nano.sampler import SequenceSampler, corpus_texts, question_intro
+from infthor_eval.training.nano.sampler import (
+    SequenceSampler,
+    SyntheticPlans,
+    corpus_texts,
+    question_intro,
+)
 from infthor_eval.training.nano.settings import NanoRecipe
 from infthor_eval.training.nano.stages import train_small_model
-from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from model_adapters import check_adapter, load
 
 from ..bundled import bundled_name
@@ -82,7 +86,9 @@ def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
                 if there
             }
             shown = {
-                name for name, there in zip(dataset.types, dataset.shown[at], strict=True) if there
+                name
+                for name, there in zip(dataset.types, dataset.visible[at], strict=True)
+                if there
             }
             assert present == {_type(key) for key in step.seen}
             assert shown <= set(step.object_log.visible) | present
@@ -154,7 +160,7 @@ def test_synthetic_questions_are_true_and_their_names_do_not_give_away_the_answe
         about = max((name for name in words if f" {name}" in text), key=len)
         counts[answer] += 1
         here = index[frame.digest]
-        assert bool(dataset.shown[here, words[about]]) == (answer == "yes")
+        assert bool(dataset.visible[here, words[about]]) == (answer == "yes")
         assert answer == "yes" or not dataset.present[here, words[about]]
     assert min(counts.values()) > 70
 

@@ -5,7 +5,7 @@ import pytest
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.samples import find_samples
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from infthor_eval.training.question_sequences import question_sequences
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters import Turn
@@ -48,7 +48,9 @@ def test_what_cannot_be_asked_is_told(make_nieh_set, encoder):
     root = make_nieh_set(
         [Question("traj_a", "Is it?", (1,), ("yes",)), Question("traj_a", "Is it?", (77,), ("no",))]
     )
-    sequence, left = sorted(build(encoder, root), key=lambda item: isinstance(item, SkippedItem))
+    sequence, left = sorted(
+        build(encoder, root), key=lambda item: isinstance(item, SkippedSequence)
+    )
     assert isinstance(sequence, TrainingSequence)
     assert "clue 77 is outside" in left.reason
     (short, *_) = build(encoder, root, "trajectory", limit=100)

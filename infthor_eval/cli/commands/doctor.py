@@ -23,7 +23,7 @@ from infthor_eval.cli.options.values import PATH
 from infthor_eval.cli.set_checks import set_checks
 from infthor_eval.errors import UsageError, in_one_line
 from infthor_eval.nieh.published.hub_data import default_folder
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 from infthor_eval.terminal import console, print_line, printable
 
 __all__ = ["checks", "command"]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import click
 
 from infthor_eval.errors import UsageError, unknown_name
-from infthor_eval.formats.pairs import read_pairs
+from model_adapters.options.parsing import read_pairs
 
 __all__ = [
     "PATH",

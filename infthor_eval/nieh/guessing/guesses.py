@@ -20,7 +20,7 @@ from infthor_eval.nieh.records import Guess
 from infthor_eval.nieh.scoring import SCORERS, Scorer, score, scores
 from infthor_eval.storage.digests import digest_of_files, fingerprint
 from infthor_eval.storage.files import write_atomically
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 
 __all__ = [
     "find_guesses",

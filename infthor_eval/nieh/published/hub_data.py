@@ -6,7 +6,7 @@ from pathlib import Path
 from infthor_eval.errors import DataError
 from infthor_eval.formats.archive import unpack_tar
 from infthor_eval.formats.nieh_set import NiehSet
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 
 __all__ = ["NIEH_REPOSITORY", "default_folder", "fetch_nieh"]
 

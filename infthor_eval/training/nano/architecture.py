@@ -1,5 +1,4 @@
-"""The untrained small model: Qwen2.5-VL's classes with random weights, and a tokenizer for
-household words.
+"""The untrained small model: Qwen2.5-VL with random weights, and a tokenizer for household words.
 
 A frame is 112 x 112 pixels and takes 16 tokens. Words are single tokens. So is the introduction of
 every question of the published evaluation, which would otherwise be three quarters of a question's
@@ -119,8 +118,7 @@ def _config(recipe: NanoRecipe, ids: dict[str, int], vocab_size: int) -> Any:
 
 
 def _rope_sections(head_width: int) -> list[int]:
-    """Return how many of a head's frequencies encode time, height and width, in about the family's
-    proportion."""
+    """Return a head's frequencies for time, height and width, in about the family's proportion."""
     frequencies = head_width // 2
     space = 3 * frequencies // 8
     return [frequencies - 2 * space, space, space]

@@ -37,7 +37,7 @@ class FrameDataset:
         pixels: patches of each frame, (frames, patches, values), in float16. The tower reads each
             frame twice, as two time steps of a video; this has one of them.
         cells: types in each token's part of the frame, (frames, tokens, types).
-        shown: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames,
+        visible: types that the frame shows near enough to be visible in AI2-THOR's sense, (frames,
             types).
         present: types with any pixel in the frame, (frames, types).
     """
@@ -46,7 +46,7 @@ class FrameDataset:
     types: tuple[str, ...]
     pixels: Tensor
     cells: Tensor
-    shown: Tensor
+    visible: Tensor
     present: Tensor
 
     def index_by_digest(self) -> dict[str, int]:
@@ -81,15 +81,14 @@ def read_frame_dataset(folders: Iterable[Path], image_processor: Any) -> FrameDa
     entries = list(frames.values())
     types = sorted({_type(key) for _, step in entries for key in step.seen or ()})
     labels = [_labels(step.seen or {}, types, frame.size) for frame, step in entries]
-    cells, shown, present = (torch.stack(parts) for parts in zip(*labels, strict=True))
-    with ThreadPoolExecutor(
-        _READER_THREADS
-    ) as readers:  # decoding and resizing release the interpreter lock
+    cells, visible, present = map(torch.stack, zip(*labels, strict=True))
+    # Decoding and resizing release the interpreter lock.
+    with ThreadPoolExecutor(_READER_THREADS) as readers:
         pixels = torch.stack(
             list(readers.map(lambda entry: _patches(entry[0], image_processor), entries))
         )
     return FrameDataset(
-        tuple(frame for frame, _ in entries), tuple(types), pixels, cells, shown, present
+        tuple(frame for frame, _ in entries), tuple(types), pixels, cells, visible, present
     )
 
 
@@ -111,18 +110,18 @@ def _labels(
     seen: dict[str, ObjectInFrame], types: Sequence[str], size: tuple[int, int]
 ) -> tuple[Tensor, Tensor, Tensor]:
     cells = torch.zeros(TOKENS, len(types))
-    shown = torch.zeros(len(types))
+    visible = torch.zeros(len(types))
     present = torch.zeros(len(types))
     coverage = _cell_coverage(
-        torch.tensor([item.box for item in seen.values()]).reshape(-1, 4), size
+        torch.tensor([instance.box for instance in seen.values()]).reshape(-1, 4), size
     )
-    for (key, item), in_cells in zip(seen.items(), coverage, strict=True):
+    for (key, instance), in_cells in zip(seen.items(), coverage, strict=True):
         column = types.index(_type(key))
         present[column] = 1
-        if item.visible and item.pixels >= _LEAST_PIXELS:
-            shown[column] = 1
+        if instance.visible and instance.pixels >= _LEAST_PIXELS:
+            visible[column] = 1
         cells[:, column] = torch.maximum(cells[:, column], in_cells)
-    return cells, shown, present
+    return cells, visible, present
 
 
 def _cell_coverage(boxes: Tensor, size: tuple[int, int]) -> Tensor:

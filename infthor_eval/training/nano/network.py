@@ -1,5 +1,4 @@
-"""The small model as a network with two losses: of sequences, and of the objects in each part of a
-frame.
+"""The small model, with two losses: of sequences, and of the objects in each part of a frame.
 
 The vision loss compares the tower's features with the embeddings of the objects' names, in all
 spellings that occur in texts. So words and images share one space before the decoder is trained.
@@ -68,16 +67,13 @@ class NanoNetwork(SequenceModel):
         return [rows[self._index_by_digest[frame.digest]] for frame in frames]
 
     def frames_of(self, sequences: Sequence[TrainingSequence]) -> tuple[list[int], Tensor]:
-        """Return the indices in the dataset and the features of the frames of some sequences, each
-        frame once."""
+        """Return indices in the dataset and features of the sequences' frames, each frame once."""
         indices = self._indices([frame for sequence in sequences for frame in sequence.frames])
         return indices, self.frame_features(indices)
 
     def _indices(self, frames: Sequence[Frame]) -> list[int]:
-        return [
-            self._index_by_digest[digest]
-            for digest in dict.fromkeys(frame.digest for frame in frames)
-        ]
+        indices = [self._index_by_digest[frame.digest] for frame in frames]
+        return list(dict.fromkeys(indices))
 
     def cache_features(self) -> None:
         """Compute the features of all frames once, for all later sequences; the tower is not
@@ -118,14 +114,14 @@ class NanoNetwork(SequenceModel):
         cell_loss = binary_cross_entropy_with_logits(
             logits, self._dataset.cells[rows], reduction="none"
         )
-        shown = self._dataset.shown[rows]
+        visible = self._dataset.visible[rows]
         present = self._dataset.present[rows]
         frame_loss = binary_cross_entropy_with_logits(
-            torch.logsumexp(logits, 1), shown, reduction="none"
+            torch.logsumexp(logits, 1), visible, reduction="none"
         )
         return (
             cell_loss.sum(-1).mean()
-            + (frame_loss * (1 - present + shown).clamp(max=1)).sum(-1).mean()
+            + (frame_loss * (1 - present + visible).clamp(max=1)).sum(-1).mean()
         )
 
     @property

@@ -1,6 +1,7 @@
 """Random sampling of the small model's training sequences."""
 
 import random
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,16 +17,17 @@ from infthor_eval.nieh.contexts.video import as_images
 from infthor_eval.nieh.docs import doc_target
 from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.samples import find_samples
+from infthor_eval.plans.actors.habits import fill_action, open_action
+from infthor_eval.plans.actors.script import read_plan, replace_objects
 from infthor_eval.plans.history.segments import PlanSegment
 from infthor_eval.training.action_sequences import single_plans, windows
 from infthor_eval.training.data import read_history, trajectory_names
-from infthor_eval.training.encoding import Encoder, SkippedItem, TrainingSequence
+from infthor_eval.training.encoding import Encoder, SkippedSequence, TrainingSequence
 from infthor_eval.training.nano.frame_dataset import FrameDataset
 from infthor_eval.training.nano.network import spellings
-from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from infthor_eval.training.question_sequences import question_sequences
 
-__all__ = ["SequenceSampler", "corpus_texts", "question_intro"]
+__all__ = ["SequenceSampler", "SyntheticPlans", "corpus_texts", "question_intro"]
 
 _LEAST_FRAMES = 20  # frames that have to show a type before synthetic questions ask for it
 _QUESTIONS = ("Have you seen {0}?", "Is there any {1} in this room?")
@@ -92,35 +94,35 @@ class SequenceSampler:
         self._samples: list[tuple[NiehSet, Sample]] = []  # of the questions on their clue frames
         self._windows: list[TrainingSequence] = []
         self._single_plans: list[TrainingSequence] = []
-        self.skipped: list[SkippedItem] = []
+        self.skipped: list[SkippedSequence] = []
         recorded: list[tuple[str, list[str]]] = []
         for folder in folders:
-            samples = find_samples({"data": str(folder), "context": "clues"})
-            self._questions += self._without_skipped(
-                question_sequences(encoder, samples, window_tokens)
-            )
-            self._samples += [(samples.data, sample) for sample in samples.samples]
+            self._read_questions(folder)
             for segments in self._read_histories(NiehSet(folder)):
-                recorded += [
-                    (segment.plan, [action for action, _ in segment.steps]) for segment in segments
-                ]
+                for segment in segments:
+                    recorded.append((segment.plan, [action for action, _ in segment.steps]))
         self._synthetic = SyntheticPlans(recorded)
-        for what, pool in (
-            ("question", self._questions),
-            ("history", self._windows),
-            ("plan", self._synthetic),
-        ):
-            if not pool:
-                raise DataError(
-                    f"{', '.join(map(str, folders))}: no {what} to learn from; give another set"
-                )
-        counts = dataset.shown.sum(0).tolist()
+        self._require_all_kinds(folders)
+        counts = dataset.visible.sum(0).tolist()
         frequent = {
             name: count
             for name, count in zip(dataset.types, counts, strict=True)
             if count >= _LEAST_FRAMES
         }
         self._names, self._weights = list(frequent), list(frequent.values())
+
+    def _read_questions(self, folder: Path) -> None:
+        samples = find_samples({"data": str(folder), "context": "clues"})
+        sequences = question_sequences(self._encoder, samples, self._limit)
+        self._questions += self._without_skipped(sequences)
+        self._samples += [(samples.data, sample) for sample in samples.samples]
+
+    def _require_all_kinds(self, folders: Sequence[Path]) -> None:
+        kinds = {"question": self._questions, "history": self._windows, "plan": self._synthetic}
+        for kind, pool in kinds.items():
+            if not pool:
+                where = ", ".join(map(str, folders))
+                raise DataError(f"{where}: no {kind} to learn from; give another set")
 
     def _read_histories(self, data: NiehSet) -> Iterator[list[PlanSegment]]:
         """Read the histories of a set, skipping those that cannot be read."""
@@ -130,20 +132,20 @@ class SequenceSampler:
                 history_windows = [*windows(self._encoder, name, segments, self._limit)]
                 plans = [*single_plans(self._encoder, name, segments)]
             except DataError as error:
-                self.skipped.append(SkippedItem(name, str(error)))
+                self.skipped.append(SkippedSequence(name, str(error)))
                 continue
             self._windows += self._without_skipped(history_windows)
             self._single_plans += [plan for plan in plans if plan.n_tokens <= self._limit]
             yield segments
 
     def _without_skipped(
-        self, items: Iterable[TrainingSequence | SkippedItem]
+        self, encoded: Iterable[TrainingSequence | SkippedSequence]
     ) -> Iterator[TrainingSequence]:
-        for item in items:
-            if isinstance(item, TrainingSequence):
-                yield item
+        for sequence in encoded:
+            if isinstance(sequence, TrainingSequence):
+                yield sequence
             else:
-                self.skipped.append(item)
+                self.skipped.append(sequence)
 
     def questions(
         self, n: int, synthetic_share: float, recalled_share: float, n_others: int
@@ -176,8 +178,8 @@ class SequenceSampler:
         clues = set() if sample.question.absence else set(sample.frames)
         others = self._rng.sample(range(last), min(self._rng.randint(0, n_others), last))
         recalled = tuple(sorted((clues | set(others)) - {last}))
-        shown = replace(sample, frames=(*recalled, last), recalled=recalled)
-        context, text = CONTEXTS[MEMORY].request(data, shown)
+        remembered = replace(sample, frames=(*recalled, last), recalled=recalled)
+        context, text = CONTEXTS[MEMORY].request(data, remembered)
         return self._encoder.answer(
             "recalled", [*as_images(context), text], doc_target(sample.question)
         )
@@ -222,10 +224,38 @@ class SequenceSampler:
             (name,) = self._rng.choices(self._names, self._weights)
             index = self._rng.randrange(len(self._dataset.frames))
             column = self._dataset.types.index(name)
-            if (self._dataset.shown if is_present else 1 - self._dataset.present)[index, column]:
+            if (self._dataset.visible if is_present else 1 - self._dataset.present)[index, column]:
                 break
         words = noun(name)
         text = self._rng.choice(_QUESTIONS).format(with_article(words), words)
         prompt = question_text(CONTEXTS["clues"].intro, Question("", text, (), ()))
-        answer = "yes" if self._dataset.shown[index, column] else "no"
+        answer = "yes" if self._dataset.visible[index, column] else "no"
         return self._encoder.answer("synthetic", [self._dataset.frames[index], prompt], answer)
+
+
+class SyntheticPlans:
+    """Plans and actions of experts, each object replaced by one of the same role in a similar plan.
+
+    The words of a plan and the objects of its actions correspond, so a model learns which words
+    name which objects.
+    """
+
+    def __init__(self, recorded: Iterable[tuple[str, Sequence[str]]]) -> None:
+        """Group recorded plans by kind, without those whose actions name no object of the plan."""
+        kinds: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
+        for plan, actions in recorded:
+            templates = tuple(open_action(action, plan) for action in actions)
+            if templates != tuple(actions):
+                kinds[read_plan(plan)[0], templates].append(plan)
+        self._kinds = [(templates, plans) for (_, templates), plans in kinds.items()]
+
+    def __bool__(self) -> bool:
+        """Return True if any plan can be sampled."""
+        return bool(self._kinds)
+
+    def sample(self, rng: random.Random) -> tuple[str, list[str]]:
+        """Return a plan and its actions; kinds are as frequent as in the recorded plans."""
+        ((templates, plans),) = rng.choices(self._kinds, [len(plans) for _, plans in self._kinds])
+        columns = zip(*(read_plan(plan)[1] for plan in plans), strict=True)
+        plan = replace_objects(plans[0], [rng.choice(column) for column in columns])
+        return plan, [fill_action(action, plan) for action in templates]

@@ -81,7 +81,7 @@ def train_small_model(
         words=recipe.words,
         seed=recipe.seed,
     )
-    for _, reason, n in count_reasons(("", item.reason) for item in sampler.skipped):
+    for _, reason, n in count_reasons(("", skipped.reason) for skipped in sampler.skipped):
         print_note(f"{n} skipped: {reason}")
     trainer = _StageTrainer(recipe, network, sampler, on_step)
     network.train()
@@ -90,9 +90,8 @@ def train_small_model(
     trainer.run("text", recipe.text_steps, trainer.text_step)
     trainer.run("joint", recipe.joint_steps, trainer.joint_step)
     network.eval()
-    loaded.model.to(
-        torch.bfloat16
-    )  # halves the file; no answer of the bundled model depends on the rounding
+    # Halves the file; no answer of the bundled model depends on the rounding.
+    loaded.model.to(torch.bfloat16)
     return loaded
 
 
@@ -153,8 +152,7 @@ class _StageTrainer:
         return loss + recipe.vision_weight * vision_loss, loss.detach()
 
     def joint_step(self) -> tuple[Tensor, Tensor]:
-        """Return the loss of questions, histories and synthetic plans, plus that of the questions'
-        frames.
+        """Return the loss of questions, histories, synthetic plans, and of the questions' frames.
 
         Answers and actions have the same weight, though most tokens are actions.
         """
@@ -183,8 +181,7 @@ class _StageTrainer:
         )
 
     def _token_loss(self, sequences: Sequence[TrainingSequence]) -> Tensor:
-        """Return the mean loss per token of some sequences, which are computed in batches of about
-        one length.
+        """Return the mean loss per token of sequences, in batches of about one length.
 
         A question on one frame has 40 tokens, one behind a memory 300: most of a single batch would
         be padding.

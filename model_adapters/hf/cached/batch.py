@@ -1,5 +1,4 @@
-"""Continuations of one encoded prefix, answered together: behind the prefix in one sequence,
-decoded in lockstep."""
+"""Continuations of an encoded prefix, together: in one sequence behind it, decoded in lockstep."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -25,19 +24,17 @@ class _Branches:
         self._embed = embed
         self._prefix = prefix
         self._ends = [prefix.end] * n_branches  # position of the next token of each
-        self._places = [prefix.n_tokens] * n_branches  # tokens of each, with the prefix
+        self._lengths = [prefix.n_tokens] * n_branches  # tokens of each, with the prefix
         device = model.get_input_embeddings().weight.device
         self._attention = BranchAttention(model.get_decoder().config, prefix.n_tokens, device)
 
     @torch.inference_mode()
     def feed(self, continuations: Sequence[Sequence[Piece]], chunk_tokens: int) -> torch.Tensor:
-        """Encode all continuations; return the logits of each one's next token, (branches,
-        vocabulary)."""
+        """Encode all continuations; return each next token's logits, (branches, vocabulary)."""
         logits: dict[int, torch.Tensor] = {}
         for group in self._groups(continuations, chunk_tokens):
-            logits |= self._forward(
-                group
-            )  # the last chunk of a branch has the logits of its next token
+            # The last chunk of a branch has the logits of its next token.
+            logits |= self._forward(group)
         return torch.stack([logits[branch] for branch in range(len(continuations))])
 
     def _groups(
@@ -60,16 +57,14 @@ class _Branches:
 
     @torch.inference_mode()
     def step(self, tokens: Mapping[int, int]) -> torch.Tensor:
-        """Feed one token to each of some branches; return the logits of the next, (these branches,
-        vocabulary)."""
+        """Feed a token to some branches; return the next logits, (these branches, vocabulary)."""
         span = self._embed.words(list(tokens.values()), [self._ends[branch] for branch in tokens])
         for branch in tokens:
             self._ends[branch] += 1
         return self._logits(span.embeds, span.positions, list(tokens), slice(None))
 
     def _forward(self, group: Sequence[_Span]) -> dict[int, torch.Tensor]:
-        """Encode chunks of branches; return the logits behind each branch's last one,
-        (vocabulary,)."""
+        """Encode chunks of branches; return the logits behind each branch's last, (vocabulary,)."""
         owners = [branch for branch, span in group for _ in span.embeds]
         last = {branch: at for at, branch in enumerate(owners)}
         positions = torch.cat([span.positions for _, span in group], dim=-1)
@@ -84,13 +79,12 @@ class _Branches:
         owners: Sequence[int],
         keep: slice | torch.Tensor,
     ) -> torch.Tensor:
-        """Encode tokens of the owners' branches; return the logits of the kept ones, (kept,
-        vocabulary)."""
-        places = []
+        """Encode tokens of the owners' branches; return the kept logits, (kept, vocabulary)."""
+        n_before = []
         for branch in owners:
-            places.append(self._places[branch])
-            self._places[branch] += 1
-        with self._attention.appended(owners, places):
+            n_before.append(self._lengths[branch])
+            self._lengths[branch] += 1
+        with self._attention.appended(owners, n_before):
             output = self._model(
                 inputs_embeds=embeds[None],
                 position_ids=positions,
@@ -112,8 +106,7 @@ def answer_together(
     replies: Sequence[ReplyState],
     chunk_tokens: int,
 ) -> None:
-    """Decode the replies to prompts that begin with the same `n_shared` pieces, each prompt with
-    more behind them.
+    """Decode the replies to prompts whose first `n_shared` pieces, and no more, are the same.
 
     `prefix` has encoded the shared pieces and nothing more, and has no more afterwards; `replies`
     are empty, one for each prompt.

@@ -31,8 +31,7 @@ def can_branch(model: Any) -> bool:
 
 
 class BranchAttention:
-    """Attention in a sequence that is a prefix and branches, which are continuations of it in
-    pieces of any order.
+    """Attention in a sequence of a prefix and branches, its continuations, in pieces of any order.
 
     Args:
         config: config of the decoder.
@@ -43,31 +42,28 @@ class BranchAttention:
     def __init__(self, config: Any, n_prefix: int, device: torch.device) -> None:
         self._config = config
         self._n_prefix = n_prefix
-        self._branches = torch.empty(
-            0, dtype=torch.long, device=device
-        )  # branch of each token behind the prefix
-        self._places = torch.empty(
-            0, dtype=torch.long, device=device
-        )  # place of each in prefix and branch
+        # Branch of each token behind the prefix.
+        self._branches = torch.empty(0, dtype=torch.long, device=device)
+        # Position of each in prefix and branch.
+        self._positions = torch.empty(0, dtype=torch.long, device=device)
         self._n_new = 0
         self._masks: dict[tuple[int | None, torch.device], Tensor] = {}
         self._n_calls = 0
 
     @contextmanager
-    def appended(self, branches: Sequence[int], places: Sequence[int]) -> Iterator[None]:
-        """Attend in this way within the context, in which the decoder is given some more tokens
-        once.
+    def appended(self, branches: Sequence[int], n_before: Sequence[int]) -> Iterator[None]:
+        """Attend this way within the context, in which the decoder is given more tokens once.
 
         Args:
             branches: the branch of each token.
-            places: the tokens before it in its branch and the prefix.
+            n_before: number of tokens before each in its branch and the prefix.
 
         Raises:
             ModelError: the decoder has layers that do not attend by transformers' interface.
         """
-        new = torch.tensor([branches, places]).to(self._branches.device)
+        new = torch.tensor([branches, n_before]).to(self._branches.device)
         self._branches = torch.cat((self._branches, new[0]))
-        self._places = torch.cat((self._places, new[1]))
+        self._positions = torch.cat((self._positions, new[1]))
         self._n_new = len(branches)
         self._masks.clear()
         self._n_calls = 0
@@ -135,8 +131,7 @@ class BranchAttention:
         return output.flatten(0, 1).transpose(0, 1)[None], None
 
     def _mask(self, window: int | None, query: Tensor) -> Tensor:
-        """Return what is added to the scores, (new tokens, all tokens): 0 or minus infinity, beside
-        the queries."""
+        """Return what is added to scores, (new tokens, all tokens): 0 or minus infinity."""
         key = (window, query.device)  # a model can be on several devices
         if key not in self._masks:
             self._masks[key] = self._new_mask(window, query.dtype).to(query.device)
@@ -145,13 +140,13 @@ class BranchAttention:
     def _new_mask(self, window: int | None, dtype: torch.dtype) -> Tensor:
         new = slice(len(self._branches) - self._n_new, None)
         own = self._branches[new, None]
-        at = self._places[new, None]
-        seen = (self._branches == own) & (self._places <= at)
+        at = self._positions[new, None]
+        seen = (self._branches == own) & (self._positions <= at)
         mask = torch.zeros(
             self._n_new, self._n_prefix + len(self._branches), dtype=dtype, device=seen.device
         )
         mask[:, self._n_prefix :].masked_fill_(~seen, -torch.inf)
         if window is not None:
             prefix = torch.arange(self._n_prefix, device=seen.device)
-            mask.masked_fill_(torch.cat((prefix, self._places)) <= at - window, -torch.inf)
+            mask.masked_fill_(torch.cat((prefix, self._positions)) <= at - window, -torch.inf)
         return mask

@@ -39,8 +39,7 @@ _UNSUPPORTED: dict[str, tuple[Any, ...]] = {
 
 @dataclass(frozen=True)
 class Generation:
-    """The generation settings of a checkpoint that are used; sampling settings come with each
-    request.
+    """The generation settings of a checkpoint that are used; requests have those of sampling.
 
     Attributes:
         end_ids: tokens that end the turn.
@@ -116,8 +115,8 @@ class ReplyState:
         self._generation = generation
         self._choices = choices
         self._finished = finished
-        asked = decoding.repetition_penalty
-        self._penalty = generation.repetition_penalty if asked is None else asked
+        penalty = decoding.repetition_penalty
+        self._penalty = generation.repetition_penalty if penalty is None else penalty
         # The penalty depends on the set of tokens, not on their counts.
         self._penalised_ids = (
             torch.tensor([list(set(context))], dtype=torch.long) if self._penalty != 1.0 else None
@@ -161,13 +160,11 @@ class ReplyState:
         self.done = len(self.ids) == self.decoding.max_new_tokens or self._ends_here()
 
     def _penalise(self, logits: torch.Tensor) -> torch.Tensor:
-        """Return logits with those of earlier tokens lowered by transformers' repetition
-        penalty."""
+        """Return logits with earlier tokens' lowered by transformers' repetition penalty."""
         if self._penalised_ids is None:
             return logits
-        self._penalised_ids = self._penalised_ids.to(
-            logits.device
-        )  # copied once, then extended on the device
+        # Copied once, then extended on the device.
+        self._penalised_ids = self._penalised_ids.to(logits.device)
         penalty = RepetitionPenaltyLogitsProcessor(self._penalty)
         return penalty(cast(Any, self._penalised_ids), cast(Any, logits[None]))[0]
 

@@ -26,9 +26,8 @@ class _Allocation:
     memory beside their successors until Python's cyclic garbage collector runs.
     """
 
-    storage: (
-        torch.device | None
-    )  # device of the buffers; the device of the layers' weights where None
+    # Device of the buffers; the device of the layers' weights where None.
+    storage: torch.device | None
     capacity: int = 0  # tokens that a buffer holds when it is next allocated
 
 
@@ -36,8 +35,7 @@ class BufferedCache(Cache):
     """A cache of `BufferedLayer`s, which are created as the model reaches its layers."""
 
     def __init__(self, storage: torch.device | None = None) -> None:
-        """Create an empty cache with buffers on the `storage` device; on that of the layers'
-        weights where None.
+        """Create an empty cache with buffers on the device `storage`, or the weights' where None.
 
         With the CPU as storage, only the computing layer's keys and values are on the weights'
         device: a context that does not fit on the device runs, at the speed of the connection.
@@ -59,8 +57,7 @@ class BufferedCache(Cache):
         return super().update(key_states, value_states, layer_idx, *args, **kwargs)
 
     def reserve(self, n_tokens: int) -> None:
-        """Set the capacity of buffers that are allocated from now on, so that they need not grow
-        step by step."""
+        """Set the capacity of buffers allocated from now on, so that they need not grow."""
         self._allocation.capacity = -(-n_tokens // _STEP) * _STEP
 
     def truncate(self, n_tokens: int) -> None:

@@ -1,5 +1,4 @@
-"""Any transformers model of a known family as a `Model`: conversations that share one encoded
-prefix."""
+"""Any transformers model of a known family as a `Model`; conversations share an encoded prefix."""
 
 from collections.abc import Sequence
 
@@ -12,13 +11,13 @@ from model_adapters.hf.cached.decoding import ReplyState, decode_replies
 from model_adapters.hf.cached.prefix import Prefix
 from model_adapters.hf.cached.replies import begin_reply, end_reply
 from model_adapters.hf.checkpoint_model import HfModel
+from model_adapters.hf.global_settings import torch_threads
 from model_adapters.hf.limits import check_limit, wrap_memory_errors, wrap_model_errors
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.hf.loading.rope import take_length_rope
 from model_adapters.hf.prompting.embedding import Embedder
 from model_adapters.hf.prompting.features import FeatureCache
 from model_adapters.hf.prompting.prompt import Piece, n_common, n_tokens, token_ids
-from model_adapters.hf.threads import torch_threads
 from model_adapters.options.checkpoints import HfOptions
 from model_adapters.protocols import Decoding, Reply, Turn
 
@@ -62,8 +61,7 @@ class TransformersModel(HfModel):
         super().close()
 
     def encode(self, pieces: Sequence[Piece]) -> torch.Tensor:
-        """Encode a prompt from scratch, in two parts; return the logits of the next token,
-        (vocabulary,)."""
+        """Encode a prompt anew, in two parts; return the next token's logits, (vocabulary,)."""
         self._prefix.reset()
         self._prefix.rewind_to(pieces)
         self._prefix.feed(pieces[:2])
@@ -130,8 +128,7 @@ class TransformersModel(HfModel):
     def _decode_branches(
         self, prompts: Sequence[Sequence[Piece]], replies: Sequence[ReplyState]
     ) -> list[int]:
-        """Decode several replies together; return how many tokens of each prompt were in the
-        cache."""
+        """Decode replies together; return how many tokens of each prompt were in the cache."""
         common = n_common(prompts)
         shared = min(self._prefix.rewind_to(prompts[0]), common)
         # The cached sequence may share more with the first prompt than all prompts share.

@@ -59,9 +59,8 @@ class Prefix:
         self._cache = BufferedCache(self._storage)
         self._pieces: list[Piece] = []
         self._ends: list[int] = []  # tokens up to the end of each piece
-        self._starts: list[int] = [
-            0
-        ]  # position behind everything before each piece, and of the next token
+        # Position behind everything before each piece, and of the next token.
+        self._starts: list[int] = [0]
 
     @property
     def n_tokens(self) -> int:
@@ -113,8 +112,7 @@ class Prefix:
         return shared
 
     def _set_rope(self, rope: LengthRope, pieces: Sequence[Piece]) -> None:
-        """Set the rotary frequencies for a prompt; a sequence that was encoded with others is
-        dropped."""
+        """Set the rotary frequencies for a prompt; a sequence encoded with others is dropped."""
         ids = torch.tensor(list(token_ids(pieces)))
         shapes = [piece.shape for piece in pieces if not isinstance(piece, int)]
         n_positions = int(self._family.positions(ids, shapes, 0).max()) + 1

@@ -7,7 +7,7 @@ from model_adapters.hf.cached.choices import read_choices
 from model_adapters.hf.cached.decoding import ReplyState
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
 from model_adapters.protocols import Decoding, Reply
-from model_adapters.stopping import cut_at_stop
+from model_adapters.thinking import cut_at_stop
 
 __all__ = ["begin_reply", "end_reply", "reply_text", "stop_ids"]
 
@@ -63,8 +63,7 @@ def stop_ids(tokenizer: Any, decoding: Decoding) -> set[int]:
 
 
 def _text(loaded: LoadedCheckpoint, ids: Sequence[int]) -> str:
-    """Return the text of a reply without special tokens, but for those that mark what the model
-    thinks."""
+    """Return a reply's text without special tokens, but for those around what the model thinks."""
     pieces: list[str] = []
     start = 0
     for at, token in enumerate(ids):

@@ -46,10 +46,8 @@ from model_adapters.protocols import Model, Part, Turn
 
 __all__ = ["HfVlm", "ProcessorFamily", "family_of", "load_processor", "require_same_ids"]
 
-_TOLERANCE = {
-    torch.float32: 1e-3,
-    torch.float64: 1e-3,
-}  # relative to the largest logit; more in half precision
+# Relative to the largest logit; more in half precision.
+_TOLERANCE = {torch.float32: 1e-3, torch.float64: 1e-3}
 _HALF_TOLERANCE = 0.1
 _BLANK = (300, 300)  # width and height of a sample image
 
@@ -73,8 +71,7 @@ class ProcessorFamily(PlainFamily):
         return tuple(expand_image_token(self._processor, Image.new("RGB", size, "gray")))
 
     def template_ids(self, placeholder_id: int) -> tuple[int, ...]:
-        """Return the placeholder, between the config's markers unless the processor adds them
-        itself."""
+        """Return the placeholder, between the config's markers unless the processor adds them."""
         markers = _markers(self._model.config)
         if markers is None or markers[0] in self.frame_ids(_BLANK):
             return (placeholder_id,)
@@ -98,10 +95,10 @@ class ProcessorFamily(PlainFamily):
 
 
 def _markers(config: Any) -> tuple[int, int] | None:
-    """Return the tokens that begin and end an image, by the names that configs use for them, or
-    None."""
+    """Return the tokens that begin and end an image, by configs' names for them, or None."""
     for kind in ("vision", "image"):
-        start, end = (getattr(config, f"{kind}_{side}_token_id", None) for side in ("start", "end"))
+        start = getattr(config, f"{kind}_start_token_id", None)
+        end = getattr(config, f"{kind}_end_token_id", None)
         if start is not None and end is not None:
             return start, end
     return None
@@ -171,8 +168,7 @@ def family_of(config: Any) -> MakeFamily | None:
 
 
 def load_processor(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the checkpoint's processor of images and text, for architectures without their own
-    family.
+    """Return the checkpoint's processor of images and text, for architectures without a family.
 
     Raises:
         ModelError: the checkpoint has none, or it cannot be loaded.
@@ -215,8 +211,7 @@ def _compare_with_plain_model(
     processor: Any,
     pretrained: str,
 ) -> None:
-    """Raise `ModelError` unless a sample has the processor's token ids and the plain model's
-    logits."""
+    """Raise `ModelError` unless a sample has the processor's ids and the plain model's logits."""
     hint = (
         f"{loaded.model.config.model_type} cannot be run with shared prefixes; use "
         "share_prefix=false"

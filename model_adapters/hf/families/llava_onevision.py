@@ -1,5 +1,4 @@
-"""LLaVA-OneVision: a frame of 300x300 takes 1485 tokens, an overview and the frame with a break
-after each row.
+"""LLaVA-OneVision: a frame of 300x300 takes 1485 tokens: overview, frame, breaks after rows.
 
 A frame of a video takes 196 tokens (`llava_video`).
 """
@@ -30,8 +29,7 @@ class LlavaOnevisionFamily(PlainFamily):
         self.video = LlavaVideo(model, image_processor)
 
     def features(self, images: Sequence[Image.Image]) -> list[torch.Tensor]:
-        """Return the packed features of overview, patches and row breaks for each image, (tokens,
-        hidden)."""
+        """Return each image's packed features, (tokens, hidden): overview, patches, row breaks."""
         inputs = self._inputs(images)
         output = self._model.get_image_features(
             inputs["pixel_values"], inputs["image_sizes"], return_dict=True

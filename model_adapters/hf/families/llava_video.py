@@ -30,8 +30,7 @@ class LlavaVideo:
         self.placeholder_id: int = model.config.video_token_id
 
     def n_tokens(self, shape: ClipShape) -> int:
-        """Return one token for each square of pooled patches, and one for the break after the last
-        frame."""
+        """Return a token for each square of pooled patches, and one for the last frame's break."""
         vision = self._model.config.vision_config
         side = math.ceil(vision.image_size // vision.patch_size / _POOLED)
         return side**2 + _is_last(shape)

@@ -1,5 +1,4 @@
-"""Pixtral 12B: a frame of 300x300 takes 380 tokens, 19 rows of 19 and a token that ends each
-row."""
+"""Pixtral 12B: a frame of 300x300 takes 380 tokens, 19 rows of 19 and a token after each row."""
 
 from collections.abc import Sequence
 from typing import Any

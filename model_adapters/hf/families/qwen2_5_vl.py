@@ -1,24 +1,29 @@
-"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between two markers, with three-axis (multimodal)
-positions.
+"""Qwen2.5-VL: a frame of 300x300 takes 121 tokens between markers, with three-axis positions.
 
 Two frames of a video take 144 tokens together, all of a video between two markers (`qwen_video`).
 """
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
 import torch
 from PIL import Image
 
+from infthor_eval.storage.folders import packaged_folder
 from model_adapters.hf.adapter import CheckpointAdapter
+from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.hf.families.plain import PlainFamily
 from model_adapters.hf.families.qwen_video import QwenVideo
 from model_adapters.hf.family import ClipShape, Shape, Size
-from model_adapters.options.families import Qwen25VLOptions
+from model_adapters.options.checkpoints import CheckpointOptions
+from model_adapters.options.families import Qwen25VLNanoOptions, Qwen25VLOptions
 
-__all__ = ["Qwen25VL", "Qwen25VLFamily"]
+__all__ = ["NANO_FOLDER", "Qwen25VL", "Qwen25VLFamily", "Qwen25VLNano"]
+
+NANO_FOLDER = "models/qwen2.5-vl-nano"
 
 
 class Qwen25VLFamily(PlainFamily):
@@ -71,8 +76,7 @@ class Qwen25VLFamily(PlainFamily):
     def _runs(
         self, ids: torch.Tensor, shapes: Sequence[Shape]
     ) -> Iterator[ClipShape | tuple[torch.Tensor, list[Size]]]:
-        """Yield each clip of a span, and the ids of what is between clips with the sizes of its
-        frames."""
+        """Yield each clip of a span, and the ids between clips with the sizes of their frames."""
         left = list(shapes)
         for in_video, run in groupby(
             ids.tolist(), lambda token: token == self._clips.placeholder_id
@@ -101,8 +105,7 @@ class Qwen25VLFamily(PlainFamily):
         return positions + start
 
     def _grid(self, size: Size) -> tuple[int, int, int]:
-        """Return the patches of an image of this size along time, height and width, by the image
-        processor."""
+        """Return an image's patches along time, height and width, by the image processor."""
         if size not in self._grids:
             inputs = self._image_processor(images=[Image.new("RGB", size)], return_tensors="pt")
             time, height, width = inputs["image_grid_thw"][0].tolist()
@@ -116,3 +119,21 @@ class Qwen25VL(CheckpointAdapter):
     Options = Qwen25VLOptions
     family = Qwen25VLFamily
     model_types = ("qwen2_5_vl",)
+
+
+class Qwen25VLNano(CheckpointAdapter):
+    """The adapter `qwen2.5-vl-nano`."""
+
+    Options = Qwen25VLNanoOptions
+    family = Qwen25VLFamily
+    model_types = ("qwen2_5_vl",)
+
+    @classmethod
+    def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:
+        """Load the checkpoint of the package, or another one of the same form.
+
+        Raises:
+            ModelError: the checkpoint cannot be loaded.
+        """
+        pretrained = options.pretrained or str(packaged_folder(NANO_FOLDER))
+        return super().build(name, replace(options, pretrained=pretrained), seed)

@@ -1,5 +1,4 @@
-"""The video input of Qwen2.5-VL: two frames make a temporal patch, of 144 tokens for frames of
-300x300.
+"""The video input of Qwen2.5-VL: two frames make a temporal patch, 144 tokens for 300x300.
 
 Frames are sized as qwen-vl-utils does it, which the published evaluation used. The checkpoint's own
 video processor needs torchvision, so pixels come from its image processor, which scales each frame
@@ -82,13 +81,11 @@ class QwenVideo:
         return torch.stack([time, rows, columns])[:, None]
 
     def _n_positions(self, shape: ClipShape, number: int) -> int:
-        """Return the number of positions that a video takes up to and with a clip of this
-        number."""
+        """Return the number of positions of a video up to and with a clip of this number."""
         return max(self._time(shape, number) + 1, *self._merged_sides(shape))
 
     def _time(self, shape: ClipShape, number: int) -> int:
-        """Return the temporal position of a clip in its video; Qwen2-VL counts clips, Qwen2.5-VL
-        time."""
+        """Return a clip's temporal position; Qwen2-VL counts clips, Qwen2.5-VL time."""
         per_second = getattr(self._model.config.vision_config, "tokens_per_second", None)
         return number if per_second is None else int(number * per_second * shape.seconds)
 
@@ -106,8 +103,7 @@ class QwenVideo:
         return self._sides[key]
 
     def _limits(self, shape: ClipShape) -> dict[str, int]:
-        """Return the limits of a frame's area: those of qwen-vl-utils, within those of the image
-        processor.
+        """Return the limits of a frame's area: qwen-vl-utils', within the image processor's.
 
         The clips of a long video share the pixels that a video may have.
         """
@@ -119,8 +115,7 @@ class QwenVideo:
         return {"shortest_edge": lower, "longest_edge": int(min(max(upper, least), most))}
 
     def _interleave(self, pixels: torch.Tensor, n_frames: int) -> torch.Tensor:
-        """Return the patches of a clip, (patches, channels x frames x area), from those of its
-        frames.
+        """Return a clip's patches, (patches, channels x frames x area), from its frames'.
 
         The image processor repeats an image along time; of each frame, its own place in time is
         taken.
@@ -130,5 +125,5 @@ class QwenVideo:
             n_frames, -1, pixels.shape[-1] // (n_frames * area), n_frames, area
         )
         return torch.stack(
-            [by_frame[place, :, :, place] for place in range(n_frames)], dim=2
+            [by_frame[index, :, :, index] for index in range(n_frames)], dim=2
         ).flatten(1)

@@ -16,8 +16,7 @@ _MOST_BYTES = 1_000_000  # of a card
 
 
 def read_card_words(folder: Path) -> str | None:
-    """Return the words that a checkpoint was trained on; None if it has no card, or the card does
-    not say so."""
+    """Return the words that a checkpoint was trained on; None if no card says so."""
     path = folder / "README.md"
     if not path.is_file() or path.stat().st_size > _MOST_BYTES:
         return None
@@ -26,12 +25,9 @@ def read_card_words(folder: Path) -> str | None:
         return None
     try:
         metadata = yaml.safe_load("\n".join(lines[1 : lines.index(_DASHES, 1)]))
-    except (
-        yaml.YAMLError,
-        RecursionError,
-        ValueError,
-        TypeError,
-    ):  # the last two: of dates and keys that are none
-        return None  # a card of somebody else, which need not be ours to read
+    except (yaml.YAMLError, RecursionError, ValueError, TypeError):
+        # The last two: of dates and keys that are none. A card of somebody else need not be ours to
+        # read.
+        return None
     words = metadata.get(WORDS) if isinstance(metadata, dict) else None
     return words if isinstance(words, str) else None

@@ -23,10 +23,10 @@ from infthor_eval.formats.reading import require_plain_files
 from infthor_eval.storage.digests import digest, digest_of_files
 from model_adapters.hf.cached.decoding import read_generation
 from model_adapters.hf.family import Family, MakeFamily
+from model_adapters.hf.global_settings import hide_transformers_output
 from model_adapters.hf.loading.card import read_card_words
 from model_adapters.hf.loading.hub import fetch
 from model_adapters.hf.loading.loaded import LoadedCheckpoint
-from model_adapters.hf.loading.quiet import hide_transformers_output
 from model_adapters.hf.loading.rope import apply_rope
 from model_adapters.hf.prompting.templates import chat_template, plain_template
 from model_adapters.options.checkpoints import CheckpointOptions, CheckpointReading, Placement
@@ -135,8 +135,7 @@ def read_checkpoint(
 
 
 def build_meta_model(located: LocatedCheckpoint[Any]) -> Any:
-    """Return the model of a checkpoint on torch's meta device: shapes without weights, which take
-    no memory.
+    """Return a checkpoint's model on torch's meta device: shapes without weights or memory.
 
     It is enough for counting a frame's tokens, if another engine has the weights.
     """
@@ -159,8 +158,7 @@ def assemble(
     max_tokens: int | None,
     origin: Mapping[str, Any],
 ) -> LoadedCheckpoint:
-    """Combine loaded parts and derive their identity, which begins with `origin`, the source of the
-    weights.
+    """Combine loaded parts and derive their identity, which begins with the weights' `origin`.
 
     Raises:
         ModelError: the generation settings are not supported, or min_pixels exceeds max_pixels.
@@ -199,8 +197,7 @@ def _check_pixels(image_processor: Any) -> None:
 
 
 def origin(folder: Path, commit: str | None, pretrained: str) -> dict[str, Any]:
-    """Return the source of weights, for an identity, and what it was trained on if its card says
-    so.
+    """Return the source of weights, for an identity, and what the card says it was trained on.
 
     The commit is None for a folder of the user's.
     """

@@ -50,7 +50,7 @@ class LoadedCheckpoint:
         markers = {text for pair in MARKERS.values() for text in pair}
         added = self.tokenizer.added_tokens_decoder.items()
         return {
-            token: str(item.content)
-            for token, item in added
-            if item.special and item.content in markers
+            token: str(special_token.content)
+            for token, special_token in added
+            if special_token.special and special_token.content in markers
         }

@@ -33,8 +33,7 @@ class EmbeddedSpan:
 
 
 class Embedder:
-    """Embeds spans of prompts for one model of a family, with a cache of the features of frames and
-    clips."""
+    """Embeds spans of prompts for one model, with a cache of features of frames and clips."""
 
     def __init__(self, model: Any, family: Family, features: FeatureCache) -> None:
         self._family = family

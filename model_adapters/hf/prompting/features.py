@@ -25,8 +25,7 @@ class FeatureCache:
 
     @torch.inference_mode()
     def get(self, pieces: Sequence[Frame | Clip]) -> list[torch.Tensor]:
-        """Return the features of each piece, (slots, hidden), in order; missing ones are computed
-        in one batch.
+        """Return each piece's features, (slots, hidden), in order; computes missing ones together.
 
         Raises:
             DataError: a frame cannot be decoded.
@@ -48,12 +47,13 @@ class FeatureCache:
         clips = [piece for piece in pieces if isinstance(piece, Clip)]
         features: dict[Frame | Clip, torch.Tensor] = {}
         if frames:
-            features |= zip(
-                frames, self._family.features([frame.ref.load() for frame in frames]), strict=True
-            )
+            images = [frame.ref.load() for frame in frames]
+            features |= zip(frames, self._family.features(images), strict=True)
         if clips and self._family.video is not None:
-            loaded = [(clip.shape, [ref.load() for ref in clip.refs]) for clip in clips]
-            features |= zip(clips, self._family.video.features(loaded), strict=True)
+            videos = []
+            for clip in clips:
+                videos.append((clip.shape, [ref.load() for ref in clip.refs]))
+            features |= zip(clips, self._family.video.features(videos), strict=True)
         return features
 
     def _store(self, features: dict[Frame | Clip, torch.Tensor]) -> None:

@@ -69,8 +69,7 @@ def n_tokens(pieces: Sequence[Piece]) -> int:
 
 
 def n_common(prompts: Sequence[Sequence[Piece]]) -> int:
-    """Return the number of pieces that all prompts begin with; at least one piece of each is left
-    over."""
+    """Return how many pieces all prompts begin with; at least one piece of each is left over."""
     first = min(prompts, key=len)
     for at, piece in enumerate(first[:-1]):
         if any(prompt[at] is not piece and prompt[at] != piece for prompt in prompts):
@@ -166,19 +165,12 @@ class Prompter:
             )
         refs = (*refs, *refs[-1:] * (-len(refs) % per_clip))
         groups = [refs[at : at + per_clip] for at in range(0, len(refs), per_clip)]
-        shapes = [
-            ClipShape(size, number, len(groups), per_clip / video.fps)
-            for number in range(len(groups))
-        ]
-        return [
-            Clip(
-                tuple(ref.digest for ref in group),
-                shape,
-                (converter.placeholder_id,) * converter.n_tokens(shape),
-                group,
-            )
-            for group, shape in zip(groups, shapes, strict=True)
-        ]
+        clips = []
+        for number, group in enumerate(groups):
+            shape = ClipShape(size, number, len(groups), per_clip / video.fps)
+            ids = (converter.placeholder_id,) * converter.n_tokens(shape)
+            clips.append(Clip(tuple(ref.digest for ref in group), shape, ids, group))
+        return clips
 
     def _check_placeholders(
         self, ids: Sequence[int], placeholder: int, n: int, kind: str, part: str

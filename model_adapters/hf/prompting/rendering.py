@@ -10,8 +10,12 @@ from jinja2 import TemplateError
 from infthor_eval.errors import ModelError, wrap_errors
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.storage.limits import TEMPLATE_CHARACTERS, TEMPLATE_MB, TEMPLATE_SECONDS
-from model_adapters.hf.prompting.memory_limit import OutOfMemoryError, limit_memory
-from model_adapters.hf.prompting.time_limit import OutOfTimeError, limit_time
+from model_adapters.hf.prompting.template_limits import (
+    OutOfMemoryError,
+    OutOfTimeError,
+    limit_memory,
+    limit_time,
+)
 from model_adapters.protocols import Part, Turn, Video
 
 __all__ = ["Marks", "prompt_end", "render", "starts_with_bos", "writes_videos"]
@@ -80,8 +84,7 @@ def starts_with_bos(tokenizer: Any, text: str) -> bool:
 
 
 def writes_videos(tokenizer: Any, template: str, marks: Marks) -> bool:
-    """Return whether a template writes the token of a video where a turn has one; no video is
-    looked at."""
+    """Return whether a template writes a video's token where a turn has one; without a video."""
     if marks.video is None:
         return False
     messages = [
@@ -108,14 +111,13 @@ def _render_alone(tokenizer: Any, template: str, turn: Turn) -> str | None:
 
 
 def prompt_end(tokenizer: Any, template: str) -> str:
-    """Return what the template writes behind a turn of the user; empty if it refuses one without
-    frames."""
-    asked = "?"
+    """Return what the template writes behind a user's turn; empty if it needs frames there."""
+    probe = "?"
     try:
-        text = _apply(tokenizer, template, (turn := Turn("user", (asked,)),), [_message(turn)])
+        text = _apply(tokenizer, template, (turn := Turn("user", (probe,)),), [_message(turn)])
     except ModelError:
         return ""
-    return text.rpartition(asked)[2]
+    return text.rpartition(probe)[2]
 
 
 def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:
@@ -136,16 +138,13 @@ def _with_frames_in_place(turn: Turn, trial: str | None, marks: Marks) -> Turn:
 
 
 def _message(turn: Turn) -> dict[str, Any]:
-    return {"role": turn.role, "content": [_item(part) for part in turn.parts]}
+    return {"role": turn.role, "content": [_content_part(part) for part in turn.parts]}
 
 
-def _item(part: Part) -> dict[str, str]:
+def _content_part(part: Part) -> dict[str, str]:
     if isinstance(part, str):
-        return {
-            "type": "text",
-            "text": part,
-            "content": part,
-        }  # most templates read "text", a few "content"
+        # Most templates read "text", a few "content".
+        return {"type": "text", "text": part, "content": part}
     return {"type": "video" if isinstance(part, Video) else "image"}
 
 

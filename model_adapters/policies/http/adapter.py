@@ -31,8 +31,7 @@ class HttpPolicy:
         return Capabilities(counts_tokens=False, token_ids=False, deterministic=False)
 
     def identity(self) -> dict[str, Any]:
-        """Return address and form of requests, as JSON values; the policy behind the address is
-        unknown."""
+        """Return address and form of requests, as JSON values; the policy is unknown."""
         options = self._options
         return {
             "adapter": self.name,

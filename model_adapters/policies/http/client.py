@@ -87,8 +87,7 @@ class JsonClient:
             raise self._timeout_error() from error
 
     def _read(self, reply: http.client.HTTPResponse) -> bytes:
-        """Read the whole reply within the limit; a socket's own timeout restarts with every
-        piece."""
+        """Read the whole reply within the limit; a socket's timeout restarts with each piece."""
         content = b""
         end = time.monotonic() + self._timeout_s
         while piece := reply.read1(_PIECE):

@@ -1,5 +1,4 @@
-"""Arrays in JSON in the form of the package json_numpy, which servers of the `/act` convention
-expect."""
+"""Arrays in JSON as by the package json_numpy, which servers of the `/act` convention expect."""
 
 import base64
 import binascii
@@ -42,7 +41,7 @@ def decode_numbers(value: Any) -> npt.NDArray[np.float64]:
 
 def _to_lists(value: Any) -> Any:
     if isinstance(value, list):
-        return [_to_lists(item) for item in value]
+        return [_to_lists(element) for element in value]
     if isinstance(value, dict) and _MARK in value:
         return _decode_array(value).tolist()
     if isinstance(value, int | float) and not isinstance(value, bool):

@@ -1,2 +1,1 @@
-"""OpenVLA: DINOv2 and SigLIP in front of Llama-2; the last 256 ids of the vocabulary encode
-actions."""
+"""OpenVLA: DINOv2 and SigLIP before Llama-2; the vocabulary's last 256 ids encode actions."""

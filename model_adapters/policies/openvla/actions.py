@@ -1,5 +1,4 @@
-"""OpenVLA's action tokens: 256 bins between -1 and 1, counted down from the end of the
-vocabulary."""
+"""OpenVLA's action tokens: 256 bins from -1 to 1, counted down from the vocabulary's end."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -8,12 +8,11 @@ from tokenizers import Tokenizer
 from infthor_eval.errors import ModelError
 from model_adapters.hf.loading.checkpoint import wrap_loading_errors
 from model_adapters.options.policies import OpenVLAOptions, PolicyOptions
-from model_adapters.policies.adapter import PolicyAdapter
 from model_adapters.policies.checkpoint import PolicyCheckpoint
 from model_adapters.policies.openvla.actions import ActionBins
 from model_adapters.policies.openvla.config import OpenVLAConfig
 from model_adapters.policies.openvla.network import OpenVLANetwork, OpenVLAWeights, weights_layout
-from model_adapters.policies.policy import VlaPolicy
+from model_adapters.policies.policy import PolicyAdapter, VlaPolicy
 from model_adapters.policies.statistics import ActionStatistics, select_statistics
 from model_adapters.policies.weights import empty_parameters, load_weights
 
@@ -43,8 +42,7 @@ class OpenVLADescription:
 
 
 def describe_openvla(checkpoint: PolicyCheckpoint, unnorm_key: str | None) -> OpenVLADescription:
-    """Read the files beside the weights of an OpenVLA; without an unnorm_key, there must be one
-    dataset only.
+    """Read the files beside OpenVLA's weights; without an unnorm_key, they must be of one dataset.
 
     Raises:
         ModelError: the checkpoint is of another family, or damaged.

@@ -61,9 +61,8 @@ class OpenVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
                 f"{pretrained} has image_sizes={self.image_sizes}, "
                 f"image_resize_strategy={self.image_resize_strategy}, "
                 f"use_fused_vision_backbone={self.use_fused_vision_backbone}, "
-                "timm_override_act_layers="
-                f"{self.timm_override_act_layers}; only the preprocessing of openvla/openvla-7b is "
-                "supported"
+                f"timm_override_act_layers={self.timm_override_act_layers}; only the preprocessing "
+                "of openvla/openvla-7b is supported"
             )
         return self.image_sizes[0]
 

@@ -29,8 +29,7 @@ def prompt(instruction: str) -> str:
 
 
 def prompt_ids(tokenizer: Tokenizer, instruction: str) -> list[int]:
-    """Return the ids of the prompt, from the tokenizer's begin token to the space that precedes
-    actions."""
+    """Return the prompt's ids, from the begin token to the space that precedes actions."""
     ids: list[int] = tokenizer.encode(prompt(instruction)).ids
     return ids if ids[-1] == _SPACE else [*ids, _SPACE]
 
@@ -64,8 +63,7 @@ class _OpenVLAProjector(nn.Module):
 
 
 class OpenVLAWeights(nn.Module):
-    """All modules with weights, under the names of the published checkpoint; the image size is in
-    pixels."""
+    """All modules with weights, by the published checkpoint's names; the image size in pixels."""
 
     def __init__(
         self, towers: tuple[TowerShape, TowerShape], image_size: int, language: LlamaConfig

@@ -132,8 +132,7 @@ class Tower(nn.Module):
 
 
 def unused_keys(shape: TowerShape) -> dict[str, Shape]:
-    """Return a tower's keys that no feature depends on: its last block, its final norm, its pooling
-    head."""
+    """Return a tower's keys that no feature depends on: last block, final norm, pooling head."""
     width = shape.width
     with empty_parameters():
         last = _Block(shape).state_dict()

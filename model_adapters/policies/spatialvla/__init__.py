@@ -1,2 +1,1 @@
-"""SpatialVLA: PaliGemma 2 with 3D positions of its patches; actions are tokens of spherical
-bins."""
+"""SpatialVLA: PaliGemma 2 with 3D positions of patches; actions are tokens of spherical bins."""

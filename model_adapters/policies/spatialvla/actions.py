@@ -1,5 +1,4 @@
-"""SpatialVLA's action tokens: a direction and a length, a rotation, and a gripper, three tokens a
-step."""
+"""SpatialVLA's action tokens: direction and length, rotation, gripper; three tokens a step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -120,8 +119,7 @@ class SpatialBins:
 
     @property
     def action_ids(self) -> tuple[range, range, range]:
-        """Ids of a step's three tokens: translations, then rotations, then gripper closed and
-        open."""
+        """Ids of a step's three tokens: translations, rotations, gripper closed and open."""
         rotations = self.begin + _n(self.theta) * _n(self.phi) * _n(self.r)
         grippers = rotations + _n(self.roll) * _n(self.pitch) * _n(self.yaw)
         return (
@@ -140,9 +138,8 @@ class SpatialBins:
         Args:
             ids: three ids per step, each among `action_ids` of its place.
         """
-        steps = np.array(ids).reshape(-1, TOKENS_PER_STEP) - [
-            place.start for place in self.action_ids
-        ]
+        first_ids = [allowed.start for allowed in self.action_ids]
+        steps = np.array(ids).reshape(-1, TOKENS_PER_STEP) - first_ids
         theta, phi, r = _centres(steps[:, 0], self.theta, self.phi, self.r)
         xyz = [r * np.sin(theta) * np.cos(phi), r * np.sin(theta) * np.sin(phi), r * np.cos(theta)]
         rotation = _centres(steps[:, 1], self.roll, self.pitch, self.yaw)
@@ -158,10 +155,9 @@ def _n(borders: Sequence[float]) -> int:
 
 
 def _centres(index: np.ndarray, *axes: Sequence[float]) -> list[np.ndarray]:
-    """Return the centres on three axes of bins, (steps,), that are numbered with the last axis
-    fastest."""
-    places = np.unravel_index(index, [_n(axis) for axis in axes])
+    """Return the centres on three axes of bins, (steps,), numbered with the last axis fastest."""
+    coordinates = np.unravel_index(index, [_n(axis) for axis in axes])
     return [
         (np.array(axis)[at] + np.array(axis)[at + 1]) / 2
-        for at, axis in zip(places, axes, strict=True)
+        for at, axis in zip(coordinates, axes, strict=True)
     ]

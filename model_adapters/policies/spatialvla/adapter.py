@@ -9,9 +9,8 @@ from model_adapters.options.policies import (
     SpatialVLAOptions,
     parse_field_of_view,
 )
-from model_adapters.policies.adapter import PolicyAdapter
 from model_adapters.policies.checkpoint import PolicyCheckpoint
-from model_adapters.policies.policy import VlaPolicy
+from model_adapters.policies.policy import PolicyAdapter, VlaPolicy
 from model_adapters.policies.spatialvla.actions import ProcessorConfig, SpatialBins
 from model_adapters.policies.spatialvla.camera import published_intrinsics
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig

@@ -54,8 +54,7 @@ class SpatialVLAConfig(msgspec.Struct, frozen=True, kw_only=True):
             )
 
     def sides(self, pretrained: str) -> tuple[int, int, int]:
-        """Return the sides, in pixels, of the image, of its patches, and of the image for depth
-        estimation.
+        """Return the sides, in pixels, of the image, its patches, and the image for depth.
 
         Raises:
             ModelError: one of them is not a square.

@@ -1,5 +1,4 @@
-"""SpatialVLA's 3D positions of patches: depth estimation, back-projection, frequency encoding, an
-MLP."""
+"""SpatialVLA's 3D positions of patches: depth, back-projection, frequency encoding, an MLP."""
 
 import torch
 from torch import nn
@@ -10,11 +9,8 @@ from model_adapters.policies.preprocessing import normalise
 __all__ = ["Ego3DEmbedding", "back_project", "estimate_depth"]
 
 _HALF = (0.5, 0.5, 0.5)
-_CENTRE = (
-    0.0,
-    0.0,
-    2.0,
-)  # metres; the point in front of the camera that coordinates are relative to
+# Metres; the point in front of the camera that coordinates are relative to.
+_CENTRE = (0.0, 0.0, 2.0)
 _REACH = 2.0  # metres; coordinates are divided by it
 
 
@@ -72,8 +68,7 @@ def estimate_depth(zoe: nn.Module, pixels: torch.Tensor, zoe_size: int) -> torch
 def back_project(
     depth: torch.Tensor, intrinsics: torch.Tensor, patch: int, resolution: int
 ) -> torch.Tensor:
-    """Return points in front of the camera, (batch, patches, 3 * resolution ** 2), in metres and
-    float32.
+    """Return points before the camera, (batch, patches, 3 * resolution ** 2), metres, float32.
 
     Args:
         depth: depth in metres, (batch, 1, size, size), in the type of the weights.

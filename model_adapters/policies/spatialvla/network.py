@@ -1,6 +1,6 @@
-"""SpatialVLA's network: patches with 3D positions, followed by a Gemma 2 that predicts action
-tokens."""
+"""SpatialVLA's network: patches with 3D positions, then a Gemma 2 that predicts action tokens."""
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,16 +22,34 @@ from model_adapters.policies.spatialvla.actions import SpatialBins
 from model_adapters.policies.spatialvla.camera import thor_intrinsics
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
 from model_adapters.policies.spatialvla.ego3d import Ego3DEmbedding, back_project, estimate_depth
-from model_adapters.policies.spatialvla.keys import checkpoint_key
 from model_adapters.policies.statistics import Actions
 from model_adapters.policies.weights import Layout
 
-__all__ = ["SpatialVLANetwork", "SpatialVLAWeights", "View", "prompt"]
+__all__ = ["SpatialVLANetwork", "SpatialVLAWeights", "View", "checkpoint_key", "prompt"]
 
 _HALF = (0.5, 0.5, 0.5)
 _IMAGE = "<image>"
 _BEGIN = "<bos>"
 _LM_HEAD = "language_model.lm_head.weight"
+
+
+# Names of parameters in transformers 5 and in SpatialVLA's checkpoints, which transformers 4.47
+# wrote. transformers has these renamings too, but applies them only to whole models that it knows:
+# the parts would keep their old names, and a loader that is not strict would leave ZoeDepth random
+# without a warning.
+_SIGLIP = "vision_tower."
+_BEIT = "vision_zoe_model.backbone."
+_BEIT_RENAMES = (
+    (r"^beit\.embeddings\.", "embeddings."),
+    (r"^beit\.layers\.(\d+)\.", r"encoder.layer.\1."),
+    (r"\.attention\.q_proj\.", ".attention.attention.query."),
+    (r"\.attention\.k_proj\.", ".attention.attention.key."),
+    (r"\.attention\.v_proj\.", ".attention.attention.value."),
+    (r"\.attention\.o_proj\.", ".attention.output.dense."),
+    (r"\.relative_position_bias\.", ".attention.attention.relative_position_bias."),
+    (r"\.mlp\.fc1\.", ".intermediate.dense."),
+    (r"\.mlp\.fc2\.", ".output.dense."),
+)
 
 
 def prompt(instruction: str) -> str:
@@ -80,8 +98,7 @@ class SpatialVLAWeights(nn.Module):
 
     @torch.inference_mode()
     def place_action_embeddings(self) -> None:
-        """Copy the embeddings of action tokens, which have their own key, into those of the
-        vocabulary."""
+        """Copy the embeddings of action tokens, which have a key, into the vocabulary's."""
         model = self.language_model
         spatial = self.spatial_embed_tokens.weight
         model.model.embed_tokens.weight[-len(spatial) :] = spatial
@@ -207,9 +224,21 @@ class SpatialVLANetwork:
             return logits(embed_ids(model, [token]))
 
         ids = self.prompt_ids(instruction)
-        places = torch.tensor(ids, device=model.device) == self.image_id
-        prefix = embed_ids(model, ids).masked_scatter(places[None, :, None], self.features(image))
+        is_image = torch.tensor(ids, device=model.device) == self.image_id
+        prefix = embed_ids(model, ids).masked_scatter(is_image[None, :, None], self.features(image))
         action = decode_greedily(
             logits(prefix), step, self.bins.action_ids * self.chunk, constrained=constrained
         )
         return self.bins.decode(action)
+
+
+def checkpoint_key(name: str) -> str:
+    """Return the key in a checkpoint of a parameter of the module."""
+    if name.startswith(_SIGLIP) and not name.startswith(f"{_SIGLIP}vision_model."):
+        return f"{_SIGLIP}vision_model.{name.removeprefix(_SIGLIP)}"
+    if name.startswith(f"{_BEIT}beit."):
+        part = name.removeprefix(_BEIT)
+        for new, old in _BEIT_RENAMES:
+            part = re.sub(new, old, part)
+        return _BEIT + part
+    return name

@@ -7,7 +7,7 @@ from infthor_eval.formats.qa_csv import read_questions
 from infthor_eval.formats.question import Question
 from infthor_eval.nieh.asking.baselines import BASELINES
 from infthor_eval.nieh.suite import NiehSuite
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from model_adapters import Capabilities
 
 # Of known skill: which answers each scripted model gets right.

@@ -10,7 +10,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import read_steps
 from infthor_eval.formats.trajectory import iter_trajectories
 from infthor_eval.household.sequence_text import sequence_text
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 __all__ = ["GOOD", "make_set", "trajectory_document"]
 

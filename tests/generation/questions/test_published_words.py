@@ -20,7 +20,7 @@ from infthor_eval.generation.questions.generate import (
 from infthor_eval.generation.questions.history import TrajectoryHistory
 from infthor_eval.generation.questions.published_words import in_published_words
 from infthor_eval.household.wording import noun, object_type
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_sim.object_types import OBJECT_TYPES
 
 PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"

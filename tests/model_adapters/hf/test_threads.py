@@ -9,7 +9,7 @@ import torch
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Part, load, options
-from model_adapters.hf.threads import torch_threads
+from model_adapters.hf.global_settings import torch_threads
 
 from ..asking import up_to
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 
 from model_adapters import Decoding, Notice, Turn
-from model_adapters.human.desk import Answer, Asked, Desk, StaleError
+from model_adapters.human.desk import Answer, Desk, Inquiry, StaleError
 
-ASKED = Asked((Turn("user", ("Where is the mug?",)),), Decoding(max_new_tokens=5), Notice())
+ASKED = Inquiry((Turn("user", ("Where is the mug?",)),), Decoding(max_new_tokens=5), Notice())
 
 
 def asking(desk: Desk) -> tuple[threading.Thread, list[object]]:

@@ -9,9 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from infthor_eval.errors import ModelError
-from model_adapters.openai import rate
-from model_adapters.openai.rate import RateLimiter
-from model_adapters.openai.spend import Caps, Prices, Spend
+from model_adapters.openai.spend import Caps, Prices, RateLimiter, Spend
 
 
 def _took(spend: Spend, tokens: int | None, cost: float = 0.0) -> None:
@@ -103,8 +101,8 @@ def test_threads_pass_a_cap_by_one_request_at_most() -> None:
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """A clock that waiting turns on; its one item is the time."""
     now = [100.0]
-    monkeypatch.setattr(rate.time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(rate.time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
     return now
 
 

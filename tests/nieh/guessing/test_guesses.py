@@ -17,7 +17,7 @@ from infthor_eval.nieh.guessing.guesses import (
     visible_knowledge,
 )
 from infthor_eval.nieh.results.above_guessing import above_guessing
-from infthor_eval.storage.user_cache import user_cache
+from infthor_eval.storage.folders import user_cache
 
 from ..made import record
 from .made import asked, on_clues

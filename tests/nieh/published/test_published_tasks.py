@@ -11,7 +11,7 @@ from infthor_eval.nieh.prompts import question_text
 from infthor_eval.nieh.rescoring.rebuilt_requests import RequestRebuilder
 from infthor_eval.nieh.samples import find_samples, open_set
 from infthor_eval.runs import Catalog, execute
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 from ...conftest import QUESTIONS
 

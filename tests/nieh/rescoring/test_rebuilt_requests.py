@@ -9,7 +9,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.nieh.rescoring.rebuilt_requests import RequestRebuilder
 from infthor_eval.nieh.samples import open_set
 from infthor_eval.runs import read_run
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 DATA = packaged_folder("sets/nieh_mini")
 SIZED = "nieh_haystack_8k,nieh_truncate_head_8k"

@@ -13,7 +13,7 @@ from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.rewards import PlanReward, max_reward
 from infthor_eval.plans.targets import PlanTarget, target_of
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.thor.grounding import Grounding
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.recorded import translate

@@ -10,7 +10,7 @@ from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.plans.history.clue_steps import clue_step, object_logs
 from infthor_eval.plans.plan import plans_of
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from infthor_eval.cli import main
 from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.report.web.page import Page
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 HOSTILE = '</script><img src=x onerror="window.hacked=1">"\'&{{ 7*7 }}<!--\u2028'
 

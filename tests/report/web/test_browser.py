@@ -6,7 +6,7 @@ from urllib.parse import parse_qs, quote
 import msgspec
 import pytest
 
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 from .conftest import HOSTILE
 

@@ -10,7 +10,7 @@ import pytest
 from infthor_eval.nieh.samples import open_set
 from infthor_eval.report.presented import read_report_runs
 from infthor_eval.report.web.build import PageRequest, build_page
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 DATA = packaged_folder("sets/nieh_mini")
 

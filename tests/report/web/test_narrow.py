@@ -3,7 +3,7 @@
 import pytest
 
 from infthor_eval.report.web.sections import Section
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from infthor_eval.tables import Column, Row, Table
 
 DATA = packaged_folder("sets/nieh_mini")

@@ -8,7 +8,7 @@ import pytest
 
 from infthor_eval.runs import UnitKey
 from infthor_eval.runs.journals.tracebacks import TracebackFile
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 
 from .conftest import HOSTILE
 

@@ -14,7 +14,7 @@ from model_adapters.hf.cached.decoding import (
     decode_replies,
     read_generation,
 )
-from model_adapters.stopping import cut_at_stop
+from model_adapters.thinking import cut_at_stop
 
 from ...asking import up_to
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from model_adapters.hf.loading.card import read_card_words
 from model_adapters.hf.loading.checkpoint import origin
 

@@ -8,8 +8,7 @@ import msgspec
 import pytest
 
 from model_adapters.policies.spatialvla.config import SpatialVLAConfig
-from model_adapters.policies.spatialvla.keys import checkpoint_key
-from model_adapters.policies.spatialvla.network import SpatialVLAWeights
+from model_adapters.policies.spatialvla.network import SpatialVLAWeights, checkpoint_key
 from model_adapters.policies.weights import Layout, Shape, empty_parameters
 
 from .published import CONFIG

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from infthor_eval.runs import UnitRecord
-from infthor_eval.storage.packaged import packaged_folder
-from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
+from infthor_eval.storage.folders import packaged_folder
+from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
 from tests.plans.cut import CANDLE, FORK, cut, write
 from tests.waiting import PATIENCE_S, wait_until
 
@@ -26,7 +26,7 @@ Run = Callable[..., list[UnitRecord[Any]]]
 
 
 def _arguments(engine: str, output: Path, *more: object) -> list[str]:
-    given = f"pretrained={packaged_folder(FOLDER)},dtype=float32"
+    given = f"pretrained={packaged_folder(NANO_FOLDER)},dtype=float32"
     given += ",enforce_eager=true" if engine == "vllm" else ",device=cpu"
     typed = [
         "--model",

@@ -14,9 +14,9 @@ import pytest
 from infthor_eval.errors import ModelError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.runs import UnitRecord
-from infthor_eval.storage.packaged import packaged_folder
+from infthor_eval.storage.folders import packaged_folder
 from model_adapters import load
-from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
+from model_adapters.hf.families.qwen2_5_vl import NANO_FOLDER
 from tests.plans.cut import CANDLE, FORK, cut, write
 from tests.waiting import PATIENCE_S, wait_until
 
@@ -25,7 +25,7 @@ from ...serving import free_port, records_in, wait_for_server
 
 OURS = "from infthor_eval.cli import main; main()"
 SERVER = "vllm.entrypoints.openai.api_server"
-MODEL = str(packaged_folder(FOLDER))
+MODEL = str(packaged_folder(NANO_FOLDER))
 MOST_FRAMES = 200  # more than a context of `nieh_mini_full` has
 
 

@@ -1,18 +1,20 @@
-"""A limit on the memory of code that comes with a checkpoint (chat templates)."""
+"""Limits on memory and computing time of code that comes with a checkpoint (chat templates)."""
 
 import resource
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
+from types import FrameType
 
-__all__ = ["OutOfMemoryError", "limit_memory"]
+__all__ = ["OutOfMemoryError", "OutOfTimeError", "limit_memory", "limit_time"]
 
 _SIZE = Path("/proc/self/statm")  # its first number is the process's address space in pages
 _MB = 1024 * 1024
-_LOCK = (
-    Lock()
-)  # of two nested limits, the second would restore the first as if it were the original
+# Of two nested limits, the second would restore the first as if it were the original.
+_LOCK = Lock()
 
 
 class OutOfMemoryError(Exception):
@@ -52,3 +54,33 @@ def _bound(megabytes: int, others: list[int]) -> int | None:
         return None
     # setrlimit cannot represent larger values.
     return min(pages * resource.getpagesize() + megabytes * _MB, 2**62, *others)
+
+
+class OutOfTimeError(Exception):
+    """Code computed for longer than allowed."""
+
+
+@contextmanager
+def limit_time(seconds: int) -> Iterator[None]:
+    """Stop code that computes for longer; only in the main thread, because signals reach no other.
+
+    The processor time of the process counts, so the limit does not depend on the load of the
+    machine.
+
+    Raises:
+        OutOfTimeError: the time is used up.
+    """
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        raise OutOfTimeError(f"it is not done after {seconds} s")
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGVTALRM, stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)
