@@ -11,14 +11,7 @@ _FRAMES = ("shown", "blank")
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatorOptions:
-    """Options that the suites share, with their help texts.
-
-    Attributes:
-        simulator: "embedded", "unity" (the build that ai2thor downloads), or the path of a Unity
-            executable.
-        scenes: folder of recorded floor plans, for trajectories in them.
-        frames: "shown", or "blank" for grey frames.
-    """
+    """Options that the suites share, with their help texts."""
 
     simulator: str = field(
         default="embedded",

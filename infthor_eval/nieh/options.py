@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from infthor_eval.errors import UsageError
-from infthor_eval.memory.budgets import read_budget
+from infthor_eval.memory.options import MemoryOptions
 from infthor_eval.nieh.prompts import PROMPTS, PUBLISHED_MAIN
 
 __all__ = ["FRAMES", "SHOWN", "NiehOptions", "check_frames"]
@@ -13,31 +13,8 @@ FRAMES = (SHOWN, "blank", "shuffled", "other")  # see `infthor_eval.nieh.frame_a
 
 
 @dataclass(frozen=True, kw_only=True)
-class NiehOptions:
-    """Options of the suite; each has its help text.
-
-    Attributes:
-        k_tokens: tokens of a kilo-token in contexts of a given size; None for each context's
-            published value.
-        tokens_per_frame: tokens of one frame for such contexts; None to ask the model.
-        retriever: CLIP model of contexts that retrieve frames, a hub id or a folder; None for the
-            published one.
-        retriever_revision: branch, tag or commit of it on the hub; None for the default branch.
-        trajectories: folder of the set's trajectories (`--traj_dir` of the published scripts); None
-            for the set's own.
-        frames: the frames that are shown: the true ones, or a frame ablation.
-        prompt: words of the question, one of `infthor_eval.nieh.prompts`; None for the task's own,
-            else published-main.
-        memory: memory that recalls what is shown, a name or FILE.py:CLASS; for tasks that leave it
-            open.
-        memory_args: its options, "k=v,k=v".
-        budget: most tokens of what it recalls ("4k" is 4,000); None for the memory's own limit.
-        repeats: times that each question is asked, with the seeds from the run's on.
-        max_thinking_tokens: tokens for what a model thinks before its answer, beside the task's own
-            tokens; None for no further ones.
-        temperature: temperature of drawn replies; None for the tasks' own, or 1 where a greedy task
-            is repeated.
-    """
+class NiehOptions(MemoryOptions):
+    """Options of the suite, with their help texts; None is the task's or the model's own."""
 
     k_tokens: int | None = field(
         default=None,
@@ -87,7 +64,6 @@ class NiehOptions:
             "each": True,
         },
     )
-
     prompt: str | None = field(
         default=None,
         metadata={
@@ -96,29 +72,6 @@ class NiehOptions:
             f"{PUBLISHED_MAIN}.",
         },
     )
-    memory: str | None = field(
-        default=None,
-        metadata={
-            "help": "Memories for tasks that need one (nieh_memory), a run with each; `ls "
-            "memories`, or FILE.py:CLASS.",
-            "metavar": "NAME,...",
-            "each": True,
-        },
-    )
-    memory_args: str | None = field(
-        default=None,
-        metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."},
-    )
-    budget: str | None = field(
-        default=None,
-        metadata={
-            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's "
-            "own limit.",
-            "metavar": "TOKENS,...",
-            "each": True,
-        },
-    )
-
     repeats: int = field(
         default=1,
         metadata={
@@ -134,7 +87,6 @@ class NiehOptions:
             "metavar": "T",
         },
     )
-
     max_thinking_tokens: int | None = field(
         default=None,
         metadata={
@@ -145,6 +97,7 @@ class NiehOptions:
 
     def __post_init__(self) -> None:
         """Raise UsageError if a value is not valid."""
+        super().__post_init__()
         if self.max_thinking_tokens is not None and self.max_thinking_tokens < 1:
             raise UsageError(
                 f"--max-thinking-tokens {self.max_thinking_tokens}: give 1 or more, or leave it out"
@@ -155,7 +108,6 @@ class NiehOptions:
             raise UsageError(
                 f"--temperature {self.temperature}: replies are drawn at a temperature above 0"
             )
-        read_budget(self.budget)
         check_frames(self.frames)
         if self.tokens_per_frame is not None and self.tokens_per_frame < 1:
             raise UsageError(

@@ -4,12 +4,13 @@ from dataclasses import dataclass, field
 
 from infthor_eval.episodes.options import SimulatorOptions
 from infthor_eval.formats.object_ids import Words
+from infthor_eval.memory.options import MemoryOptions
 
 __all__ = ["PlansOptions"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlansOptions(SimulatorOptions):
+class PlansOptions(SimulatorOptions, MemoryOptions):
     """Options of the suite, with their help texts; None is the task's own."""
 
     rewards: str | None = field(
@@ -42,28 +43,6 @@ class PlansOptions(SimulatorOptions):
             "metavar": "HOW",
         },
     )
-    memory: str | None = field(
-        default=None,
-        metadata={
-            "help": "Memories for --history memory, a run with each; `ls memories`, or "
-            "FILE.py:CLASS.",
-            "metavar": "NAME,...",
-            "each": True,
-        },
-    )
-    memory_args: str | None = field(
-        default=None,
-        metadata={"help": "Options of the memory (see `ls memories`).", "metavar": "K=V,..."},
-    )
-    budget: str | None = field(
-        default=None,
-        metadata={
-            "help": "Most tokens of what a memory recalls, a run with each; default: the memory's "
-            "own limit.",
-            "metavar": "TOKENS,...",
-            "each": True,
-        },
-    )
     protocol: str | None = field(
         default=None,
         metadata={
@@ -94,3 +73,8 @@ class PlansOptions(SimulatorOptions):
             "is_place": True,
         },
     )
+
+    def __post_init__(self) -> None:
+        """Raise UsageError if a value is not valid."""
+        SimulatorOptions.__post_init__(self)
+        MemoryOptions.__post_init__(self)
