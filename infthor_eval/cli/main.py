@@ -19,8 +19,7 @@ from infthor_eval.terminal import print_error
 
 __all__ = ["main"]
 
-# By group: the name of each command, of which infthor_eval.cli.commands has the module, and its
-# line in the overview.
+# By group: the name of each command and its line in the overview.
 _COMMANDS = {
     "Evaluate": {
         "run": "Evaluate a model on tasks (the default command).",
@@ -60,6 +59,14 @@ _COMMANDS = {
         "lm-eval": "Run lm-eval's own command with these models.",
     },
 }
+# Commands that share a module of infthor_eval.cli.commands; the others are `command` of their own.
+_SHARED_MODULES = {
+    "table4": "tables:table4",
+    "table-final": "tables:table_final",
+    "check-adapter": "checks:check_adapter",
+    "check-memory": "checks:check_memory",
+    "check-parity": "checks:check_parity",
+}
 _NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"
 
@@ -73,7 +80,8 @@ class _Commands(ExampleGroup):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _NAMES:
             return None
-        command = import_target(f"infthor_eval.cli.commands.{cmd_name.replace('-', '_')}:command")
+        target = _SHARED_MODULES.get(cmd_name, f"{cmd_name.replace('-', '_')}:command")
+        command = import_target(f"infthor_eval.cli.commands.{target}")
         assert isinstance(command, click.Command)
         return command
 

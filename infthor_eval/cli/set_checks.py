@@ -6,16 +6,33 @@ import statistics
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from infthor_eval.cli.checks import Check
+import msgspec
 
 if TYPE_CHECKING:
     from infthor_eval.nieh.set_contents import SetContents
 
-__all__ = ["set_checks"]
+__all__ = ["Check", "set_checks"]
 
 _SHOWN = 5  # reasons that are named one by one
+
+
+class Check(msgspec.Struct, frozen=True):
+    """The result of one check.
+
+    Attributes:
+        name: what is checked.
+        state: "ok"; "optional" if it is missing and only some uses need it; "wrong" if every use
+            needs it.
+        detail: what is installed, or what is missing.
+        hint: how to fix it; empty if there is nothing to fix.
+    """
+
+    name: str
+    state: Literal["ok", "optional", "wrong"]
+    detail: str
+    hint: str = ""
 
 
 def set_checks(root: Path, trajectories: Path | None) -> Iterator[Check]:

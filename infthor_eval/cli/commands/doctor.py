@@ -17,10 +17,9 @@ import click
 import msgspec
 from rich.text import Text
 
-from infthor_eval.cli.checks import Check
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
-from infthor_eval.cli.set_checks import set_checks
+from infthor_eval.cli.set_checks import Check, set_checks
 from infthor_eval.errors import UsageError, in_one_line
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.storage.user_cache import user_cache
