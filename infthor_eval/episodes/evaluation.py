@@ -35,10 +35,8 @@ E = TypeVar("E")
 K = TypeVar("K", bound=EpisodeTask[Any, Any])
 Options = TypeVar("Options", bound=SimulatorOptions)
 
-_OF_ALL_TRAJECTORIES = (
-    "trajectories",
-    "broken",
-)  # parts of a task's config that one episode does not depend on
+# Parts of a task's config that one episode does not depend on.
+_OF_ALL_TRAJECTORIES = ("trajectories", "broken")
 
 
 @dataclass(frozen=True)
@@ -85,9 +83,9 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
         self._scenes = Path(self.options.scenes) if self.options.scenes is not None else None
         self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
         by_name = {
-            item.traj_id: item.data
+            trajectory.traj_id: trajectory.data
             for task in self.tasks.values()
-            for item in task.trajectories.trajectories
+            for trajectory in task.trajectories.trajectories
         }
         self.trajectories = list(by_name.values())
 
@@ -134,11 +132,9 @@ class BoundEpisodes(Generic[U, P]):
         simulators: Iterable[Simulators],
     ) -> None:
         """Take the work, and the simulators that it is done in, which are closed with this."""
-        self.workload, self.seed, self._simulators_to_close = (
-            workload,
-            evaluation.seed,
-            list(simulators),
-        )
+        self.workload = workload
+        self.seed = evaluation.seed
+        self._simulators_to_close = list(simulators)
         by_task = groupby(evaluation.units, key=lambda unit: unit.key.task)
         self._numbers = {
             unit.key: number for _, of_task in by_task for number, unit in enumerate(of_task)
@@ -153,13 +149,13 @@ class BoundEpisodes(Generic[U, P]):
     def _fingerprint(self, unit: U) -> str:
         """Return the hash of everything that an episode depends on."""
         config = {name: value for name, value in self.workload.config.items() if name != "tasks"}
-        of_task = self.workload.config["tasks"][unit.key.task].items()
+        task = dict(self.workload.config["tasks"][unit.key.task])
+        for name in _OF_ALL_TRAJECTORIES:
+            task.pop(name, None)
         return fingerprint(
             {
                 **config,
-                "task": {
-                    name: value for name, value in of_task if name not in _OF_ALL_TRAJECTORIES
-                },
+                "task": task,
                 "trajectory": unit.trajectory.digest,
                 "index": unit.payload.index,
                 "seed": self.seed,
@@ -169,9 +165,9 @@ class BoundEpisodes(Generic[U, P]):
     def _find_records(
         self, group: Group[U], session: Session[P]
     ) -> tuple[dict[UnitKey, str], dict[UnitKey, UnitRecord[P] | None]]:
-        """Return the fingerprints of a group's units, and the records of those that have a result
-        already."""
+        """Return the fingerprints of a group's units, and the records of results that are there."""
         fingerprints = {unit.key: self._fingerprint(unit) for unit in group.units}
-        return fingerprints, {
+        records = {
             unit.key: session.find_record(unit, fingerprints[unit.key]) for unit in group.units
         }
+        return fingerprints, records

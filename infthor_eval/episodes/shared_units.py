@@ -33,19 +33,20 @@ class SharedUnits(Generic[P]):
 
 
 def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | None) -> list[str]:
-    """Return the names of the tasks that all runs (at least one) have, or the chosen ones; in the
-    first run's order.
+    """Return the names of the tasks that all runs (at least one) have, in the first run's order.
+
+    If some are chosen, return these.
 
     Raises:
         UsageError: there is no shared task, or a chosen one is not shared.
     """
     first = runs[0]
-    shared = [name for name in first.config.tasks if all(name in run.config.tasks for run in runs)]
+    tasks_of_runs = [run.config.tasks.keys() for run in runs]
+    of_all = set.intersection(*map(set, tasks_of_runs))
+    shared = [name for name in first.config.tasks if name in of_all]
     if not shared:
-        other = next(
-            (run for run in runs if not run.config.tasks.keys() & first.config.tasks.keys()),
-            runs[-1],
-        )
+        disjoint = (run for run in runs if not run.config.tasks.keys() & first.config.tasks.keys())
+        other = next(disjoint, runs[-1])
         raise UsageError(
             f"{first.label} and {other.label} share no task; draw runs of the same task"
         )
@@ -61,8 +62,7 @@ def shared_units(
     excluded: str,
     differences: Iterable[str] = (),
 ) -> SharedUnits[P]:
-    """Find the episodes of trajectories that all runs (at least one) have in full, in tasks that
-    all have.
+    """Find the episodes of trajectories that all runs (at least one) have in full, in shared tasks.
 
     Args:
         excluded: description of episodes that some run excludes, for a note.
@@ -73,18 +73,8 @@ def shared_units(
     """
     units = [run.by_trajectory(tasks) for run in runs]
     digests = [run.digests(tasks) for run in runs]
-    names = sorted(
-        {*(name for known in digests for name in known), *(name for item in units for name in item)}
-    )
-    left_out = {
-        name: {
-            place
-            for item in units
-            for place, record in item.get(name, {}).items()
-            if record.excluded is not None
-        }
-        for name in names
-    }
+    names = sorted(set().union(*digests, *units))
+    left_out = {name: _excluded(name, units) for name in names}
     shared = [
         name
         for name in names
@@ -96,13 +86,10 @@ def shared_units(
             f"the runs share no trajectory of {which} that all of them have in full; draw runs on "
             "the same data"
         )
-    records = tuple(
-        tuple(
-            tuple(item[name][place] for place in sorted(item[name].keys() - left_out[name]))
-            for name in shared
-        )
-        for item in units
-    )
+    records = []
+    for of_run in units:
+        counted = [_without(of_run[name], left_out[name]) for name in shared]
+        records.append(tuple(counted))
     notes = []
     if len(shared) < len(names):
         notes.append(
@@ -114,7 +101,22 @@ def shared_units(
     if n_excluded := sum(len(left_out[name]) for name in shared):
         notes.append(f"{excluded}: {n_excluded}")
     notes += difference_notes("simulator", runs, [run.config.simulator for run in runs])
-    return SharedUnits(tuple(tasks), tuple(shared), records, (*notes, *differences))
+    return SharedUnits(tuple(tasks), tuple(shared), tuple(records), (*notes, *differences))
+
+
+def _excluded(name: str, units: Sequence[Units[P]]) -> set[Any]:
+    """Return which episodes of a trajectory some run excludes, by their order in time."""
+    of_runs = [of_run.get(name, {}) for of_run in units]
+    return {
+        order
+        for of_run in of_runs
+        for order, record in of_run.items()
+        if record.excluded is not None
+    }
+
+
+def _without(units: Mapping[Any, UnitRecord[P]], left_out: set[Any]) -> tuple[UnitRecord[P], ...]:
+    return tuple(units[order] for order in sorted(units.keys() - left_out))
 
 
 def difference_notes(
@@ -128,8 +130,13 @@ def difference_notes(
 
 
 def only_name(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
-    """Return the given name, or the only one that a run has; `what` is its kind, `option` the
-    option that gives it.
+    """Return the name if it is given, or the only one that a run has.
+
+    Args:
+        what: kind of the name, for messages.
+        option: option that gives it.
+        name: the name, None if it is not given.
+        known: names that the run has.
 
     Raises:
         UsageError: the run has nothing of that name, or no name is given and there are several.
@@ -148,6 +155,9 @@ def _is_shared(name: str, digests: Sequence[Mapping[str, str]], units: Sequence[
 
     A run that was stopped in the middle of a trajectory lacks episodes there.
     """
-    if any(name not in item for item in units) or len({known.get(name) for known in digests}) > 1:
+    if (
+        any(name not in of_run for of_run in units)
+        or len({known.get(name) for known in digests}) > 1
+    ):
         return False
-    return all(item[name].keys() == units[0][name].keys() for item in units)
+    return all(of_run[name].keys() == units[0][name].keys() for of_run in units)

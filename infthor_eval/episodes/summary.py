@@ -53,13 +53,16 @@ def summarise_episodes(
     records: Sequence[UnitRecord[P]],
     summarise_task: Callable[[Mapping[str, Any], list[UnitRecord[P]]], T],
 ) -> EpisodesSummary[T]:
-    """Summarise a run; `summarise_task` returns a task's results, given its config and its records
-    in order."""
+    """Summarise a run.
+
+    Args:
+        summarise_task: returns a task's results, given its config and its records in order.
+    """
     ordered = sorted(records, key=lambda record: record.key)
-    tasks = {
-        name: summarise_task(of_task, [record for record in ordered if record.task == name])
-        for name, of_task in config["tasks"].items()
-    }
+    tasks = {}
+    for name, task_config in config["tasks"].items():
+        of_task = [record for record in ordered if record.task == name]
+        tasks[name] = summarise_task(task_config, of_task)
     return EpisodesSummary(str(config["simulator"]), tasks)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.household.containment import contents_of, is_in
 from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.navigation import Grid, GridPose

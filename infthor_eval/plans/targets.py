@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.navigation import GridPose
 from infthor_eval.plans.plan import Plan, PlanKind

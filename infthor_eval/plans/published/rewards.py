@@ -9,7 +9,7 @@ from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import HighAction, PlannerAction, TaskInfo
 from infthor_eval.plans.plan import PlanKind

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.scout import reachable_grid
 from infthor_eval.plans.expert import Replayed
