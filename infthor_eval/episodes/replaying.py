@@ -113,7 +113,7 @@ class EpisodeInReplay(Protocol):
     """An episode that is being replayed."""
 
     def repeat(self, step: Any, *, is_last: bool) -> str:
-        """Repeat a recorded step unless the episode is over; return its difference (or "")."""
+        """Repeat a recorded step unless the episode is over; return how it differs, if it does."""
 
     def observe(self) -> Any:
         """Return the present observation; raises DataError if the simulator sent no frame."""

@@ -37,16 +37,14 @@ class TaskPool:
         return tasks[0]
 
     def begin_again(self, candidates: Collection[Task]) -> bool:
-        """Let all tasks be drawn again; returns False if that does not help, as none of
-        `candidates` was drawn."""
+        """Let all tasks be drawn again; returns False if none of `candidates` was drawn."""
         if self._drawn.isdisjoint(candidates):
             return False
         self._drawn.clear()
         return True
 
     def _narrow(self, tasks: Sequence[Task]) -> list[Task]:
-        """Return the tasks with the value that leads by most; there are at least two tasks, and
-        fewer afterwards."""
+        """Return the tasks, fewer than before (at least two), with the value that leads by most."""
         variable, value = max(self._leads(tasks))[2:]
         return [task for task in tasks if _values(task)[variable] == value]
 
@@ -65,6 +63,5 @@ class TaskPool:
 
 
 def _values(task: Task) -> tuple[str, str, str, str]:
-    """Return the variables of a task, as published: slices are objects of their own; "" for
-    none."""
+    """Return the variables of a task, as published: slices are objects; "" for none."""
     return str(task.task_type), task.target, task.movable or "", task.receptacle or task.light or ""

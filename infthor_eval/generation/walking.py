@@ -1,5 +1,4 @@
-"""Walking to poses from which objects can be acted on, replanned when the simulator refuses a
-step."""
+"""Walking to poses from which objects can be acted on, replanned when a step is refused."""
 
 from infthor_eval.formats.trajectory import ApiAction, PlannerAction
 from infthor_eval.generation.trace import RolloutError, Trace
@@ -27,8 +26,7 @@ class Walker:
         self._grid: Grid | None = None
 
     def go(self, shown: list[str], inside: str | None = None) -> None:
-        """Walk to where objects can be acted on; this is a sub-goal, unless the agent is there
-        already.
+        """Walk to where objects can be acted on; a sub-goal, unless the agent is there already.
 
         Args:
             shown: ids of the objects; the agent faces the first.
@@ -41,7 +39,7 @@ class Walker:
         viewpoint = self._viewpoint(shown, inside)
         if self._moves(viewpoint) == []:
             return
-        (x, z) = viewpoint.pose.cell
+        x, z = viewpoint.pose.cell
         facing = viewpoint.pose.facing
         location = f"loc|{x}|{z}|{facing // _TURN}|{viewpoint.horizon}"
         action = PlannerAction("GotoLocation", location=location, object_id=target.object_id)
@@ -96,8 +94,7 @@ class Walker:
         return ["LookDown" if steps > 0 else "LookUp"] * abs(steps)
 
     def _move(self, action: str) -> bool:
-        """Execute one action of a walk; returns False if a step is blocked, and removes its cell
-        from the grid."""
+        """Execute one action of a walk; returns False if blocked, and removes the cell."""
         if action != "MoveAhead":
             degrees = _TURN if action.startswith("Rotate") else HORIZON_STEP
             self._trace.act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))

@@ -25,7 +25,7 @@ __all__ = ["check_adapter", "check_memory", "check_parity"]
 )
 @click.argument("model")
 @click.option(
-    "--model-args", default="", metavar="K=V,...", help="Options of MODEL (see `ls models`)."
+    "--model-args", default="", metavar="K=V,...", help="Options of MODEL (see `ls models MODEL`)."
 )
 def check_adapter(model: str, model_args: str) -> int:
     """Check MODEL, a name or your own FILE.py:CLASS, against the adapter contract.
@@ -49,7 +49,10 @@ def check_adapter(model: str, model_args: str) -> int:
 )
 @click.argument("memory")
 @click.option(
-    "--memory-args", default="", metavar="K=V,...", help="Options of MEMORY (see `ls memories`)."
+    "--memory-args",
+    default="",
+    metavar="K=V,...",
+    help="Options of MEMORY (see `ls memories MEMORY`).",
 )
 def check_memory(memory: str, memory_args: str) -> int:
     """Check MEMORY, a name or your own FILE.py:CLASS, against the contract of memories.

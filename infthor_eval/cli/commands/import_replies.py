@@ -65,8 +65,7 @@ def _import_replies(
 ) -> Iterator[tuple["RunResults", int]]:
     """Yield the results of the runs of logs of replies, and the number of rows that are not
     imported."""
-    from infthor_eval.cli.progress.left_out import print_left_out, print_refused
-    from infthor_eval.cli.progress.notes import print_note
+    from infthor_eval.cli.progress.notes import print_left_out, print_note, print_refused
     from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.published.imported_replies import import_logs
@@ -103,8 +102,7 @@ def _import_plans(
 ) -> Iterator[tuple["RunResults", int]]:
     """Yield the results of the runs of logs of plans, and the number of rows that are not
     imported."""
-    from infthor_eval.cli.progress.left_out import print_refused
-    from infthor_eval.cli.progress.notes import print_note
+    from infthor_eval.cli.progress.notes import print_note, print_refused
     from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.published.imported_counts import import_counts

@@ -18,7 +18,7 @@ def table4(set_folder: Path) -> None:
 
     SET is a folder with both files. It needs no frames.
     """
-    from infthor_eval.cli.progress.left_out import print_left_out
+    from infthor_eval.cli.progress.notes import print_left_out
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.published import table4 as published
     from infthor_eval.report.terminal import print_table, table_console
@@ -39,7 +39,7 @@ def table_final(logs: tuple[Path, ...]) -> int:
     The name of a LOG says which row it is; a log of another name has a row of its own. A line
     without counts is counted and named; the exit code is then 1.
     """
-    from infthor_eval.cli.progress.left_out import print_refused
+    from infthor_eval.cli.progress.notes import print_refused
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.published.final_table import final_table
     from infthor_eval.report.terminal import print_table, table_console

@@ -1,4 +1,7 @@
-"""The options for how results are printed."""
+"""The options for how results are printed, and for the trackers that finished runs are sent to.
+
+Trackers are named as lm-eval names them.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -6,9 +9,17 @@ from typing import Any
 
 import click
 
+from infthor_eval.cli.options.values import parse_pairs
 from infthor_eval.errors import UsageError
 
-__all__ = ["ShowOptions", "sample_options", "show_options"]
+__all__ = ["ShowOptions", "parse_trackers", "sample_options", "show_options", "tracker_options"]
+
+_TRACKERS = {
+    "wandb_args": "Send finished runs to Weights & Biases: arguments of wandb.init (project=NAME).",
+    "trackio_args": "Send finished runs to trackio: arguments of trackio.init (project=NAME).",
+    "hf_hub_log_args": "Push finished runs to the hub: lm-eval's arguments "
+    "(push_results_to_hub=True).",
+}
 
 
 @dataclass(frozen=True)
@@ -27,8 +38,7 @@ class ShowOptions:
 
     @classmethod
     def from_click(cls, given: Mapping[str, Any]) -> "ShowOptions":
-        """Return the options among the parameters of a command; one with --quiet adds that option
-        itself.
+        """Return the options among the parameters of a command, which adds --quiet itself.
 
         Raises:
             UsageError: --json with --format or --full.
@@ -41,11 +51,9 @@ class ShowOptions:
 
 
 def show_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --full, --format and --json to a command, which passes them to
-    `ShowOptions.from_click`."""
-    return _with_options(
-        command, click.Choice(["csv", "latex", "markdown"]), "Write the tables in this form."
-    )
+    """Add --full, --format and --json to a command, for `ShowOptions.from_click`."""
+    forms = click.Choice(["csv", "latex", "markdown"])
+    return _with_options(command, forms, "Write the tables in this form.")
 
 
 def sample_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -77,3 +85,23 @@ def _with_options(
     ):
         command = option(command)
     return command
+
+
+def tracker_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add an option for each tracker to a command, which passes them to `parse_trackers`."""
+    for name, text in reversed(_TRACKERS.items()):
+        command = click.option(_option(name), metavar="K=V,...", help=text)(command)
+    return command
+
+
+def parse_trackers(given: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Return the arguments of the trackers that are used, by option, of a command's parameters."""
+    return {
+        name: parse_pairs(given[name].split(","), _option(name))
+        for name in _TRACKERS
+        if given[name] is not None
+    }
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"

@@ -1,12 +1,10 @@
-"""Movement counting: how often something was moved; further forms count openings, puts and
-different objects.
+"""Movement counting: how often something was moved; further: openings, puts, different objects.
 
 The clues of Table 3's form are one frame per counted event, so the number of clue frames alone
 gives the answer away. The further questions therefore have frames without an event among their
 clues: 8 frames in all for answers up to 7, 16 for answers up to 15, and so on.
 """
 
-import itertools
 import random
 from collections import defaultdict
 from collections.abc import Iterator
@@ -24,8 +22,7 @@ _FRAMES = 8  # of a further question whose answer is smaller
 
 
 def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on how often an object was moved: picked up more than once, and put down
-    each time.
+    """Yield the questions on how often an object was moved, picked up more than once and put down.
 
     It must be the only object of its type that was picked up, or the name would be ambiguous.
     """
@@ -51,11 +48,10 @@ def further_counts(history: TrajectoryHistory, rng: random.Random) -> Iterator[C
 
 
 def _number_of_frames(count: int) -> int:
-    return next(
-        number
-        for number in (_FRAMES << doublings for doublings in itertools.count())
-        if number > count
-    )
+    number = _FRAMES
+    while number <= count:
+        number *= 2
+    return number
 
 
 def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
