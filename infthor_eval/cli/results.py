@@ -86,15 +86,11 @@ def _print_json(runs: Sequence[RunResults]) -> None:
 def _with_labels(runs: Sequence[RunResults]) -> list[RunResults]:
     """The runs with labels for names, which tell those of one name apart."""
     labels = label_runs([(run.folder, run.summary.header) for run in runs], _SHOWN_BY_TABLES)
-    return [
-        replace(
-            run,
-            summary=replace(
-                run.summary, header=msgspec.structs.replace(run.summary.header, name=label)
-            ),
-        )
-        for run, label in zip(runs, labels, strict=True)
-    ]
+    labelled = []
+    for run, label in zip(runs, labels, strict=True):
+        header = msgspec.structs.replace(run.summary.header, name=label)
+        labelled.append(replace(run, summary=replace(run.summary, header=header)))
+    return labelled
 
 
 def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
@@ -103,9 +99,8 @@ def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
     for _, group in groupby(sorted(runs, key=suite_name), key=suite_name):
         same_suite = list(group)
         suite = same_suite[0].suite
-        tables += (suite.tables if options.full else suite.overview)(
-            [run.summary for run in same_suite]
-        )
+        make_tables = suite.tables if options.full else suite.overview
+        tables += make_tables([run.summary for run in same_suite])
     if options.form is not None:
         click.echo(export_tables(tables, options.form))
         return

@@ -47,9 +47,9 @@ def set_checks(root: Path, trajectories: Path | None) -> Iterator[Check]:
     yield from _questions(contents)
     yield from _trajectories(contents)
     if not contents.frames:
-        yield Check("frames", "optional", "none can be read: tables of the files' own scores can "
-                                          "be made, and no more",
-                    "unpack the set's metadata.tar beside its question files")  # fmt: skip
+        missing = "none can be read: tables of the files' own scores can be made, and no more"
+        hint = "unpack the set's metadata.tar beside its question files"
+        yield Check("frames", "optional", missing, hint)
         return
     n_asked = 0
     for task in read_asked_tasks(root, trajectories):
@@ -88,23 +88,16 @@ def _trajectories(contents: SetContents) -> Iterator[Check]:
         if contents.n_unasked:
             detail += f"; {contents.n_unasked:,} more without a question"
         yield Check("trajectories", "ok", detail)
-        sizes = Counter(
-            {
-                f"{width}x{height}": number
-                for (width, height), number in contents.image_sizes.items()
-            }
-        )
-        yield Check(
-            "pictures", "ok", f"in {_counted(contents.image_folders)}; {_counted(sizes)} pixels"
-        )
+        sizes = {f"{width}x{height}": n for (width, height), n in contents.image_sizes.items()}
+        detail = f"in {_counted(contents.image_folders)}; {_counted(sizes)} pixels"
+        yield Check("pictures", "ok", detail)
         yield Check("step logs", "ok", _counted(contents.layouts))
     if contents.unreadable:
         more = len(contents.unreadable) - _SHOWN
-        shown = "; ".join(contents.unreadable[:_SHOWN]) + (
-            f"; and {more:,} more" if more > 0 else ""
-        )
+        reasons = "; ".join(contents.unreadable[:_SHOWN])
+        reasons += f"; and {more:,} more" if more > 0 else ""
         detail = f"{len(contents.unreadable):,} cannot be read"
-        yield Check("unreadable trajectories", "optional", detail, shown)
+        yield Check("unreadable trajectories", "optional", detail, reasons)
 
 
 def _counted(numbers: Mapping[str, int]) -> str:

@@ -49,8 +49,7 @@ class TaskPool:
         return [task for task in tasks if _values(task)[variable] == value]
 
     def _leads(self, tasks: Sequence[Task]) -> list[tuple[float, float, int, str]]:
-        """Return the lead of each value over the last of its variable, a tie-breaker, the variable,
-        and the value."""
+        """Return each value's lead over its variable's last, a tie-breaker, variable and value."""
         leads = []
         for variable in range(_N_VARIABLES):
             values = sorted({_values(task)[variable] for task in tasks} - {""})

@@ -1,5 +1,4 @@
-"""One trajectory as an environment like Gymnasium's: reset to any of its plans, then step until it
-is over."""
+"""One trajectory as an environment like Gymnasium's: reset to any plan, step until it is over."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -197,8 +196,7 @@ class PlanEnvironment:
         return Observation(view, start.frame), info
 
     def go_on(self, plan: int) -> tuple[Observation, Mapping[str, Any]]:
-        """Begin a later plan of the same task where the world is, without a reset; returns what
-        `reset` does.
+        """Begin a later plan of the same task without a reset; returns what `reset` does.
 
         The expert must have passed it (`expert_actions`) before the reset, as it would otherwise
         act in this world.
@@ -263,8 +261,7 @@ class PlanEnvironment:
         return self._execute(text, call, before)
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as
-        `reset` does."""
+        """Return the history before a plan, if frames are kept; raises as `reset` does."""
         return self._expert.past(plan)
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
@@ -272,8 +269,7 @@ class PlanEnvironment:
         return self._expert.actions(plan)
 
     def named_objects(self, plan: int) -> Sequence[str]:
-        """Return the ids of the objects that a plan names and that the scene has; for pictures, not
-        for rewards.
+        """Return the ids of a plan's objects in the scene; for pictures, not for rewards.
 
         Raises:
             ExpertRefusedError: as `reset`.
@@ -325,8 +321,7 @@ class PlanEnvironment:
     def _target(
         self, plan: Plan, view: SimulatorView, end: AgentPose, grid: Grid | None
     ) -> PlanTarget:
-        """Return the target of a plan; that of GotoLocation is the pose in which the expert
-        ended."""
+        """Return a plan's target; that of GotoLocation is the pose in which the expert ended."""
         if grid is not None:
             return PlanTarget(
                 plan.kind, goal_stand=grid_pose_of(end, grid), goal_horizon=end.horizon
@@ -356,8 +351,7 @@ def _ending(earned: StepReward) -> Ended | None:
 
 
 def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:
-    """Return the ids that ambiguous words mean: the plan's objects, and what they are in (one of
-    ten drawers)."""
+    """Return the ids that ambiguous words mean: the plan's objects, and what they are in."""
     named = [
         start.objects[key]
         for key in (target.object_id, target.receptacle_id)
@@ -367,8 +361,7 @@ def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:
 
 
 def _look_degrees(trajectory: Trajectory) -> float:
-    """Return the angle of most looks up or down in this trajectory: 15 degrees in ALFRED's, 30 in
-    others."""
+    """Return the angle of most looks up or down: 15 degrees in ALFRED's trajectories, else 30."""
     looks = Counter(
         degrees_of(low)
         for low in trajectory.plan.low_actions

@@ -102,8 +102,7 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         runner: PlanRunner,
         session: Session[PlanRecord],
     ) -> Iterator[UnitRecord[PlanRecord]]:
-        """Run the plans of a final task as the published scripts do, all of them even if some have
-        records."""
+        """Run all plans of a final task as the published scripts do, even if some have records."""
         fingerprints, known = self._find_records(group, session)
         tried = 0
         goes_on = True

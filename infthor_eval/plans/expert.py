@@ -71,8 +71,7 @@ class Replayed(NamedTuple):
 
 
 class Expert:
-    """Replays the expert of a trajectory, plan by plan; `grounding` has the ids of its objects in
-    this simulator."""
+    """Replays a trajectory's expert plan by plan; `grounding` has its objects' ids here."""
 
     def __init__(
         self,
@@ -126,14 +125,12 @@ class Expert:
         return self._starts[plan]
 
     def actions(self, plan: int) -> Sequence[ExpertAction]:
-        """Return the expert's actions of a plan; raises ExpertRefusedError as `start` of the next
-        plan does."""
+        """Return the expert's actions of a plan; raises as `start` of the next plan does."""
         self.start(plan + 1)
         return self._actions[plan]
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as
-        `start` does."""
+        """Return the history before a plan, if frames are kept; raises as `start` does."""
         segment = self._open_segment(plan)
         present = self._plans[plan]
         first = present.low[0]

@@ -30,8 +30,7 @@ class PlanKind(StrEnum):
 
 @dataclass(frozen=True)
 class TrajectoryTask:
-    """One task of a trajectory: its goal in words, as recorded and as a condition; its sub-goals
-    [first, end)."""
+    """One task: its goal in words, as recorded and as a condition; its sub-goals [first, end)."""
 
     text: str
     info: TaskInfo
@@ -102,8 +101,7 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
 
 
 def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
-    """Return the plans of a trajectory, in time order; sub-goals without an action (ALFRED's last
-    one) are left out.
+    """Return a trajectory's plans in time order; sub-goals without action (ALFRED's last) have none.
 
     Raises:
         DataError: a task has no goal, a sub-goal is of an unknown kind or cannot be said in these
@@ -140,8 +138,7 @@ def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
 
 
 def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
-    """Return a task for each part of the trajectory; some files have the final task apart from the
-    others."""
+    """Return a task for each part; some files have the final task apart from the others."""
     tasks = trajectory.sub_tasks
     parts = trajectory.sub_trajs
     final = trajectory.long_horizon_task

@@ -89,8 +89,7 @@ class PlanReward:
     def after(
         self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView
     ) -> StepReward:
-        """Return the reward of an action, as `Simulator.step(**call)` takes it; ValueError if the
-        plan is over."""
+        """Return the reward of a call of `Simulator.step`; ValueError if the plan is over."""
         if self._is_over:
             raise ValueError("the plan is over; begin the next one")
         action = call["action"]
@@ -195,8 +194,7 @@ class PlanReward:
     def _cool(
         self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
     ) -> StepReward:
-        """Reward three stages in their order: an object in the closed fridge is cold, but still to
-        be taken out."""
+        """Reward three stages in order: what is cold in the fridge is still to be taken out."""
         subject = self._subject or ""
         if subject not in self._in_plan.cold:
             return StepReward()
@@ -262,8 +260,7 @@ def max_reward(
 def count_actions_to_goal(
     rules: RewardRules, target: PlanTarget, poses: Sequence[AgentPose], grid: Grid | None = None
 ) -> int:
-    """Return how many of some actions a plan takes: GotoLocation is done some steps before the end
-    of a path.
+    """Return how many actions a plan takes: GotoLocation is done before its path's end.
 
     Args:
         target: target of the plan; plans of other kinds than GotoLocation take all actions.
@@ -303,8 +300,7 @@ class _PathsToGoal:
         self._distances = grid.distances_to(goal)
 
     def remaining(self, pose: AgentPose) -> float:
-        """Return the number of remaining actions; a partial look counts as one. Infinite if there
-        is no path."""
+        """Return the remaining actions, a partial look as one; infinite if there is no path."""
         steps = self._distances.get(grid_pose_of(pose, self._grid), math.inf)
         looks = abs(self._horizon - pose.horizon) / self._look_degrees
         return steps + math.ceil(looks - _SMALL_LOOK)

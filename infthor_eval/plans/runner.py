@@ -55,8 +55,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         folder: Path,
         seed: int,
     ) -> None:
-        """Take a trajectory, its simulator, what creates the actor, and an empty folder for
-        frames."""
+        """Take a trajectory, its simulator, the actor's factory, and an empty folder for frames."""
         frames = FrameFolder(folder) if factory.sees else NoFrames()
         super().__init__(
             simulator,
@@ -75,8 +74,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         self._seed = f"{seed}/{task.name}/{trajectory.traj_id}"
 
     def prepare(self, plans: Sequence[Plan]) -> None:
-        """Have the expert pass plans that are to follow each other without a reset, as far as it
-        can here.
+        """Have the expert pass plans that follow each other without a reset, as far as it can.
 
         Raises:
             SceneError: the simulator has no such scene.
@@ -127,8 +125,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         return EpisodeResult(_completed_record(self.begun, acts), _tokens(replies), faults)
 
     def _with_clue_tokens(self, begun: PlanRecord, plan: Plan) -> PlanRecord:
-        """Return the record with how far back the clue of a final task's plan is, in tokens of the
-        whole history."""
+        """Return the record with the distance of a final plan's clue, in tokens of the history."""
         clue = self._trajectory.clue(plan) if plan.is_final else None
         if clue is None or not isinstance(self._actor, CountingActor):
             return begun
@@ -177,8 +174,7 @@ def _step_record(act: Act, outcome: StepOutcome) -> StepRecord:
 
 
 def _tokens(replies: Sequence[Reply]) -> Tokens:
-    """Return the context of the last request, which holds those before it, and the tokens of all
-    replies."""
+    """Return the context of the last request, which holds earlier ones, and all reply tokens."""
     if not replies:
         return Tokens()
     counts = [reply.n_reply_tokens for reply in replies]

@@ -8,6 +8,7 @@ from types import NoneType
 from typing import Any
 
 import click
+import msgspec
 
 from infthor_eval.cli.options.values import WholeNumber, split_names
 from infthor_eval.errors import UsageError
@@ -22,21 +23,16 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
     Suites with an option of one name share it; its help has the text of each.
     """
     for name, by_suite in reversed(_options_by_name().items()):
-        first, item = next(iter(by_suite.items()))
+        first, option = next(iter(by_suite.items()))
         kind = _value_type(typing.get_type_hints(options_class(first))[name])
-        choices = item.metadata.get("choices")
+        choices = option.metadata.get("choices")
+        types = {bool: None, int: WholeNumber()}
         command = click.option(
             f"--{name.replace('_', '-')}",
-            type=None
-            if kind is bool
-            else click.Choice(choices)
-            if choices
-            else WholeNumber()
-            if kind is int
-            else kind,
+            type=click.Choice(choices) if choices else types.get(kind, kind),
             is_flag=kind is bool,
             default=None,
-            metavar=item.metadata.get("metavar"),
+            metavar=option.metadata.get("metavar"),
             help=_help(by_suite),
         )(command)
     return command
@@ -66,14 +62,16 @@ def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[
     _refuse_unused(given, used)
     kinds = typing.get_type_hints(options_class(suite))
     values: dict[str, list[Any]] = {}
-    for item in fields(options_class(suite)):
-        if given.get(item.name) is not None:
+    for option in fields(options_class(suite)):
+        if given.get(option.name) is not None:
             typed = (
-                split_names(given[item.name], f"--{item.name}")
-                if item.metadata.get("each")
-                else [given[item.name]]
+                split_names(given[option.name], f"--{option.name}")
+                if option.metadata.get("each")
+                else [given[option.name]]
             )
-            values[item.name] = [_value_type(kinds[item.name])(value) for value in typed]
+            values[option.name] = [
+                msgspec.convert(value, kinds[option.name], strict=False) for value in typed
+            ]
     return [
         options_class(suite)(**dict(zip(values, chosen, strict=True)))
         for chosen in product(*values.values())
@@ -102,8 +100,8 @@ def _options_by_name() -> dict[str, dict[str, Field[Any]]]:
     """The options of all suites by name, then by suite."""
     options: dict[str, dict[str, Field[Any]]] = {}
     for suite in suite_names():
-        for item in fields(options_class(suite)):
-            options.setdefault(item.name, {})[suite] = item
+        for option in fields(options_class(suite)):
+            options.setdefault(option.name, {})[suite] = option
     return options
 
 
@@ -119,8 +117,8 @@ def _refuse_unused(given: Mapping[str, Any], used: Collection[str]) -> None:
 def _help(by_suite: Mapping[str, Field[Any]]) -> str:
     """The text of each suite with the suites' names; equal texts once."""
     suites: dict[str, list[str]] = {}
-    for suite, item in by_suite.items():
-        suites.setdefault(item.metadata.get("help", ""), []).append(suite)
+    for suite, option in by_suite.items():
+        suites.setdefault(option.metadata.get("help", ""), []).append(suite)
     return " ".join(f"{text} [{', '.join(names)}]" for text, names in suites.items())
 
 

@@ -1,5 +1,4 @@
-"""Slicing and container content: what was sliced, and what a receptacle held, at a given step or
-always.
+"""Slicing and container content: what was sliced, and what a receptacle held, and when.
 
 Table 3's forms do not define which objects count as being in or on something, so they are used only
 where every reading gives the same answer (see `readings`). Our forms define it: objects that can be

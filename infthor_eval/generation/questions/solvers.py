@@ -43,8 +43,7 @@ class FrameFacts:
 def frame_facts(
     steps: Sequence[Step], share: float, frames: Container[int] | None = None
 ) -> list[FrameFacts]:
-    """Return the facts of the whole log, or what clue frames show: objects that fill a share of the
-    frame's pixels."""
+    """Return the facts of the log, or what clue frames show: objects of this share of pixels."""
     facts = []
     loose = frozenset(name for step in steps for name in step.object_log.pickupable)
     for step, states in zip(steps, iter_object_states(steps), strict=True):
@@ -99,8 +98,7 @@ def _is(state: ObjectState, words: str) -> bool:
 
 
 def _holder(glimpse: FrameFacts, key: str) -> str | None:
-    """Return what an object is directly in or on: the one of its parents that is in most of the
-    others."""
+    """Return what an object is directly in: the parent that is in most of the others."""
     # Not by `household.containment`, which the rules use: an independent check must not share its
     # errors.
     state = glimpse.objects[key]
@@ -230,8 +228,7 @@ def _journey(facts: Sequence[FrameFacts], words: str) -> list[str]:
 
 
 def _puts_at(facts: Sequence[FrameFacts], place: str, words: str | None = None) -> list[FrameFacts]:
-    """Return the facts right after puts (of an object of a type) into or onto a receptacle of a
-    type."""
+    """Return the facts right after puts (of a type of object) into a type of receptacle."""
     events = [item for item in _events(facts, "PutObject", words) if item.target in item.objects]
     return [item for item in events if _place(item, item.target or "") == _type_name(place)]
 
@@ -354,8 +351,7 @@ def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) ->
 
 
 def _only_loose(item: FrameFacts) -> FrameFacts:
-    """Return the facts without the fixtures in or on others; objects without a parent remain, as
-    possible holders."""
+    """Return the facts without fixtures in or on others; those without a parent are holders."""
     remaining = {
         key: state
         for key, state in item.objects.items()
@@ -379,8 +375,7 @@ def _is_in(facts: Sequence[FrameFacts], item: str, _preposition: str, place: str
 
 
 def _last_inside(facts: Sequence[FrameFacts], place: str) -> dict[str, str]:
-    """Return what is in a receptacle in the end, by id: where each object is at the last frame that
-    shows it."""
+    """Return what is in a receptacle in the end, by id, each at the last frame that shows it."""
     if facts[-1].everything:
         return {key: _name(facts[-1].objects[key].type) for key in _inside(facts[-1], place)}
     names: dict[str, str] = {}
@@ -404,8 +399,7 @@ def _how_many(facts: Sequence[FrameFacts], _preposition: str, place: str) -> lis
 
 
 def _moves(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    """Return how often it was put down; with full knowledge, it must have been picked up as
-    often."""
+    """Return how often it was put down; the whole log must have as many pick-ups."""
     count = len(_events(facts, "PutObject", words))
     paired = not facts[0].everything or count == len(_events(facts, "PickupObject", words)) > 1
     return [str(count)] if count and paired else []

@@ -1,5 +1,4 @@
-"""Baselines that see no frame: the expert, chance, a script for a plan's words, and habits of
-experts."""
+"""Baselines that see no frame: expert, chance, a script for a plan's words, experts' habits."""
 
 import random
 from collections.abc import Callable, Mapping, Sequence
@@ -85,8 +84,7 @@ class PlannerAgent(_PlanBaseline):
 
 
 class RandomAgent(_PlanBaseline):
-    """Draws uniformly, by the situation's seed alone, from the calls possible in view: each action
-    with each object."""
+    """Draws uniformly, by the seed alone, from the calls possible in view, with any object."""
 
     name = "random"
     _actor = _RandomPlanActor
@@ -100,8 +98,7 @@ class ScriptedAgent(_PlanBaseline):
 
 
 class HabitualAgent(_PlanBaseline):
-    """Does what experts did next in other scenes, after the same action in a plan of the same
-    words; see `Habits`."""
+    """Does what experts did next elsewhere, after the same action in an equal plan (`Habits`)."""
 
     name = "history"
 

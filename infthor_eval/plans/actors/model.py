@@ -97,8 +97,7 @@ class ModelActor:
         return Act(answer_of(reply).answer, reply)
 
     def observe(self, outcome: StepOutcome) -> None:
-        """See `PlanActor`; the action is appended as it was understood, not as the model wrote
-        it."""
+        """See `PlanActor`; the action is appended as it was understood, not as it was written."""
         self._observation = outcome.observation
         if self._asks_anew:
             return

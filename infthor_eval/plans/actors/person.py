@@ -10,8 +10,7 @@ __all__ = ["PersonActor"]
 
 
 class PersonActor(ModelActor):
-    """Asks a person for one action after the other; tells goal, plan, rewards, and the actions that
-    are possible."""
+    """Asks a person for actions; tells goal, plan, rewards, and the actions that are possible."""
 
     def __init__(self, person: Attended, config: AgentConfig) -> None:
         super().__init__(person, config)

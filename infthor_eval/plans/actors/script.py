@@ -54,8 +54,7 @@ def replace_objects(plan: str, types: Sequence[str]) -> str:
 
 
 def scripted_action(plan: str, done: Sequence[str]) -> str:
-    """Return the next action of a plan's script, after the actions done so far; its last action is
-    repeated."""
+    """Return the next action of a plan's script after those done; its last one is repeated."""
     actions = _script(*read_plan(plan))
     return actions[min(len(done), len(actions) - 1)]
 
@@ -85,8 +84,7 @@ def _treat(item: str, appliance: str, treatment: list[str]) -> list[str]:
 
 
 def _inside(receptacle: str, action: str) -> list[str]:
-    """Return the action, with the receptacle opened before and closed after it if it is closed at
-    first."""
+    """Return the action, within opening and closing the receptacle if it is closed at first."""
     if receptacle not in _CLOSED:
         return [action]
     return [f"OpenObject {receptacle}", action, f"CloseObject {receptacle}"]

@@ -10,8 +10,7 @@ __all__ = ["GoalHistory", "PlanHistory"]
 
 
 class GoalHistory:
-    """The whole history with goals and actions, in which each plan begins with a mark and no
-    text."""
+    """The whole history with goals and actions; plans begin with a mark and have no text."""
 
     needs_state: ClassVar[bool] = False
 
@@ -30,8 +29,7 @@ class GoalHistory:
 
 
 class PlanHistory:
-    """The plans before in words, without goal, frame or the plan itself; the present frame
-    follows."""
+    """The plans before in words, without goal, frame or the plan; the present frame follows."""
 
     needs_state: ClassVar[bool] = False
 

@@ -49,8 +49,7 @@ class PublishedHistory:
 
 
 class LastTokens:
-    """As many of the last plans as fit, after the goal that they belong to and the frame that they
-    begin with.
+    """As many of the last plans as fit, after their goal and the frame that they begin with.
 
     Whole plans are left out, from the first on, and the goal is repeated if the rest would begin
     without it. So every window has the form of a trajectory's beginning, which is what the models
@@ -60,8 +59,7 @@ class LastTokens:
     needs_state: ClassVar[bool] = False
 
     def __init__(self, n_tokens: int) -> None:
-        """Set the maximum number of tokens before the model's first action; the plan's own steps
-        come on top."""
+        """Set the maximum tokens before the first action; the plan's own steps come on top."""
         self._n_tokens = n_tokens
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:

@@ -82,8 +82,7 @@ class Past:
 
 
 class History(Protocol):
-    """Selects what a model is given of the past; `needs_state` tells whether it needs the state in
-    words."""
+    """Selects a model's past; `needs_state` tells whether it needs the state in words."""
 
     needs_state: ClassVar[bool]
 

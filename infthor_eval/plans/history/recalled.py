@@ -27,8 +27,7 @@ __all__ = ["MemoryChoice", "RecalledHistory"]
 
 
 class RecalledHistory:
-    """What a memory recalls of the steps before the present one (`infthor_eval.memory`), the goal,
-    and that frame.
+    """What a memory (`infthor_eval.memory`) recalls of earlier steps, the goal, and the frame.
 
     The memory observes each step once, as long as one episode goes on.
     """

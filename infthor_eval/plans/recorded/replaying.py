@@ -50,9 +50,9 @@ class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
     """What a run recorded of the plans of one trajectory."""
 
     def between(self, first: int, last: int) -> list[Record]:
-        """Return the records of plans by number, from 1 on, ends included; UsageError if the run
-        lacks some of them."""
-        lowest, highest = (self.records[place].payload.index + 1 for place in (0, -1))
+        """Return the records of plans by number, from 1, ends included; UsageError if lacking."""
+        lowest = self.records[0].payload.index + 1
+        highest = self.records[-1].payload.index + 1
         if not lowest <= first <= last <= highest:
             chosen = f"{first}" if first == last else f"{first}-{last}"
             raise UsageError(
@@ -85,8 +85,7 @@ def replay_plans(
 
 
 class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
-    """A simulator in which recorded plans are replayed. It is started, and the scene restored, for
-    the first plan."""
+    """A simulator in which recorded plans are replayed, started and restored for the first plan."""
 
     def __init__(
         self,
@@ -155,8 +154,7 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
         )
 
     def _rewards(self, plan: PlanRecord, number: int) -> PlanRewards:
-        """Return the rewards after a number of actions; excluded plans of the trajectory do not
-        count."""
+        """Return the rewards after some actions; excluded plans do not count."""
         steps = plan.steps[:number]
         earned = sum(step.reward for step in steps)
         so_far = [item.payload for item in self._recorded.records if item.excluded is None]
@@ -256,8 +254,7 @@ def _success_text(message: str) -> str:
 
 
 def _action_text(step: StepRecord) -> str:
-    """Return the action in words; of an action given as a call, as by a baseline, the record has
-    its name alone."""
+    """Return the action in words; the record of a call has its name alone."""
     object_id = (step.call or {}).get("objectId")
     if isinstance(object_id, str) and step.call is not None and step.action == step.call["action"]:
         return str(text_of(step.action, object_id))

@@ -19,8 +19,7 @@ __all__ = ["PlanTaskConfig", "PlansRun", "shared_plans"]
 
 
 class PlanTaskConfig(TaskConfig, frozen=True, kw_only=True):
-    """The part of a task's run config that curves and replays need; `rewards` is as `RewardRules`
-    decodes it.
+    """A task's run config as curves and replays need it; `rewards` decode as `RewardRules`.
 
     All of these are None for imported counts.
     """
@@ -50,8 +49,7 @@ class PlansRun(RecordedRun[PlanRecord, PlanTaskConfig]):
 
 
 def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[PlanRecord]:
-    """Find the plans of a task (None: the only one shared) in trajectories that all runs (at least
-    one) have in full.
+    """Find a task's plans (None: the only shared one) in trajectories that all runs have in full.
 
     Raises:
         UsageError: they share no task or several, or their reward rules differ.
