@@ -179,7 +179,8 @@ class PlanEnvironment:
         # The whole plan is replayed before its start is restored: a plan whose expert fails here is
         # infeasible, and the expert's end is the goal of GotoLocation.
         expert_actions = self._expert.actions(plan)
-        start, end = self._expert.start(plan), self._expert.start(plan + 1)
+        start = self._expert.start(plan)
+        end = self._expert.start(plan + 1)
         view = self._simulator.rewind(start.mark, exactly=True)
         self._plan = present
         self._n_steps = 0
@@ -190,9 +191,8 @@ class PlanEnvironment:
             self._reward = PublishedReward(scripted.task.copy(), scripted.sub_goal)
             info |= {"max_reward": scripted.planner_reward, "expert_reward": scripted.expert_reward}
         else:
-            info["max_reward"] = self._begin_default(
-                present, view, start.treatments, end.mark.view.agent
-            )
+            goal = end.mark.view.agent
+            info["max_reward"] = self._begin_default(present, view, start.treatments, goal)
         return Observation(view, start.frame), info
 
     def go_on(self, plan: int) -> tuple[Observation, Mapping[str, Any]]:
@@ -232,9 +232,8 @@ class PlanEnvironment:
         target = self._target(plan, view, end, grid)
         self._preferred = _preferred_objects(target, view)
         self._reward = PlanReward(self._rules, target, task, view, treatments, grid)
-        n_actions = count_actions_to_goal(
-            self._rules, target, [action.pose for action in actions], grid
-        )
+        poses = [action.pose for action in actions]
+        n_actions = count_actions_to_goal(self._rules, target, poses, grid)
         completes = any(action.completes for action in actions[:n_actions])
         return max_reward(self._rules, target, view, grid, task if completes else None)
 
@@ -276,14 +275,10 @@ class PlanEnvironment:
         """
         present = self.plans[plan]
         view = self._expert.start(plan).mark.view
-        grounding = deepcopy(
-            self._expert.grounding
-        )  # it remembers its choices, and a picture must not decide any
-        ids = (
-            grounding.ground(key, view)
-            for key in (present.object_id, present.receptacle_id)
-            if key is not None
-        )
+        # A grounding remembers its choices, and a picture must not decide any.
+        grounding = deepcopy(self._expert.grounding)
+        recorded = filter(None, (present.object_id, present.receptacle_id))
+        ids = [grounding.ground(key, view) for key in recorded]
         return [key for key in ids if key is not None]
 
     def _ground(
@@ -313,8 +308,8 @@ class PlanEnvironment:
         if ended is not None or truncated:
             conditions = self._conditions(after)
             self._plan = None
-        said = Ended.LIMIT if truncated else ended
-        info = StepInfo(call, text, after.error, said, self._reward.goal_reached, conditions)
+        ending = Ended.LIMIT if truncated else ended
+        info = StepInfo(call, text, after.error, ending, self._reward.goal_reached, conditions)
         observation = Observation(after, self._frames.keep(after))
         return StepOutcome(observation, earned.reward, ended is not None, truncated, info)
 
@@ -323,9 +318,8 @@ class PlanEnvironment:
     ) -> PlanTarget:
         """Return a plan's target; that of GotoLocation is the pose in which the expert ended."""
         if grid is not None:
-            return PlanTarget(
-                plan.kind, goal_stand=grid_pose_of(end, grid), goal_horizon=end.horizon
-            )
+            stand = grid_pose_of(end, grid)
+            return PlanTarget(plan.kind, goal_stand=stand, goal_horizon=end.horizon)
         return target_of(plan, self._expert.grounding, view)
 
     def _grid(
@@ -352,12 +346,11 @@ def _ending(earned: StepReward) -> Ended | None:
 
 def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:
     """Return the ids that ambiguous words mean: the plan's objects, and what they are in."""
-    named = [
-        start.objects[key]
-        for key in (target.object_id, target.receptacle_id)
-        if key in start.objects
-    ]
-    return {key for item in named for key in (item.object_id, *(item.parent_receptacles or ()))}
+    preferred = set()
+    for key in (target.object_id, target.receptacle_id):
+        if key in start.objects:
+            preferred |= {key, *(start.objects[key].parent_receptacles or ())}
+    return preferred
 
 
 def _look_degrees(trajectory: Trajectory) -> float:

@@ -169,17 +169,14 @@ class Expert:
                 self._log.record(step.view, step=number, action=step.action.text)
         if start.frame is not None:
             segment = self._open_segment(plan.index)
-            after = tuple(
-                (step.action.text, step.frame) for step in steps if step.frame is not None
-            )
-            self._segments.append(replace(segment, steps=after))
+            after = [(step.action.text, step.frame) for step in steps if step.frame is not None]
+            self._segments.append(replace(segment, steps=tuple(after)))
         self._actions.append([step.action for step in steps])
         self._watch(plan, steps)
         following = self._plans[plan.index + 1 : plan.index + 2]
-        task_goes_on = any(item.task == plan.task for item in following)
-        self._starts.append(
-            PlanStart(mark, last.frame, last.treatments if task_goes_on else Treatments())
-        )
+        task_goes_on = [after.task for after in following] == [plan.task]
+        treatments = last.treatments if task_goes_on else Treatments()
+        self._starts.append(PlanStart(mark, last.frame, treatments))
 
     def _steps(self, plan: Plan, start: PlanStart) -> Iterator[Replayed]:
         view = self._simulator.rewind(start.mark, exactly=True)

@@ -70,7 +70,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
                 in_one_go=task.final_form is not None,
             ),
         )
-        self._trajectory, self._actor = trajectory, factory.create(task, trajectory.data)
+        self._trajectory = trajectory
+        self._actor = factory.create(task, trajectory.data)
         self._seed = f"{seed}/{task.name}/{trajectory.traj_id}"
 
     def prepare(self, plans: Sequence[Plan]) -> None:
@@ -96,19 +97,16 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             SimulatorError: the simulator fails.
         """
         environment = self.environment
-        observation, info = (
-            environment.go_on(plan.index) if goes_on else environment.reset(plan.index)
-        )
-        record = plan_record(self._trajectory, plan)
+        begin = environment.go_on if goes_on else environment.reset
+        observation, info = begin(plan.index)
         of_expert = info["expert_reward"]
         self.begun = msgspec.structs.replace(
-            record,
+            plan_record(self._trajectory, plan),
             max_reward=round(info["max_reward"], _DIGITS),
             expert_reward=None if of_expert is None else round(of_expert, _DIGITS),
         )
-        self._actor.begin(
-            PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation, goes_on)
-        )
+        seed = f"{self._seed}/{plan.index}"
+        self._actor.begin(PlanSituation(environment, plan, seed, observation, goes_on))
         self.begun = self._with_clue_tokens(self.begun, plan)
         acts: list[tuple[Act, StepOutcome]] = []
         while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):
@@ -143,9 +141,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             SimulatorError: as `run`.
         """
         self.environment.expert_actions(plan.index)
-        return EpisodeResult(
-            msgspec.structs.replace(plan_record(self._trajectory, plan), ended=NOT_ATTEMPTED)
-        )
+        record = plan_record(self._trajectory, plan)
+        return EpisodeResult(msgspec.structs.replace(record, ended=NOT_ATTEMPTED))
 
 
 def _completed_record(begun: PlanRecord, acts: Sequence[tuple[Act, StepOutcome]]) -> PlanRecord:

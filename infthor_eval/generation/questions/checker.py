@@ -1,6 +1,6 @@
 """An independent check of questions, which answers their text in another way than the rules.
 
-The answer is computed from the facts of frames (see `solvers`). Facts of the whole log have the
+The answer is computed from the facts of frames (see `facts`). Facts of the whole log have the
 true states of all objects. Facts of clue frames have only what the frame's entry shows: the action
 before it, and the objects that are large enough to be seen. A question is sound if both give its
 gold answer, and no smaller set of clues does.
@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import Step
-from infthor_eval.generation.questions.solvers import FrameFacts, answer, frame_facts
+from infthor_eval.generation.questions.facts import FrameFacts, frame_facts
+from infthor_eval.generation.questions.solvers import answer
 
 __all__ = ["Checker", "Verdict"]
 
@@ -43,7 +44,7 @@ class Checker:
         """Read the log; objects that fill this share of the frame's pixels count as seen."""
         self._whole = frame_facts(steps, share)
         each_frame = frame_facts(steps, share, range(len(steps)))
-        self._single = {facts.frame: facts for facts in each_frame}
+        self._single = {frame.number: frame for frame in each_frame}
 
     def verdict(self, question: Question) -> Verdict:
         """Check one question.
@@ -61,7 +62,7 @@ class Checker:
         shown = [self._single[clue] for clue in clues]
         n_necessary = 0
         for skipped in clues:
-            n_necessary += not gives_gold([facts for facts in shown if facts.frame != skipped])
+            n_necessary += not gives_gold([frame for frame in shown if frame.number != skipped])
         if question.question_type == "movement_counting_further":
             minimal = [str(n_necessary)] == gold and n_necessary < len(clues)
         else:

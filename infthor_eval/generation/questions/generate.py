@@ -112,13 +112,7 @@ def generate_questions(
         )
     simulator_of(folder)  # raises for another format version
     result = GeneratedQuestions()
-    types: dict[Path, frozenset[str]] = {}
-    for path in _trajectory_folders(folder):
-        try:
-            types[path] = _read_history(path, share).all_object_types
-        except DataError as error:
-            result.skipped.append(str(error))
-    result.trajectories = len(types)
+    types = _object_types(folder, share, result)
     rooms = {path: rooms_of(names) for path, names in types.items()}
     vocabularies: dict[str, frozenset[str]] = {}
     for path, kind in rooms.items():
@@ -145,6 +139,20 @@ def generate_questions(
                 question = in_published_words(candidate, name)
             (result.questions if is_sound else result.unconfirmed).append(question)
     return result
+
+
+def _object_types(
+    folder: Path, share: float, result: GeneratedQuestions
+) -> dict[Path, frozenset[str]]:
+    """Return the object types of each trajectory; those that cannot be read are skipped."""
+    types: dict[Path, frozenset[str]] = {}
+    for path in _trajectory_folders(folder):
+        try:
+            types[path] = _read_history(path, share).all_object_types
+        except DataError as error:
+            result.skipped.append(str(error))
+    result.trajectories = len(types)
+    return types
 
 
 @dataclass(frozen=True)
@@ -233,11 +241,9 @@ def _telling_inconsistency(path: Path) -> AbstractContextManager[None]:
 
 def _trajectory_folders(folder: Path) -> list[Path]:
     metadata = folder / "metadata"
-    folders = (
-        sorted(path for path in metadata.glob("*/") if not path.name.startswith("."))
-        if metadata.is_dir()
-        else []
-    )
+    folders: list[Path] = []
+    if metadata.is_dir():
+        folders = sorted(path for path in metadata.glob("*/") if not path.name.startswith("."))
     if not folders:
         raise DataError(f"{metadata}: has no trajectory; replay some into this set first")
     return folders

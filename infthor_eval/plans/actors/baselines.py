@@ -56,11 +56,8 @@ class _RandomPlanActor(_BlindActor):
         self._random = random.Random(situation.seed)
 
     def act(self) -> Act:
-        return Act(
-            self._random.choice(
-                applicable_calls(self._view, self._situation.environment.look_degrees)
-            )
-        )
+        look_degrees = self._situation.environment.look_degrees
+        return Act(self._random.choice(applicable_calls(self._view, look_degrees)))
 
 
 class _ScriptedActor(_BlindActor):
@@ -109,7 +106,7 @@ class HabitualAgent(_PlanBaseline):
     def actor(self, trajectory: Trajectory, words: Words) -> _HabitualActor:
         """See `PlanBaseline`; it learns from other scenes than the trajectory's."""
         scene = trajectory.scene.floor_plan
-        elsewhere = (item for item in self._trajectories if item.scene.floor_plan != scene)
+        elsewhere = (one for one in self._trajectories if one.scene.floor_plan != scene)
         return _HabitualActor(Habits(elsewhere, words))
 
 

@@ -51,9 +51,7 @@ class PersonActor(ModelActor):
         """See `EndedActor`."""
         self._add(outcome)
         ended = f"{self._title}. {outcome.info.ended}".rstrip()
-        self._news = " ".join(
-            filter(None, (f"{ended}, reward {self._of_plan:g}.", outcome.info.message))
-        )
+        self._news = f"{ended}, reward {self._of_plan:g}. {outcome.info.message}".rstrip()
 
     def _add(self, outcome: StepOutcome) -> None:
         self._of_plan = round(self._of_plan + outcome.reward, 6)

@@ -10,9 +10,8 @@ __all__ = ["read_plan", "replace_objects", "scripted_action"]
 
 _TYPES = {compact_name(name): name for name in sorted(KNOWN_TYPES)}
 _TYPES |= {"sink": "SinkBasin", "bathtub": "BathtubBasin"}  # things are put into the basin
-_CLOSED = frozenset(
-    {"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"}
-)  # at first, as a rule
+# At first, as a rule.
+_CLOSED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"})
 _VERBS = ("go to", "open", "close", "pick up", "put", "wash", "heat", "cool", "toggle", "slice")
 _PLAN = re.compile(rf"({'|'.join(_VERBS)}) (?:the )?(\S+)(?: in the (\S+))?")
 
@@ -41,15 +40,11 @@ def replace_objects(plan: str, types: Sequence[str]) -> str:
     """Return a plan of the usual form with other objects, in the order in which it names them."""
     match = _PLAN.fullmatch(plan)
     assert match is not None
-    for group, name in reversed(
-        [*enumerate(types, start=2)]
-    ):  # from the end, so that earlier spans stay valid
+    # From the end, so that earlier spans stay valid.
+    for group, name in reversed([*enumerate(types, start=2)]):
         start, end = match.span(group)
-        plan = (
-            plan[:start]
-            + (compact_name(name) if match.group(group).islower() else name)
-            + plan[end:]
-        )
+        word = compact_name(name) if match.group(group).islower() else name
+        plan = plan[:start] + word + plan[end:]
     return plan
 
 
@@ -68,13 +63,15 @@ def _script(verb: str, types: tuple[str, ...]) -> list[str]:
         "pick up": [f"PickupObject {item}"],
         "toggle": [f"ToggleObjectOn {item}"],
         "put": _inside(receptacle, f"PutObject {item} {receptacle}"),
-        "wash": _treat(item, "SinkBasin", ["ToggleObjectOn Faucet", "ToggleObjectOff Faucet"]),
-        "heat": _treat(
-            item, "Microwave", ["ToggleObjectOn Microwave", "ToggleObjectOff Microwave"]
-        ),
+        "wash": _treat(item, "SinkBasin", _switch("Faucet")),
+        "heat": _treat(item, "Microwave", _switch("Microwave")),
         "cool": _treat(item, "Fridge", []),
     }
     return scripts.get(verb, ["MoveAhead"])
+
+
+def _switch(name: str) -> list[str]:
+    return [f"ToggleObjectOn {name}", f"ToggleObjectOff {name}"]
 
 
 def _treat(item: str, appliance: str, treatment: list[str]) -> list[str]:

@@ -22,9 +22,8 @@ class GoalHistory:
                 parts += goal_part(segment.goal), past.all[0].before
             if segment.steps and segment.in_task:
                 parts.append(ACT)
-                parts += (
-                    part for action, frame in segment.steps for part in (action_part(action), frame)
-                )
+                for action, frame in segment.steps:
+                    parts += action_part(action), frame
         return parts
 
 
@@ -36,8 +35,5 @@ class PlanHistory:
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`."""
         plans = [segment.plan for segment in past.segments if segment.in_task]
-        return [
-            f"Action history: {'; '.join(plans)};\n"
-            if plans
-            else "Action history: No history is available.\n"
-        ]
+        text = f"{'; '.join(plans)};" if plans else "No history is available."
+        return [f"Action history: {text}\n"]

@@ -38,10 +38,10 @@ def clue_step(
     None if it was never in view, or if that is not known.
     """
     wanted = _wanted(trajectory.plan.high_pddl[plan.high], plan.kind)
-    frames = range(min(before + 1, len(logs)))
-    return next(
-        (frame for frame in reversed(frames) if wanted in map(str.lower, logs[frame].visible)), None
-    )
+    for frame in reversed(range(min(before + 1, len(logs)))):
+        if wanted in map(str.lower, logs[frame].visible):
+            return frame
+    return None
 
 
 def _wanted(high: HighAction, kind: PlanKind) -> str:

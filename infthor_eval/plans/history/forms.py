@@ -42,9 +42,8 @@ class PublishedHistory:
                 parts += goal_part(segment.goal), past.all[0].before
             if segment.in_task:
                 parts += plan_part(segment.plan), *((ACT,) if segment.steps else ())
-                parts += (
-                    part for action, frame in segment.steps for part in (action_part(action), frame)
-                )
+                for action, frame in segment.steps:
+                    parts += action_part(action), frame
         return parts
 
 
@@ -65,7 +64,7 @@ class LastTokens:
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`; by bisection, as each count encodes the window."""
         segments = past.all
-        # number of last segments
+        # Numbers of last segments.
         least = 1
         most = len(segments)
         if not self._fits(segments, least, count):
@@ -121,9 +120,8 @@ def history_named(text: str, memory: MemoryChoice) -> History:
     if text == "memory":
         return memory.open()
     memory.refuse(text)
-    if (
-        kind == "frames" and size
-    ):  # where the trajectories have no frames of their own for `retrieved:K`
+    if kind == "frames" and size:
+        # Where the trajectories have no frames of their own for `retrieved:K`.
         return MemoryChoice("clip-view", f"k={size}", None, memory.retriever, memory.blank).open()
     if memory.retriever is not None:
         raise UsageError(

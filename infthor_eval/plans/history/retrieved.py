@@ -80,30 +80,30 @@ def retrieved_steps(trajectory: Trajectory, action: int, k: int) -> Sequence[int
     Raises:
         DataError: it names none, or one that is not known or is taken after the action.
     """
-    place = f'trajectory {trajectory.traj_id}: retrieved_image["{action}"]["top{k}"]'
-    names = _names(trajectory.retrieved_image, action, k, place)
+    entry = f'trajectory {trajectory.traj_id}: retrieved_image["{action}"]["top{k}"]'
+    names = _names(trajectory.retrieved_image, action, k, entry)
     steps = _steps_of_images(trajectory)
-    found = [steps.get(Path(name).stem) for name in names]
-    for name, step in zip(names, found, strict=True):
+    retrieved = []
+    for name in names:
+        step = steps.get(Path(name).stem)
         if step is None or step > action:
             wrong = "is in no entry of images" if step is None else "is taken after that action"
-            raise DataError(f"{place}: {name!r:.60} {wrong}; restore the file")
-    return [step for step in found if step is not None]
+            raise DataError(f"{entry}: {name!r:.60} {wrong}; restore the file")
+        retrieved.append(step)
+    return retrieved
 
 
-def _names(retrieved: Mapping[str, Any] | None, action: int, k: int, place: str) -> Sequence[str]:
-    entry = (retrieved or {}).get(str(action))
-    if entry is None or (isinstance(entry, dict) and f"top{k}" not in entry):
-        there = (
-            f"it has {', '.join(sorted(entry))}"
-            if entry
-            else "nothing was retrieved before this action"
-        )
-        raise DataError(f"{place} is not in the file ({there}); take --history frames:{k}")
-    with wrap_errors(
-        f"{place} is no list of frame names", "restore the file", catch=msgspec.ValidationError
-    ):
-        return msgspec.convert(entry, dict[str, list[str]])[f"top{k}"]
+def _names(retrieved: Mapping[str, Any] | None, action: int, k: int, entry: str) -> Sequence[str]:
+    """Return the file names of frames before an action; `entry` says in messages where they are."""
+    lists = (retrieved or {}).get(str(action))
+    if lists is None or (isinstance(lists, dict) and f"top{k}" not in lists):
+        there = "nothing was retrieved before this action"
+        if lists:
+            there = f"it has {', '.join(sorted(lists))}"
+        raise DataError(f"{entry} is not in the file ({there}); take --history frames:{k}")
+    problem = f"{entry} is no list of frame names"
+    with wrap_errors(problem, "restore the file", catch=msgspec.ValidationError):
+        return msgspec.convert(lists, dict[str, list[str]])[f"top{k}"]
 
 
 def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:

@@ -109,10 +109,8 @@ def _printed(
         cells.append(f"{value:.1f}{'' if follows else '*'}")
         if not follows:
             why = _explanation(f"{value:.1f}", name, counts)
-            notes.append(
-                f"*: {row.name}, {name}: printed {value:.1f}, in the log {_cell(counts[name])}. "
-                f"{why}"
-            )
+            logged = f"in the log {_cell(counts[name])}"
+            notes.append(f"*: {row.name}, {name}: printed {value:.1f}, {logged}. {why}")
     return cells, notes
 
 

@@ -64,10 +64,8 @@ def import_counts(log: PlanLog, model: str | None = None) -> ImportedCounts:
     refused = tuple(UnreadRow(line, problem) for line in mixed)
     records = tuple(record for row in whole for record in _records(row))
     if not records:
-        raise DataError(
-            f"{log.path}: none of its plans can be imported; give a log that counts goto, pick and "
-            "put"
-        )
+        hint = "give a log that counts goto, pick and put"
+        raise DataError(f"{log.path}: none of its plans can be imported; {hint}")
     without = [row.traj_id for row in log.rows if not row.total.n]
     unread = (*log.unread, *refused)
     return ImportedCounts(log, _header(name, log, without, unread), records, len(without), unread)

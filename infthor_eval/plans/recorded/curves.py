@@ -65,10 +65,8 @@ def _functions(trajectories: Sequence[Earned[PlanRecord]]) -> Functions:
 
 
 def _over_steps(units: Earned[PlanRecord]) -> StepFunction:
-    ends = [
-        (record.payload.first_step + record.payload.n_expert_steps, reward)
-        for record, reward in units
-    ]
+    plans = [(record.payload, reward) for record, reward in units]
+    ends = [(plan.first_step + plan.n_expert_steps, reward) for plan, reward in plans]
     return StepFunction.of(ends, start=units[0][0].payload.first_step)
 
 

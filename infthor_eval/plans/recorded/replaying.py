@@ -116,11 +116,14 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
             rules = msgspec.convert(config.rewards, RewardRules)
             max_steps = msgspec.convert(config.settings.get("max_steps", MAX_STEPS), int)
         simulator = self._start_simulator()
-        data = self._trajectory.data
-        words = _words(config)
-        return PlanEnvironment(
-            data, simulator, rules=rules, words=words, max_steps=max_steps
-        ), simulator
+        environment = PlanEnvironment(
+            self._trajectory.data,
+            simulator,
+            rules=rules,
+            words=_words(config),
+            max_steps=max_steps,
+        )
+        return environment, simulator
 
     def _place(self, record: Record, number: int) -> str:
         return f"plan {record.payload.index + 1}, action {number}"
@@ -157,13 +160,15 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
         """Return the rewards after some actions; excluded plans do not count."""
         steps = plan.steps[:number]
         earned = sum(step.reward for step in steps)
-        so_far = [item.payload for item in self._recorded.records if item.excluded is None]
+        counted = [r.payload for r in self._recorded.records if r.excluded is None]
+        before = [other.reward for other in counted if other.index < plan.index]
+        most = [other.max_reward or 0.0 for other in counted if other.index <= plan.index]
         return PlanRewards(
             step=steps[-1].reward if steps else None,
             plan=earned,
             max_of_plan=plan.max_reward,
-            so_far=sum(item.reward for item in so_far if item.index < plan.index) + earned,
-            max_so_far=sum(item.max_reward or 0.0 for item in so_far if item.index <= plan.index),
+            so_far=sum(before) + earned,
+            max_so_far=sum(most),
         )
 
 
@@ -179,10 +184,9 @@ class _PlanInReplay:
         self._named = frozenset(environment.named_objects(plan))
         grid = reachable_grid(simulator)
         self._floor = tuple(grid.position(cell) for cell in sorted(grid.cells))
-        leads_somewhere = environment.plans[plan].kind == PlanKind.GOTO
-        self._goal = (
-            _floor_pose(environment.expert_actions(plan)[-1].pose) if leads_somewhere else None
-        )
+        self._goal: FloorPose | None = None
+        if environment.plans[plan].kind == PlanKind.GOTO:
+            self._goal = _floor_pose(environment.expert_actions(plan)[-1].pose)
 
     def repeat(self, step: StepRecord, *, is_last: bool) -> str:
         """See `EpisodeInReplay`; a reply that could not be executed has no call to repeat."""
@@ -201,30 +205,27 @@ class _PlanInReplay:
         view = self._view
         if view.frame is None:
             raise DataError("the simulator sent no frame; use one that renders")
-        drawn = (self._map_object(item) for item in view.objects.values() if self._is_drawn(item))
-        room = RoomMap(self._floor, tuple(item for item in drawn if item is not None), self._goal)
+        drawn = map(self._map_object, filter(self._is_drawn, view.objects.values()))
+        objects = tuple(each for each in drawn if each is not None)
+        room = RoomMap(self._floor, objects, self._goal)
         held = tuple(map(object_type_of, view.inventory))
         return PlanObservation(view.frame, room, _floor_pose(view.agent), tuple(self._walked), held)
 
-    def _is_drawn(self, item: ThorObject) -> bool:
-        if item.is_picked_up or item.object_type == _FLOOR:
+    def _is_drawn(self, thor_object: ThorObject) -> bool:
+        if thor_object.is_picked_up or thor_object.object_type == _FLOOR:
             return False
-        return item.object_id in self._named or (
-            not item.pickupable and (item.receptacle or item.moveable)
-        )
+        if thor_object.object_id in self._named:
+            return True
+        return not thor_object.pickupable and (thor_object.receptacle or thor_object.moveable)
 
-    def _map_object(self, item: ThorObject) -> MapObject | None:
-        box = item.axis_aligned_bounding_box
+    def _map_object(self, thor_object: ThorObject) -> MapObject | None:
+        box = thor_object.axis_aligned_bounding_box
         if box is None:
             return None
-        x = box.center.x
-        z = box.center.z
-        half_x = box.size.x / 2
-        half_z = box.size.z / 2
-        is_named = item.object_id in self._named
-        return MapObject(
-            item.object_type, (x - half_x, z - half_z), (x + half_x, z + half_z), is_named
-        )
+        low = box.center.x - box.size.x / 2, box.center.z - box.size.z / 2
+        high = box.center.x + box.size.x / 2, box.center.z + box.size.z / 2
+        is_named = thor_object.object_id in self._named
+        return MapObject(thor_object.object_type, low, high, is_named)
 
 
 def _words(config: PlanTaskConfig) -> Words:
@@ -235,10 +236,8 @@ def _words(config: PlanTaskConfig) -> Words:
 def _difference(step: StepRecord, outcome: StepOutcome, is_over: bool, is_last: bool) -> str:
     message = outcome.info.message
     if bool(step.message) != bool(message):
-        return (
-            f"{step.action} {_success_text(message)} now, and {_success_text(step.message)} in the "
-            "run"
-        )
+        now, then = _success_text(message), _success_text(step.message)
+        return f"{step.action} {now} now, and {then} in the run"
     if abs(outcome.reward - step.reward) > _TOLERANCE:
         return f"{step.action} earns {outcome.reward:g} now, and {step.reward:g} in the run"
     if is_over != is_last:
