@@ -1,4 +1,4 @@
-"""Results of runs on standard output: tables, or a form for another program."""
+"""Results of runs on standard output: tables, or a format for another program."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -62,13 +62,13 @@ def read_run_results(folder: Path) -> RunResults:
 
 def print_results(runs: Sequence[RunResults], options: ShowOptions) -> None:
     """Print the results of runs, with one set of tables for each suite."""
-    if options.form == "json":
+    if options.format == "json":
         _print_json(runs)
         return
     labelled = _with_labels(runs)
     if not options.quiet:
         _print_tables(labelled, options)
-    if options.form is None:
+    if options.format is None:
         _print_folders(labelled, options.quiet)
 
 
@@ -101,8 +101,8 @@ def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
         suite = same_suite[0].suite
         make_tables = suite.tables if options.full else suite.overview
         tables += make_tables([run.summary for run in same_suite])
-    if options.form is not None:
-        click.echo(export_tables(tables, options.form))
+    if options.format is not None:
+        click.echo(export_tables(tables, options.format))
         return
     console = table_console()
     for table in tables:

@@ -54,11 +54,11 @@ def set_checks(root: Path, trajectories: Path | None) -> Iterator[Check]:
     n_asked = 0
     for task in read_asked_tasks(root, trajectories):
         n_asked += task.n_asked
-        asked = f"{task.n_asked:,} of {task.n_asked + task.skipped.total():,} samples can be asked"
+        detail = f"{task.n_asked:,} of {task.n_asked + task.skipped.total():,} samples can be asked"
         if task.skipped:
-            yield Check(f"task {task.name}", "optional", asked, _in_words(task.skipped))
+            yield Check(f"task {task.name}", "optional", detail, _in_words(task.skipped))
         else:
-            yield Check(f"task {task.name}", "ok", asked)
+            yield Check(f"task {task.name}", "ok", detail)
     if not n_asked:
         yield Check("questions", "wrong", "none can be asked", "the lines above say why")
 
@@ -108,6 +108,6 @@ def _counted(numbers: Mapping[str, int]) -> str:
 
 
 def _in_words(reasons: Counter[str]) -> str:
-    shown = [f"{reason} ({number:,})" for reason, number in reasons.most_common(_SHOWN)]
+    named = [f"{reason} ({number:,})" for reason, number in reasons.most_common(_SHOWN)]
     more = len(reasons) - _SHOWN
-    return "; ".join(shown) + (f"; and {more:,} other reasons" if more > 0 else "")
+    return "; ".join(named) + (f"; and {more:,} other reasons" if more > 0 else "")

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import accumulate
-from typing import Any, Generic
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from infthor_eval.episodes.recorded_runs import RecordedRun
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.episodes.shared_units import SharedUnits
 from infthor_eval.runs.journals.records import UnitRecord
 from infthor_eval.statistics import MeanEstimate, mean_over_clusters
@@ -28,6 +28,7 @@ __all__ = [
     "compute_curves",
 ]
 
+P = TypeVar("P", bound=EpisodeRecord)
 AT_MOST = "at most"  # label of the bound if no planner is among the runs
 _MAX_POINTS = 400  # of a grid; a picture resolves no more
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
 from infthor_eval.episodes.options import SimulatorOptions
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
@@ -30,6 +30,7 @@ from infthor_eval.storage.digests import fingerprint
 
 __all__ = ["BoundEpisodes", "EpisodeEvaluation", "EpisodeUnit"]
 
+P = TypeVar("P", bound=EpisodeRecord)
 T = TypeVar("T", bound=TaskTrajectory)
 E = TypeVar("E")
 K = TypeVar("K", bound=EpisodeTask[Any, Any])
@@ -103,9 +104,9 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
                 for units in listed
             ],
             skipped=[
-                Skipped(UnitKey(name, place), reason)
+                Skipped(UnitKey(name, path), reason)
                 for name, task in self.tasks.items()
-                for place, reason in task.trajectories.broken
+                for path, reason in task.trajectories.broken
             ],
             config={
                 "tasks": {name: task.config() for name, task in self.tasks.items()},

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from infthor_eval.episodes.recorded_runs import RecordedRun
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.episodes.replay_frames import EpisodeFrame
 from infthor_eval.episodes.shared_units import only_name
 from infthor_eval.episodes.simulators import Simulators
@@ -33,6 +33,7 @@ __all__ = [
     "restore_trajectory",
 ]
 
+P = TypeVar("P", bound=EpisodeRecord)
 R = TypeVar("R", bound=RecordedRun[Any, Any])
 T = TypeVar("T", bound=TaskTrajectory)
 F = TypeVar("F", bound=EpisodeFrame[Any, Any])
@@ -136,7 +137,7 @@ class EpisodeReplay(ABC, Generic[P, F]):
         """Return the frame after so many steps; `observation` is None if nobody acted."""
 
     @abstractmethod
-    def _place(self, record: UnitRecord[P], number: int) -> str:
+    def _describe_step(self, record: UnitRecord[P], number: int) -> str:
         """Describe a step of an episode."""
 
     def frames(self, records: Sequence[UnitRecord[P]]) -> Iterator[F]:
@@ -161,9 +162,8 @@ class EpisodeReplay(ABC, Generic[P, F]):
             difference = episode.repeat(step, is_last=number == len(steps))
             # Once the worlds differ all later steps may differ too, so the first difference alone
             # is noted.
-            note = (
-                f"{self._place(record, number)}: {difference}" if difference and not differs else ""
-            )
+            is_first = difference and not differs
+            note = f"{self._describe_step(record, number)}: {difference}" if is_first else ""
             differs = differs or bool(difference)
             yield self._frame(record, number, episode.observe(), note)
 

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from infthor_eval.episodes.recorded_runs import RecordedRun, TaskConfig
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.runs.journals.records import UnitRecord
 
 __all__ = ["SharedUnits", "difference_notes", "only_name", "shared_tasks", "shared_units"]
 
+P = TypeVar("P", bound=EpisodeRecord)
 T = TypeVar("T", bound=TaskConfig)
 Units = Mapping[str, Mapping[Any, UnitRecord[P]]]  # by trajectory, then by their order in time
 

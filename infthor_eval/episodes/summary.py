@@ -6,7 +6,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
@@ -38,6 +38,7 @@ class EpisodeTaskSummary(msgspec.Struct, frozen=True, kw_only=True):
     endings: dict[str, int]
 
 
+P = TypeVar("P", bound=EpisodeRecord)
 T = TypeVar("T", bound=EpisodeTaskSummary)
 
 
@@ -90,5 +91,5 @@ def success_rate(records: Sequence[UnitRecord[P]]) -> Rate | None:
     )
 
 
-def _count(items: Iterable[str]) -> dict[str, int]:
-    return dict(sorted(Counter(items).items()))
+def _count(reasons: Iterable[str]) -> dict[str, int]:
+    return dict(sorted(Counter(reasons).items()))

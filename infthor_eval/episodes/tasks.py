@@ -52,6 +52,6 @@ class EpisodeTask(ABC, Generic[S, T]):
         return {
             "config": dict(self.file.settings),
             "trajectories": {trajectory.traj_id: trajectory.digest for trajectory in used},
-            "broken": [list(item) for item in self.trajectories.broken],
+            "broken": list(map(list, self.trajectories.broken)),
             **settings,
         }

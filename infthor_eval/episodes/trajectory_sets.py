@@ -41,7 +41,7 @@ class TrajectorySet(Generic[T]):
 
     Attributes:
         trajectories: trajectories that can be used, ordered by name.
-        broken: places of the others within the folder, and what is wrong with each.
+        broken: paths of the others within the folder, and what is wrong with each.
     """
 
     trajectories: Sequence[T]
@@ -87,7 +87,7 @@ def find_trajectories(
     if not by_name:
         why = broken[0][1] if broken else "no trajectory there"
         raise DataError(f"{root}: nothing to evaluate ({why})")
-    within = [(_within(root, place), _within(root, reason)) for place, reason in broken]
+    within = [(_within(root, path), _within(root, reason)) for path, reason in broken]
     return TrajectorySet([by_name[name] for name in sorted(by_name)], within)
 
 

@@ -22,7 +22,7 @@ _NO_PICTURES = {"renderImage": False, "renderInstanceSegmentation": False}
 class _Stage:
     """Stands in for a walker: everything is in reach."""
 
-    def go(self, shown: list[str], inside: str | None = None) -> None:
+    def go(self, object_ids: list[str], inside: str | None = None) -> None:
         """Do nothing."""
 
     def step_aside(self, item: str) -> None:

@@ -20,7 +20,7 @@ __all__ = ["Rollout", "Walking"]
 class Walking(Protocol):
     """Brings the agent to where it can act; see `walking.Walker`."""
 
-    def go(self, shown: list[str], inside: str | None = None) -> None:
+    def go(self, object_ids: list[str], inside: str | None = None) -> None:
         """Walk to where objects can be acted on."""
         ...
 

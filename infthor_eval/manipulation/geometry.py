@@ -69,6 +69,7 @@ def distance_to(point: Point, thor_object: ThorObject) -> float:
 
 def corners_of(thor_object: ThorObject) -> Corners:
     """Return the box of an object."""
-    (x, y, z), (width, height, depth) = middle_of(thor_object), size_of(thor_object)
+    x, y, z = middle_of(thor_object)
+    width, height, depth = size_of(thor_object)
     half = width / 2, height / 2, depth / 2
     return Corners((x - half[0], y - half[1], z - half[2]), (x + half[0], y + half[1], z + half[2]))

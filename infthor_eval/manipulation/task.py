@@ -131,9 +131,9 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             DataError: the file is malformed, or none of its trajectories can be used.
         """
         file.require("dataset_kwargs")
-        given = {"radius": request.options.radius_metres}
-        given |= {name: getattr(request.options, name) for name in _GIVEN}
-        settings = task_settings(file, ArmTaskSettings, given, _CHOICES)
+        overrides = {"radius": request.options.radius_metres}
+        overrides |= {name: getattr(request.options, name) for name in _GIVEN}
+        settings = task_settings(file, ArmTaskSettings, overrides, _CHOICES)
         self.kind = ManipulationKind(settings.kind)
         self._template = (
             _INSTRUCTIONS[self.kind] if settings.instruction is None else settings.instruction

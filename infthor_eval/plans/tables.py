@@ -79,10 +79,10 @@ def _distance_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[
     """Return tables of final tasks' plans by the distance of their clues, in frames and tokens."""
     by_frames = [((run, name), task.by_distance) for run, name, task in tasks]
     by_tokens = [((run, name), task.by_tokens) for run, name, task in tasks]
-    frames, tokens = "frames since what they need was in view", "thousand tokens since then"
+    title = "frames since what they need was in view"
     tables = [
-        _distance_table(frames, by_frames, (*DISTANCES, NEVER)),
-        _distance_table(tokens, by_tokens, LENGTHS),
+        _distance_table(title, by_frames, (*DISTANCES, NEVER)),
+        _distance_table("thousand tokens since then", by_tokens, LENGTHS),
     ]
     return [table for table in tables if table.rows]
 

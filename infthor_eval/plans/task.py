@@ -91,8 +91,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         """
         file.require("dataset_kwargs", "generation_kwargs")
         self._options = request.options
-        given = {name: getattr(self._options, name) for name in _GIVEN}
-        settings = task_settings(file, PlanTaskSettings, given, _CHOICES)
+        overrides = {name: getattr(self._options, name) for name in _GIVEN}
+        settings = task_settings(file, PlanTaskSettings, overrides, _CHOICES)
         rules = reward_rules(settings.rewards)
         self.rules = rules.forcing() if self._options.force_action else rules
         self.words = Words(settings.words)

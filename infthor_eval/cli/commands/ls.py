@@ -164,8 +164,8 @@ def _join_sizes(rows: Iterable[_TaskRow], *, full: bool = False) -> list[_TaskRo
     """
     families: dict[_TaskRow, list[str]] = {}
     for name, about, data in rows:
-        found = _SIZE.search(name)
-        size = found[0] if found is not None else ""
+        match = _SIZE.search(name)
+        size = match[0] if match is not None else ""
         pattern = about.replace(size.upper(), _SIZE_HERE) if size else about
         families.setdefault((name.removesuffix(size), pattern, data), []).append(size)
     joined = []
@@ -173,8 +173,8 @@ def _join_sizes(rows: Iterable[_TaskRow], *, full: bool = False) -> list[_TaskRo
         text = sizes[0]
         if len(sizes) > 1:
             ordered = sorted(sizes, key=_tokens)
-            shown = ordered if full or len(ordered) == 2 else [ordered[0], "...", ordered[-1]]
-            text = f"{{{','.join(shown)}}}"
+            listed = ordered if full or len(ordered) == 2 else [ordered[0], "...", ordered[-1]]
+            text = f"{{{','.join(listed)}}}"
         joined.append((f"{stem}{text}", pattern.replace(_SIZE_HERE, text.upper()), data))
     return joined
 

@@ -44,12 +44,12 @@ _COLUMNS = ("units", "measured", "frames", "requests", "tokens read", "encoded",
     help="Price of a worker's machine, for the cost.",
 )
 @run_options
-def command(measure: int, price_per_hour: float | None, **given: Any) -> int:
+def command(measure: int, price_per_hour: float | None, **params: Any) -> int:
     """Estimate what a run would take: requests, tokens, frames, memory, time and money.
 
     Takes the options of `run`. A few units of each task are evaluated to measure, and not kept.
     """
-    requests = RunOptions.from_click(given).requests()
+    requests = RunOptions.from_click(params).requests()
     return max([plan(*request, measure, price_per_hour) for request in requests])
 
 

@@ -38,13 +38,13 @@ __all__ = ["command", "evaluate"]
 @show_options
 @tracker_options
 @click.option("--quiet", is_flag=True, help="Print only failures, and the runs' folders.")
-def command(**given: Any) -> int:
+def command(**params: Any) -> int:
     """Evaluate MODEL on TASKS and print the results; --full prints all, beside the published ones.
 
     Stop it whenever you like: the same command continues where it stopped.
     """
-    requests = RunOptions.from_click(given).requests()
-    return evaluate(requests, ShowOptions.from_click(given), parse_trackers(given))
+    requests = RunOptions.from_click(params).requests()
+    return evaluate(requests, ShowOptions.from_click(params), parse_trackers(params))
 
 
 def evaluate(

@@ -28,39 +28,38 @@ class ShowOptions:
 
     Attributes:
         full: whether to print every scorer, column and table, and the published rows.
-        form: csv, latex, markdown or json; None for tables on the terminal.
+        format: csv, latex, markdown or json; None for tables on the terminal.
         quiet: whether to print the runs' folders alone.
     """
 
     full: bool = False
-    form: str | None = None
+    format: str | None = None
     quiet: bool = False
 
     @classmethod
-    def from_click(cls, given: Mapping[str, Any]) -> "ShowOptions":
+    def from_click(cls, params: Mapping[str, Any]) -> "ShowOptions":
         """Return the options among the parameters of a command, which adds --quiet itself.
 
         Raises:
             UsageError: --json with --format or --full.
         """
-        if given["as_json"] and (given["form"] is not None or given["full"]):
+        if params["as_json"] and (params["format"] is not None or params["full"]):
             raise UsageError("--json holds everything; leave out --format and --full")
-        return cls(
-            given["full"], "json" if given["as_json"] else given["form"], given.get("quiet", False)
-        )
+        output_format = "json" if params["as_json"] else params["format"]
+        return cls(params["full"], output_format, params.get("quiet", False))
 
 
 def show_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add --full, --format and --json to a command, for `ShowOptions.from_click`."""
-    forms = click.Choice(["csv", "latex", "markdown"])
-    return _with_options(command, forms, "Write the tables in this form.")
+    formats = click.Choice(["csv", "latex", "markdown"])
+    return _with_options(command, formats, "Write the tables in this form.")
 
 
 def sample_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --per-sample and the options of `show_options`, among them a form for samples alone."""
-    forms = click.Choice(["csv", "latex", "markdown", "parquet"])
+    """Add --per-sample and the options of `show_options`, among them a format for samples alone."""
+    formats = click.Choice(["csv", "latex", "markdown", "parquet"])
     command = _with_options(
-        command, forms, "Write the tables in this form; parquet has a row per sample."
+        command, formats, "Write the tables in this form; parquet has a row per sample."
     )
     return click.option(
         "--per-sample",
@@ -70,13 +69,13 @@ def sample_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _with_options(
-    command: Callable[..., Any], forms: click.Choice[str], help_text: str
+    command: Callable[..., Any], formats: click.Choice[str], help_text: str
 ) -> Callable[..., Any]:
     for option in (
         click.option(
             "--json", "as_json", is_flag=True, help="Print the results as JSON, as in results.json."
         ),
-        click.option("--format", "form", type=forms, help=help_text),
+        click.option("--format", type=formats, help=help_text),
         click.option(
             "--full",
             is_flag=True,
@@ -94,12 +93,12 @@ def tracker_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def parse_trackers(given: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+def parse_trackers(params: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """Return the arguments of the trackers that are used, by option, of a command's parameters."""
     return {
-        name: parse_pairs(given[name].split(","), _option(name))
+        name: parse_pairs(params[name].split(","), _option(name))
         for name in _TRACKERS
-        if given[name] is not None
+        if params[name] is not None
     }
 
 

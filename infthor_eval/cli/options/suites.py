@@ -38,14 +38,14 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def suite_values(given: Mapping[str, Any]) -> dict[str, Any]:
+def suite_values(params: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of all suites among the parameters of a command; None where not given."""
     # A suite that was installed after the command was imported has options that the command does
     # not know.
-    return {name: given.get(name) for name in _options_by_name()}
+    return {name: params.get(name) for name in _options_by_name()}
 
 
-def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[str]) -> list[Any]:
+def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection[str]) -> list[Any]:
     """Return the options of a suite for each of its runs.
 
     An option with `each` in its metadata takes several values with commas, and there is a run for
@@ -53,22 +53,20 @@ def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[
 
     Args:
         suite: name of the suite.
-        given: options of all suites by name; None where not given.
+        params: options of all suites by name; None where not given.
         used: names of the suites that the tasks belong to.
 
     Raises:
         UsageError: an option belongs to no suite that is used.
     """
-    _refuse_unused(given, used)
+    _refuse_unused(params, used)
     kinds = typing.get_type_hints(options_class(suite))
     values: dict[str, list[Any]] = {}
     for option in fields(options_class(suite)):
-        if given.get(option.name) is not None:
-            typed = (
-                split_names(given[option.name], f"--{option.name}")
-                if option.metadata.get("each")
-                else [given[option.name]]
-            )
+        if params.get(option.name) is not None:
+            typed = [params[option.name]]
+            if option.metadata.get("each"):
+                typed = list(split_names(params[option.name], f"--{option.name}"))
             values[option.name] = [
                 msgspec.convert(value, kinds[option.name], strict=False) for value in typed
             ]
@@ -105,9 +103,9 @@ def _options_by_name() -> dict[str, dict[str, Field[Any]]]:
     return options
 
 
-def _refuse_unused(given: Mapping[str, Any], used: Collection[str]) -> None:
+def _refuse_unused(params: Mapping[str, Any], used: Collection[str]) -> None:
     for name, by_suite in _options_by_name().items():
-        if given.get(name) is not None and not set(by_suite) & set(used):
+        if params.get(name) is not None and not set(by_suite) & set(used):
             raise UsageError(
                 f"--{name.replace('_', '-')} is for tasks of {' and '.join(by_suite)}; --tasks "
                 "names none of these"

@@ -177,13 +177,13 @@ def parse_model_args(text: str) -> dict[str, str]:
     return parse_pairs(text.split(","), "--model-args")
 
 
-def parse_pairs(items: Iterable[str], option: str) -> dict[str, str]:
+def parse_pairs(pairs: Iterable[str], option: str) -> dict[str, str]:
     """Return keys and values written as `k=v`; messages name the option that they belong to.
 
     Raises:
         click.UsageError: an item is not `k=v`, or a key is given twice.
     """
     try:
-        return read_pairs(items, option)
+        return read_pairs(pairs, option)
     except UsageError as error:
         raise click.UsageError(str(error)) from error

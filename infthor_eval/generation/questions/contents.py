@@ -186,18 +186,18 @@ def _contents_question(
         items: ids of the objects.
         shown_first: True if the first of the frames must be among the clues.
     """
-    shown = {}
+    seen_at = {}
     for frame in frames:
         is_ambiguous = _shows_similar_contents(history, frame, receptacle)
         if history.shows(frame, receptacle) and not is_ambiguous:
-            shown[frame] = frozenset(key for key in items if history.shows_inside(frame, key))
-    if shown_first and frames[0] not in shown:
+            seen_at[frame] = frozenset(key for key in items if history.shows_inside(frame, key))
+    if shown_first and frames[0] not in seen_at:
         return
     first = {frames[0]} if shown_first else set[int]()
-    missing = items.difference(*map(shown.__getitem__, first))
+    missing = items.difference(*map(seen_at.__getitem__, first))
     if not items:
         return
-    cover = minimal_cover(missing, shown, lambda frame, keys: history.clarity(frame, *keys))
+    cover = minimal_cover(missing, seen_at, lambda frame, keys: history.clarity(frame, *keys))
     if cover is not None:
         clues = tuple(sorted(first.union(cover)))
         types = sorted(_whole_types(history, frames[0], items))

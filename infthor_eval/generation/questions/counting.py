@@ -29,8 +29,8 @@ def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
     for object_type, items in sorted(history.picked_up_by_type.items()):
         item = min(items)
         moves = history.moves_of(item)
-        shown = all(history.shows(move.after, move.item, move.target) for move in moves)
-        if len(items) == 1 and shown and len(moves) == history.pickups[item] > 1:
+        is_shown = all(history.shows(move.after, move.item, move.target) for move in moves)
+        if len(items) == 1 and is_shown and len(moves) == history.pickups[item] > 1:
             form = "How many times did you move {}?"
             frames = [move.after for move in moves]
             yield _count(QUESTION_TYPE, form, (with_the(object_type),), frames, object_type)
@@ -74,8 +74,8 @@ def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     for move in history.moves:
         by_target[move.target].append(move)
     for target, moves in sorted(by_target.items()):
-        shown = all(history.shows_put(move) for move in moves)
-        if shown and all(history.is_only_one(move.after, target) for move in moves):
+        is_shown = all(history.shows_put(move) for move in moves)
+        if is_shown and all(history.is_only_one(move.after, target) for move in moves):
             place_type = history.target_type(moves[0])
             frames = [move.after for move in moves]
             form = "How many times did you put something {}?"

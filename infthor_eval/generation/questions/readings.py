@@ -57,13 +57,15 @@ def _has_fixtures(history: TrajectoryHistory, frame: int, receptacle: str) -> bo
 
 
 def minimal_cover(
-    items: Set[str], shown: Mapping[int, Set[str]], clarity: Callable[[int, Set[str]], Any]
+    wanted: Set[str],
+    seen_at: Mapping[int, Set[str]],
+    clarity: Callable[[int, Set[str]], Any],
 ) -> tuple[int, ...] | None:
     """Return a small set of frames that shows all objects and from which no frame can be removed.
 
     Args:
-        items: ids of the objects.
-        shown: the objects that each frame shows.
+        wanted: ids of the objects.
+        seen_at: ids of the objects that each frame shows.
         clarity: how well a frame shows some objects, as any comparable value; among frames that
             show equally many, the clearest is chosen.
 
@@ -72,18 +74,18 @@ def minimal_cover(
     """
     # Greedy set cover: minimum covers are NP-hard, and the checker only demands that no clue can be
     # removed.
-    missing = set(items)
+    missing = set(wanted)
     chosen: list[int] = []
     while missing:
-        most = max((len(objects & missing) for objects in shown.values()), default=0)
+        most = max((len(objects & missing) for objects in seen_at.values()), default=0)
         if not most:
             return None
-        candidates = [frame for frame in sorted(shown) if len(shown[frame] & missing) == most]
-        best = max(candidates, key=lambda frame: clarity(frame, shown[frame] & missing))
+        candidates = [frame for frame in sorted(seen_at) if len(seen_at[frame] & missing) == most]
+        best = max(candidates, key=lambda frame: clarity(frame, seen_at[frame] & missing))
         chosen.append(best)
-        missing -= shown[best]
+        missing -= seen_at[best]
     for frame in list(chosen):
         rest = [other for other in chosen if other != frame]
-        if items <= set().union(*(shown[other] for other in rest)):
+        if wanted <= set().union(*(seen_at[other] for other in rest)):
             chosen = rest
     return tuple(sorted(chosen))

@@ -62,11 +62,9 @@ class Surroundings:
         self._linkage = linkage
         self._receptacle_object = environment.view.objects[str(environment.start.receptacle_id)]
         self.places = places_of(environment, self._receptacle_object)
-        self.entry = (
-            None
-            if self.places is None
-            else entry_of(environment.view, self._receptacle_object, self.places)
-        )
+        self.entry: Entry | None = None
+        if self.places is not None:
+            self.entry = entry_of(environment.view, self._receptacle_object, self.places)
         self._hinges = _hinges(self._receptacle_object, self.places, self.entry)
         # Collisions that each side of the door cannot explain.
         self._n_refuted = [0] * len(self._hinges)
@@ -109,7 +107,9 @@ class Surroundings:
             Whether the arm collided with the receptacle.
         """
         objects = self._environment.view.objects
-        self._collided.update(name for name, item in objects.items() if f"'{item.name}'" in error)
+        self._collided.update(
+            name for name, nearby in objects.items() if f"'{nearby.name}'" in error
+        )
         if f"'{self._receptacle_object.name}'" not in error:
             return False
         for number, hinge in enumerate(self._hinges):
@@ -132,18 +132,18 @@ class Surroundings:
         view = self._environment.view
         wrist: Point = tuple(self._linkage.now.world()[0].tolist())
         around = [("Floor", self._floor)]
-        for name, item in view.objects.items():
+        for name, nearby in view.objects.items():
             if (
-                item.pickupable
-                or item.object_type == "Floor"
+                nearby.pickupable
+                or nearby.object_type == "Floor"
                 or name == self._receptacle_object.object_id
             ):
                 continue
-            box = corners_of(item)
+            box = corners_of(nearby)
             if _distance_to_box(wrist, box) > _REACH:
                 continue
             is_whole = belief == Belief.WHOLE and not self._is_in(box)
-            boxes = [box] if is_whole else self._boxes_of(item)
+            boxes = [box] if is_whole else self._boxes_of(nearby)
             around += [(name, part) for part in boxes if not self._has_places_in(part)]
         return around
 
@@ -161,16 +161,19 @@ class Surroundings:
         parts = self._linkage.parts(self._linkage.now)
         return bool(clearances(parts, obstacles_of([("", box)])).min() < 0)
 
-    def _boxes_of(self, item: ThorObject) -> list[Corners]:
+    def _boxes_of(self, furniture: ThorObject) -> list[Corners]:
         """Return furniture's boxes without the room in an open cupboard, or below a counter."""
-        hollow = item.is_open if is_entered(item) and item.openable else not item.openable
-        places = places_of(self._environment, item) if item.receptacle and hollow else None
+        is_cupboard = is_entered(furniture) and furniture.openable
+        hollow = furniture.is_open if is_cupboard else not furniture.openable
+        places = (
+            places_of(self._environment, furniture) if furniture.receptacle and hollow else None
+        )
         if places is None:
-            return [corners_of(item)]
-        entry = entry_of(self._environment.view, item, places)
+            return [corners_of(furniture)]
+        entry = entry_of(self._environment.view, furniture, places)
         if entry is None:
-            return columns(item, places)
-        return cavity(item, places, entry, _hinges(item, places, entry)[0])
+            return columns(furniture, places)
+        return cavity(furniture, places, entry, _hinges(furniture, places, entry)[0])
 
 
 def _distance_to_box(point: Point, box: Corners) -> float:
@@ -179,20 +182,20 @@ def _distance_to_box(point: Point, box: Corners) -> float:
     return math.hypot(*(max(low - value, value - high, 0.0) for low, value, high in by_axis))
 
 
-def _hinges(item: ThorObject, places: Places | None, entry: Entry | None) -> list[int]:
+def _hinges(furniture: ThorObject, places: Places | None, entry: Entry | None) -> list[int]:
     """Return the edges of an opening that the door may hang on, the likeliest first; see `cavity`.
 
     The origin of a cupboard is at its hinge.
     """
-    if entry is None or places is None or not item.openable:
+    if entry is None or places is None or not furniture.openable:
         return [0]
     across = 2 - entry.axis
     low = float(places.points[:, across].min())
     high = float(places.points[:, across].max())
-    aside = (item.position.x if across == 0 else item.position.z) - (low + high) / 2
+    aside = (furniture.position.x if across == 0 else furniture.position.z) - (low + high) / 2
     right = entry.sign if entry.axis == 0 else -entry.sign
     if abs(aside) > _ASIDE * (high - low):
         first = 1 if aside > 0 else -1
     else:
-        first = -right if item.object_type in _LEFT else right
+        first = -right if furniture.object_type in _LEFT else right
     return [first, -first, 0]

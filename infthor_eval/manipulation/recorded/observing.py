@@ -36,7 +36,7 @@ class ArmObserver:
         self._path = [self._hand(begun)]
         points = [
             *self._path,
-            *map(self._place, hands),
+            *map(self._to_agent, hands),
             *self._joints(begun),
             (0.0, 0.0, self._path[0][2]),
         ]
@@ -70,10 +70,10 @@ class ArmObserver:
         return ArmObservation(view.frame, reach, tuple(map(object_type_of, arm.held)))
 
     def _hand(self, view: SimulatorView) -> Place:
-        return self._place(point_of(arm_of(view).sphere_center))
+        return self._to_agent(point_of(arm_of(view).sphere_center))
 
     def _joints(self, view: SimulatorView) -> Iterator[Place]:
-        return (self._place(point_of(joint.position)) for joint in arm_of(view).joints)
+        return (self._to_agent(point_of(joint.position)) for joint in arm_of(view).joints)
 
     def _objects(self, view: SimulatorView) -> Iterator[NearbyObject]:
         return (self._nearby(each) for each in view.objects.values() if self._is_drawn(each))
@@ -87,20 +87,20 @@ class ArmObserver:
             or thor_object.axis_aligned_bounding_box is None
         ):
             return False
-        right, ahead, _ = self._place(middle_of(thor_object))
+        right, ahead, _ = self._to_agent(middle_of(thor_object))
         return (thor_object.receptacle or thor_object.moveable) and math.hypot(right, ahead) < _NEAR
 
     def _nearby(self, thor_object: ThorObject) -> NearbyObject:
         x, y, z = middle_of(thor_object)
         width, height, depth = size_of(thor_object)
         signs = ((-1, -1), (-1, 1), (1, 1), (1, -1))
-        corners = (self._place((x + i * width / 2, y, z + j * depth / 2))[:2] for i, j in signs)
+        corners = (self._to_agent((x + i * width / 2, y, z + j * depth / 2))[:2] for i, j in signs)
         is_named = thor_object.object_id in self._named
         return NearbyObject(
             thor_object.object_type, tuple(corners), y - height / 2, y + height / 2, is_named
         )
 
-    def _place(self, point: Point) -> Place:
+    def _to_agent(self, point: Point) -> Place:
         """Return a point in the agent's coordinates; its rotation goes from +z towards +x."""
         x = point[0] - self._agent.position.x
         z = point[2] - self._agent.position.z

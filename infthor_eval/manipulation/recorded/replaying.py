@@ -139,7 +139,7 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
             self._environments[settings.camera] = ArmEnvironment(self._trajectory.data, simulator)
         return self._environments[settings.camera]
 
-    def _place(self, record: Record, number: int) -> str:
+    def _describe_step(self, record: Record, number: int) -> str:
         return f"action {record.payload.index}, step {number}"
 
     def _frame(

@@ -127,8 +127,6 @@ def _differences(runs: Sequence[ArmRun], tasks: Sequence[str], one_radius: bool)
 
 def _settings(task: ArmTaskConfig) -> Mapping[str, Any]:
     """Return the settings of a task; an instruction of the command line wins."""
-    return (
-        task.settings
-        if task.instruction is None
-        else {**task.settings, "instruction": task.instruction}
-    )
+    if task.instruction is None:
+        return task.settings
+    return {**task.settings, "instruction": task.instruction}

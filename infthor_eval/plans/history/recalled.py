@@ -156,8 +156,8 @@ class MemoryChoice:
         Raises:
             UsageError: there is one.
         """
-        given = {"--memory": self.name, "--memory-args": self.options, "--budget": self.budget}
-        for option, value in given.items():
+        typed = {"--memory": self.name, "--memory-args": self.options, "--budget": self.budget}
+        for option, value in typed.items():
             if value is not None:
                 raise UsageError(
                     f"{option} {value}: --history {history} has no memory; use --history memory"

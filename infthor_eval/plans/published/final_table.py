@@ -128,9 +128,9 @@ def _explanation(printed: str, column: str, counts: Mapping[str, PlanCount]) -> 
 
 def _without_log(table: PublishedTable, logs: Sequence[PlanLog]) -> Iterator[Row]:
     """Yield the printed rows that none of the logs is of."""
-    given = {log.model for log in logs}
+    logged = {log.model for log in logs}
     for row in table.rows:
-        if row.log is None or row.log not in given:
+        if row.log is None or row.log not in logged:
             yield Row((row.name, "printed", *map("{:.1f}".format, row.values)), is_published=True)
 
 

@@ -43,46 +43,46 @@ class Scene:
         ]
 
 
-def _pickupable(item: ThorObject) -> bool:
-    return bool(item.pickupable)
+def _pickupable(thor_object: ThorObject) -> bool:
+    return bool(thor_object.pickupable)
 
 
-def _receptacle(item: ThorObject) -> bool:
-    return bool(item.receptacle)
+def _receptacle(thor_object: ThorObject) -> bool:
+    return bool(thor_object.receptacle)
 
 
-def _inside(item: ThorObject, receptacles: Iterable[ThorObject]) -> bool:
-    return bool(_filled([item], receptacles))
+def _inside(target: ThorObject, receptacles: Iterable[ThorObject]) -> bool:
+    return bool(_filled([target], receptacles))
 
 
-def _filled(items: Sequence[ThorObject], receptacles: Iterable[ThorObject]) -> list[ThorObject]:
+def _filled(targets: Sequence[ThorObject], receptacles: Iterable[ThorObject]) -> list[ThorObject]:
     """Return the receptacles with any of the objects in them."""
-    ids = {item.object_id for item in items}
+    ids = {target.object_id for target in targets}
     return [each for each in receptacles if ids & set(each.receptacle_object_ids or ())]
 
 
 def _targets(info: TaskInfo, scene: Scene) -> tuple[list[ThorObject], list[ThorObject], int]:
     """Return a task's objects, its receptacles, and the number of slices that it lacks."""
-    items = scene.named(info.pickup, _pickupable)
-    n_slices = sum("Sliced" in item.object_id for item in items)
+    targets = scene.named(info.pickup, _pickupable)
+    n_slices = sum("Sliced" in target.object_id for target in targets)
     if info.pickup is None:
         raise TypeError("the task names no object")
     lacking = max(0, 1 - n_slices) if "Sliced" in info.pickup else 0
-    return items, scene.named(info.receptacle, _receptacle), lacking
+    return targets, scene.named(info.receptacle, _receptacle), lacking
 
 
 def _place(info: TaskInfo, scene: Scene) -> bool:
-    items, receptacles, lacking = _targets(info, scene)
-    return not lacking and any(_inside(item, receptacles) for item in items)
+    targets, receptacles, lacking = _targets(info, scene)
+    return not lacking and any(_inside(target, receptacles) for target in targets)
 
 
 def _place_two(info: TaskInfo, scene: Scene) -> bool:
-    items, receptacles, _ = _targets(info, scene)
+    targets, receptacles, _ = _targets(info, scene)
     if not receptacles and info.receptacle == "SinkBasin":
         receptacles = scene.named("Sink", _receptacle)
-    if "Sliced" in str(info.pickup) and sum("Sliced" in item.object_id for item in items) < 2:
+    if "Sliced" in str(info.pickup) and sum("Sliced" in target.object_id for target in targets) < 2:
         return False
-    ids = {item.object_id for item in items}
+    ids = {target.object_id for target in targets}
     contents = [set(receptacle.receptacle_object_ids or ()) for receptacle in receptacles]
     return any(len(ids & inside) >= 2 for inside in contents)
 
@@ -96,17 +96,17 @@ def _place_treated(
     chosen: Callable[[Treated], Collection[str]],
 ) -> Callable[[TaskInfo, Scene], bool]:
     def holds(info: TaskInfo, scene: Scene) -> bool:
-        items, receptacles, lacking = _targets(info, scene)
-        ready = [item for item in items if item.object_id in chosen(scene.treated)]
-        return not lacking and any(_inside(item, receptacles) for item in ready)
+        targets, receptacles, lacking = _targets(info, scene)
+        ready = [target for target in targets if target.object_id in chosen(scene.treated)]
+        return not lacking and any(_inside(target, receptacles) for target in ready)
 
     return holds
 
 
 def _place_with_movable(info: TaskInfo, scene: Scene) -> bool:
-    items, receptacles, lacking = _targets(info, scene)
+    targets, receptacles, lacking = _targets(info, scene)
     carriers = scene.named(info.movable, _pickupable)
-    filled = _filled(items, carriers)
+    filled = _filled(targets, carriers)
     there = any(_inside(carrier, receptacles) for carrier in carriers)
     ids = {receptacle.object_id for receptacle in receptacles}
     stacked = any(ids & set(carrier.parent_receptacles or ()) for carrier in filled)

@@ -180,16 +180,16 @@ class PublishedTask:
         return per_success, not (step.before.last_action == "OpenObject" and now == "PutObject")
 
     def _open(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.OPEN, lambda item: bool(item.is_open))
+        return self._state_reward(step, PlanKind.OPEN, lambda changed: bool(changed.is_open))
 
     def _close(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.CLOSE, lambda item: not item.is_open)
+        return self._state_reward(step, PlanKind.CLOSE, lambda changed: not changed.is_open)
 
     def _toggle(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.TOGGLE, lambda item: item.is_toggled)
+        return self._state_reward(step, PlanKind.TOGGLE, lambda changed: changed.is_toggled)
 
     def _slice(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.SLICE, lambda item: item.is_sliced)
+        return self._state_reward(step, PlanKind.SLICE, lambda changed: changed.is_sliced)
 
     def _state_reward(
         self, step: "_Step", kind: PlanKind, is_done: Callable[[ThorObject], bool]

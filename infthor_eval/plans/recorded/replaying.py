@@ -125,7 +125,7 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
         )
         return environment, simulator
 
-    def _place(self, record: Record, number: int) -> str:
+    def _describe_step(self, record: Record, number: int) -> str:
         return f"plan {record.payload.index + 1}, action {number}"
 
     def _frame(
@@ -236,8 +236,8 @@ def _words(config: PlanTaskConfig) -> Words:
 def _difference(step: StepRecord, outcome: StepOutcome, is_over: bool, is_last: bool) -> str:
     message = outcome.info.message
     if bool(step.message) != bool(message):
-        now, then = _success_text(message), _success_text(step.message)
-        return f"{step.action} {now} now, and {then} in the run"
+        then = _success_text(step.message)
+        return f"{step.action} {_success_text(message)} now, and {then} in the run"
     if abs(outcome.reward - step.reward) > _TOLERANCE:
         return f"{step.action} earns {outcome.reward:g} now, and {step.reward:g} in the run"
     if is_over != is_last:
