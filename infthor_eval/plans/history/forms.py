@@ -5,13 +5,20 @@ from typing import ClassVar
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.household.sequence_text import ACT, action_part, goal_part, plan_part
-from infthor_eval.plans.history.chat import GoalHistory, PlanHistory
 from infthor_eval.plans.history.past import CountTokens, History, Past
 from infthor_eval.plans.history.recalled import MemoryChoice
 from infthor_eval.plans.history.retrieved import RetrievedFrames
 from infthor_eval.plans.history.segments import Part, PlanSegment, restart_at, segment_parts
 
-__all__ = ["FullHistory", "LastTokens", "PublishedHistory", "StateInWords", "history_named"]
+__all__ = [
+    "FullHistory",
+    "GoalHistory",
+    "LastTokens",
+    "PlanHistory",
+    "PublishedHistory",
+    "StateInWords",
+    "history_named",
+]
 
 
 class FullHistory:
@@ -45,6 +52,42 @@ class PublishedHistory:
                 for action, frame in segment.steps:
                     parts += action_part(action), frame
         return parts
+
+
+class GoalHistory:
+    """The whole history with goals and actions, as in the published chats of branch `dev`.
+
+    Plans begin with a mark and have no text.
+    """
+
+    needs_state: ClassVar[bool] = False
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        parts: list[Part] = []
+        for segment in past.all:
+            if segment.goal is not None:
+                parts += goal_part(segment.goal), past.all[0].before
+            if segment.steps and segment.in_task:
+                parts.append(ACT)
+                for action, frame in segment.steps:
+                    parts += action_part(action), frame
+        return parts
+
+
+class PlanHistory:
+    """The plans before in words, as in the published chats of branch `dev`.
+
+    Goal, frames and the plan itself are left out; the present frame follows.
+    """
+
+    needs_state: ClassVar[bool] = False
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        plans = [segment.plan for segment in past.segments if segment.in_task]
+        text = f"{'; '.join(plans)};" if plans else "No history is available."
+        return [f"Action history: {text}\n"]
 
 
 class LastTokens:

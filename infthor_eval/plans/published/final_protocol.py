@@ -22,8 +22,7 @@ from typing import ClassVar
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.plans.history.chat import GoalHistory, PlanHistory
-from infthor_eval.plans.history.forms import StateInWords
+from infthor_eval.plans.history.forms import GoalHistory, PlanHistory, StateInWords
 from infthor_eval.plans.history.past import CountTokens, History, Past
 from infthor_eval.plans.history.recalled import RecalledHistory
 from infthor_eval.plans.history.retrieved import RetrievedFrames
