@@ -72,7 +72,7 @@ def test_what_runs_is_the_installed_code(installed, tmp_path):
 
 
 def test_it_runs_in_an_empty_folder(command, tmp_path):
-    assert "nieh_haystack_128k" in command("ls", "tasks")
+    assert "nieh_haystack_{8k,...,1m}" in command("ls", "tasks")
     asked = (
         "--model",
         "blind,oracle,qwen2.5-vl-nano",

@@ -16,9 +16,8 @@ class _WithExample(click.Command):
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Example"):
             for line in self.example.splitlines():
-                formatter.write(
-                    f"{'':{formatter.current_indent}}{line}\n"
-                )  # not wrapped: it is to be copied
+                # Not wrapped: it is to be copied.
+                formatter.write(f"{'':{formatter.current_indent}}{line}\n")
         formatter.write_paragraph()
         super().format_help(ctx, formatter)
 

@@ -22,8 +22,7 @@ from infthor_eval.terminal import print_error
 
 __all__ = ["main"]
 
-# By group: the name of each command, of which infthor_eval.cli.commands has the module, and its
-# line in the overview.
+# By group: the name of each command and its line in the overview.
 _COMMANDS = {
     "Evaluate": {
         "run": "Evaluate a model on tasks (the default command).",
@@ -63,6 +62,14 @@ _COMMANDS = {
         "lm-eval": "Run lm-eval's own command with these models.",
     },
 }
+# Commands that share a module of infthor_eval.cli.commands; the others are `command` of their own.
+_SHARED_MODULES = {
+    "table4": "tables:table4",
+    "table-final": "tables:table_final",
+    "check-adapter": "checks:check_adapter",
+    "check-memory": "checks:check_memory",
+    "check-parity": "checks:check_parity",
+}
 _NAMES = tuple(name for group in _COMMANDS.values() for name in group)
 _DEFAULT = "run"
 _COLLECT_AFTER = 50_000  # new objects between two collections of garbage
@@ -77,7 +84,8 @@ class _Commands(ExampleGroup):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in _NAMES:
             return None
-        command = import_target(f"infthor_eval.cli.commands.{cmd_name.replace('-', '_')}:command")
+        target = _SHARED_MODULES.get(cmd_name, f"{cmd_name.replace('-', '_')}:command")
+        command = import_target(f"infthor_eval.cli.commands.{target}")
         assert isinstance(command, click.Command)
         return command
 
@@ -89,9 +97,8 @@ class _Commands(ExampleGroup):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if (
-            args and args[0] not in _NAMES and not ctx.resilient_parsing
-        ):  # completion asks for parts of names
+        # Completion asks for parts of names.
+        if args and args[0] not in _NAMES and not ctx.resilient_parsing:
             raise unknown_name("command", args[0], _NAMES)
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None:
@@ -99,8 +106,7 @@ class _Commands(ExampleGroup):
         return name, command, rest
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the commands, then the options, with those of the default command, which is typed
-        without its name."""
+        """Write the commands, then the options, with those of the default command."""
         for group, commands in _COMMANDS.items():
             with formatter.section(group):  # not click's own list, which would import every command
                 formatter.write_dl(list(commands.items()))
@@ -108,9 +114,8 @@ class _Commands(ExampleGroup):
         run = self.get_command(ctx, _DEFAULT)
         assert run is not None
         with formatter.section("Options of a run"):
-            formatter.write_dl(
-                [record for option in run.params if (record := option.get_help_record(ctx))]
-            )
+            records = (option.get_help_record(ctx) for option in run.params)
+            formatter.write_dl(list(filter(None, records)))
 
 
 @click.group(
@@ -131,13 +136,12 @@ def main(args: list[str] | None = None) -> None:
     """Run the command line; errors meant for people are printed as one line on standard error."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(
-                errors="backslashreplace"
-            )  # no name in the data may end a run, whatever the encoding
+            # No name in the data may end a run, whatever the encoding.
+            stream.reconfigure(errors="backslashreplace")
     try:
         with handle_signal(signal.SIGTERM, _raise_terminated), _collecting_seldom():
             code = _infthor_eval.main(args, prog_name="infthor-eval", standalone_mode=False)
-        # here and not at Python's exit, so that a full disk is an error like any other
+        # Here and not at Python's exit, so that a full disk is an error like any other.
         sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
@@ -158,12 +162,9 @@ def main(args: list[str] | None = None) -> None:
         _exit("stopped; run the same command to continue", 130)
     except OSError as error:  # that no command expects: a full disk, a file removed during the work
         _discard_output()
-        place = error.filename if error.filename is not None else "standard output or a file"
-        _exit(
-            f"{place}: cannot be read or written ({in_one_line(error)}); fix that and run the same "
-            "command again",
-            2,
-        )
+        path = error.filename if error.filename is not None else "standard output or a file"
+        problem = f"{path}: cannot be read or written ({in_one_line(error)})"
+        _exit(f"{problem}; fix that and run the same command again", 2)
     else:
         sys.exit(code if isinstance(code, int) else 0)
 
@@ -188,14 +189,12 @@ class _Terminated(BaseException):
 
 
 def _raise_terminated(_number: int, _frame: FrameType | None) -> None:
-    """Handle SIGTERM, so that temporary folders and simulator processes are removed as on
-    Ctrl-C."""
+    """Handle SIGTERM, so that temporary folders and simulators are removed as on Ctrl-C."""
     raise _Terminated
 
 
 def _discard_output() -> None:
-    """Discard what standard output cannot take; Python would try again at its exit, and
-    complain."""
+    """Discard what standard output cannot take; Python would try again at its exit."""
     try:
         sys.stdout.flush()
     except OSError:

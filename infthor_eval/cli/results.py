@@ -1,4 +1,4 @@
-"""Results of runs on standard output: tables, or a form for another program."""
+"""Results of runs on standard output: tables, or a format for another program."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -61,13 +61,13 @@ def read_run_results(folder: Path) -> RunResults:
 
 def print_results(runs: Sequence[RunResults], options: ShowOptions) -> None:
     """Print the results of runs, with one set of tables for each suite."""
-    if options.form == "json":
+    if options.format == "json":
         _print_json(runs)
         return
     labelled = _with_labels(runs)
     if not options.quiet:
         _print_tables(labelled, options)
-    if options.form is None:
+    if options.format is None:
         _print_folders(labelled, options.quiet)
 
 
@@ -85,15 +85,11 @@ def _print_json(runs: Sequence[RunResults]) -> None:
 def _with_labels(runs: Sequence[RunResults]) -> list[RunResults]:
     """The runs with labels for names, which tell those of one name apart."""
     labels = label_runs([(run.folder, run.summary.header) for run in runs], _SHOWN_BY_TABLES)
-    return [
-        replace(
-            run,
-            summary=replace(
-                run.summary, header=msgspec.structs.replace(run.summary.header, name=label)
-            ),
-        )
-        for run, label in zip(runs, labels, strict=True)
-    ]
+    labelled = []
+    for run, label in zip(runs, labels, strict=True):
+        header = msgspec.structs.replace(run.summary.header, name=label)
+        labelled.append(replace(run, summary=replace(run.summary, header=header)))
+    return labelled
 
 
 def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
@@ -102,11 +98,10 @@ def _print_tables(runs: Sequence[RunResults], options: ShowOptions) -> None:
     for _, group in groupby(sorted(runs, key=suite_name), key=suite_name):
         same_suite = list(group)
         suite = same_suite[0].suite
-        tables += (suite.tables if options.full else suite.overview)(
-            [run.summary for run in same_suite]
-        )
-    if options.form is not None:
-        click.echo(export_tables(tables, options.form))
+        make_tables = suite.tables if options.full else suite.overview
+        tables += make_tables([run.summary for run in same_suite])
+    if options.format is not None:
+        click.echo(export_tables(tables, options.format))
         return
     console = table_console()
     for table in tables:

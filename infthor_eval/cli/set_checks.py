@@ -6,16 +6,33 @@ import statistics
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from infthor_eval.cli.checks import Check
+import msgspec
 
 if TYPE_CHECKING:
     from infthor_eval.nieh.set_contents import SetContents
 
-__all__ = ["set_checks"]
+__all__ = ["Check", "set_checks"]
 
 _SHOWN = 5  # reasons that are named one by one
+
+
+class Check(msgspec.Struct, frozen=True):
+    """The result of one check.
+
+    Attributes:
+        name: what is checked.
+        state: "ok"; "optional" if it is missing and only some uses need it; "wrong" if every use
+            needs it.
+        detail: what is installed, or what is missing.
+        hint: how to fix it; empty if there is nothing to fix.
+    """
+
+    name: str
+    state: Literal["ok", "optional", "wrong"]
+    detail: str
+    hint: str = ""
 
 
 def set_checks(root: Path, trajectories: Path | None) -> Iterator[Check]:
@@ -30,18 +47,18 @@ def set_checks(root: Path, trajectories: Path | None) -> Iterator[Check]:
     yield from _questions(contents)
     yield from _trajectories(contents)
     if not contents.frames:
-        yield Check("frames", "optional", "none can be read: tables of the files' own scores can "
-                                          "be made, and no more",
-                    "unpack the set's metadata.tar beside its question files")  # fmt: skip
+        missing = "none can be read: tables of the files' own scores can be made, and no more"
+        hint = "unpack the set's metadata.tar beside its question files"
+        yield Check("frames", "optional", missing, hint)
         return
     n_asked = 0
     for task in read_asked_tasks(root, trajectories):
         n_asked += task.n_asked
-        asked = f"{task.n_asked:,} of {task.n_asked + task.skipped.total():,} samples can be asked"
+        detail = f"{task.n_asked:,} of {task.n_asked + task.skipped.total():,} samples can be asked"
         if task.skipped:
-            yield Check(f"task {task.name}", "optional", asked, _in_words(task.skipped))
+            yield Check(f"task {task.name}", "optional", detail, _in_words(task.skipped))
         else:
-            yield Check(f"task {task.name}", "ok", asked)
+            yield Check(f"task {task.name}", "ok", detail)
     if not n_asked:
         yield Check("questions", "wrong", "none can be asked", "the lines above say why")
 
@@ -71,23 +88,16 @@ def _trajectories(contents: SetContents) -> Iterator[Check]:
         if contents.n_unasked:
             detail += f"; {contents.n_unasked:,} more without a question"
         yield Check("trajectories", "ok", detail)
-        sizes = Counter(
-            {
-                f"{width}x{height}": number
-                for (width, height), number in contents.image_sizes.items()
-            }
-        )
-        yield Check(
-            "pictures", "ok", f"in {_counted(contents.image_folders)}; {_counted(sizes)} pixels"
-        )
+        sizes = {f"{width}x{height}": n for (width, height), n in contents.image_sizes.items()}
+        detail = f"in {_counted(contents.image_folders)}; {_counted(sizes)} pixels"
+        yield Check("pictures", "ok", detail)
         yield Check("step logs", "ok", _counted(contents.layouts))
     if contents.unreadable:
         more = len(contents.unreadable) - _SHOWN
-        shown = "; ".join(contents.unreadable[:_SHOWN]) + (
-            f"; and {more:,} more" if more > 0 else ""
-        )
+        reasons = "; ".join(contents.unreadable[:_SHOWN])
+        reasons += f"; and {more:,} more" if more > 0 else ""
         detail = f"{len(contents.unreadable):,} cannot be read"
-        yield Check("unreadable trajectories", "optional", detail, shown)
+        yield Check("unreadable trajectories", "optional", detail, reasons)
 
 
 def _counted(numbers: Mapping[str, int]) -> str:
@@ -98,6 +108,6 @@ def _counted(numbers: Mapping[str, int]) -> str:
 
 
 def _in_words(reasons: Counter[str]) -> str:
-    shown = [f"{reason} ({number:,})" for reason, number in reasons.most_common(_SHOWN)]
+    named = [f"{reason} ({number:,})" for reason, number in reasons.most_common(_SHOWN)]
     more = len(reasons) - _SHOWN
-    return "; ".join(shown) + (f"; and {more:,} other reasons" if more > 0 else "")
+    return "; ".join(named) + (f"; and {more:,} other reasons" if more > 0 else "")

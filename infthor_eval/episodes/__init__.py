@@ -1,2 +1,1 @@
-"""What suites that act in a simulator share: trajectories, simulators, retries, records and
-curves."""
+"""What suites that act in a simulator share: trajectories, simulators, records and curves."""

@@ -1,17 +1,17 @@
-"""Cumulative reward along trajectories: step functions of single trajectories, and their mean over
-trajectories."""
+"""Cumulative reward along trajectories: step functions of single ones, and their mean."""
 
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import accumulate
-from typing import Any, Generic
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from infthor_eval.episodes.recorded_runs import RecordedRun
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.episodes.shared_units import SharedUnits
 from infthor_eval.runs.journals.records import UnitRecord
 from infthor_eval.statistics import MeanEstimate, mean_over_clusters
@@ -28,14 +28,14 @@ __all__ = [
     "compute_curves",
 ]
 
+P = TypeVar("P", bound=EpisodeRecord)
 AT_MOST = "at most"  # label of the bound if no planner is among the runs
 _MAX_POINTS = 400  # of a grid; a picture resolves no more
 
 
 @dataclass(frozen=True)
 class StepFunction:
-    """Cumulative reward in one trajectory: 0 before the first place, and constant from each place
-    to the next.
+    """Cumulative reward in one trajectory: 0 before the first place, then constant between them.
 
     Attributes:
         places: places of the steps, ascending; several episodes may end in one place.
@@ -149,9 +149,8 @@ class RewardCurves:
         return next(iter(self.facets))
 
 
-Earned = Sequence[
-    tuple[UnitRecord[P], float]
-]  # the episodes of a trajectory in time order, and their rewards
+# The episodes of a trajectory in time order, and their rewards.
+Earned = Sequence[tuple[UnitRecord[P], float]]
 Functions = Mapping[str, Sequence[StepFunction]]  # by facet, one of each trajectory
 
 
@@ -167,7 +166,8 @@ class _Drawn(Generic[P]):
 
     def curves(self, grids: Mapping[str, np.ndarray], *, is_bound: bool) -> RunCurves:
         means = {
-            name: _mean_curve(of_facet, grids[name]) for name, of_facet in self.functions.items()
+            facet: _mean_curve(functions, grids[facet])
+            for facet, functions in self.functions.items()
         }
         return RunCurves(self.label, is_bound, self.is_embedded, means, self.counts)
 
@@ -195,8 +195,8 @@ def compute_curves(
         count: returns the counts of some episodes by description, the number of all first.
     """
     drawn = [
-        _drawn_run(run, of_run, functions_of, count)
-        for run, of_run in zip(runs, shared.records, strict=True)
+        _drawn_run(run, trajectories, functions_of, count)
+        for run, trajectories in zip(runs, shared.records, strict=True)
     ]
     notes = list(shared.notes)
     planners = [number for number, run in enumerate(runs) if run.is_planner]
@@ -209,23 +209,18 @@ def compute_curves(
             notes.append(
                 f"{what} that no run attempted, which add nothing to {AT_MOST!r}: {n_unknown}"
             )
-    if lent := [
-        name
-        for name in facets
-        if name not in bound.functions and any(name in it.functions for it in drawn)
-    ]:
+    facets_of_runs = {name for run in drawn for name in run.functions}
+    lent = [name for name in facets if name in facets_of_runs - bound.functions.keys()]
+    if lent:
         bound = _on_lent_places(bound, lent, shared.records, functions_of)
         notes += _lent_notes(bound, [facets[name] for name in lent])
     everything = [*drawn, bound]
     notes += _missing_notes(everything if len(planners) == 1 else drawn, facets)
-    grids = {
-        name: _grid([it.functions[name] for it in everything if name in it.functions])
-        for name in facets
-    }
+    grids = {name: _grid(name, everything) for name in facets}
     return RewardCurves(
         task=" and ".join(shared.tasks),
         facets=facets,
-        runs=tuple(it.curves(grids, is_bound=it is bound) for it in everything),
+        runs=tuple(run.curves(grids, is_bound=run is bound) for run in everything),
         n_trajectories=len(shared.trajectories),
         notes=tuple(notes),
     )
@@ -233,16 +228,18 @@ def compute_curves(
 
 def _drawn_run(
     run: RecordedRun[P, Any],
-    of_run: Sequence[Sequence[UnitRecord[P]]],
+    trajectories: Sequence[Sequence[UnitRecord[P]]],
     functions_of: Callable[[Sequence[Earned[P]]], Functions],
     count: Callable[[Sequence[UnitRecord[P]]], dict[str, int]],
 ) -> _Drawn[P]:
-    earned = [
-        [(r, 0.0 if r.failure is not None else r.payload.reward) for r in records]
-        for records in of_run
-    ]
-    counts = count([record for records in of_run for record in records])
+    earned = [_earned(records) for records in trajectories]
+    counts = count([record for records in trajectories for record in records])
     return _Drawn(run.label, run.is_embedded, earned, functions_of(earned), counts)
+
+
+def _earned(records: Sequence[UnitRecord[P]]) -> Earned[P]:
+    """Pair episodes with their rewards; one that failed earns nothing."""
+    return [(r, 0.0 if r.failure is not None else r.payload.reward) for r in records]
 
 
 def _highest_possible(
@@ -251,18 +248,22 @@ def _highest_possible(
     facets: Mapping[str, Facet],
     functions_of: Callable[[Sequence[Earned[P]]], Functions],
 ) -> tuple[_Drawn[P], int]:
-    """Return the highest possible reward, and the number of episodes for which no run recorded
-    it."""
-    most = [list(_highest_rewards(of_runs)) for of_runs in zip(*records, strict=True)]
-    earned = [[(record, reward or 0.0) for record, reward in units] for units in most]
-    functions = {name: it for name, it in functions_of(earned).items() if facets[name].has_bound}
-    counts = {
-        what: n if number == 0 else 0 for number, (what, n) in enumerate(drawn[0].counts.items())
+    """Return the highest possible reward, and the number of episodes that no run has it for."""
+    earned: list[Earned[P]] = []
+    n_unknown = 0
+    for same_trajectory in zip(*records, strict=True):
+        most = list(_highest_rewards(same_trajectory))
+        earned.append([(record, reward or 0.0) for record, reward in most])
+        n_unknown += sum(reward is None for _, reward in most)
+    functions = {
+        facet: of_facet
+        for facet, of_facet in functions_of(earned).items()
+        if facets[facet].has_bound
     }
-    n_unknown = sum(reward is None for units in most for _, reward in units)
-    return _Drawn(
-        AT_MOST, all(it.is_embedded for it in drawn), earned, functions, counts
-    ), n_unknown
+    n_episodes, *rest = drawn[0].counts.items()
+    counts = dict([n_episodes, *((what, 0) for what, _ in rest)])
+    is_embedded = all(run.is_embedded for run in drawn)
+    return _Drawn(AT_MOST, is_embedded, earned, functions, counts), n_unknown
 
 
 def _on_lent_places(
@@ -273,37 +274,29 @@ def _on_lent_places(
 ) -> _Drawn[P]:
     """Add facets in which the bound's episodes stand where the first of the runs has them."""
 
-    def place(record: UnitRecord[P], facet: str) -> float:
+    def place(facet: str, record: UnitRecord[P]) -> float:
         alone = functions_of([[(record, 0.0)]])
         return alone[facet][0].places[-1] if facet in alone else math.inf
 
     functions = dict(bound.functions)
     for facet in lent:
-        first = [
-            [
-                min(same, key=lambda record: place(record, facet))
-                for same in zip(*of_runs, strict=True)
-            ]
-            for of_runs in zip(*records, strict=True)
-        ]
-        earned = [
-            [(record, reward) for record, (_, reward) in zip(of_first, units, strict=True)]
-            for of_first, units in zip(first, bound.earned, strict=True)
-        ]
+        earned = []
+        for same_trajectory, of_bound in zip(zip(*records, strict=True), bound.earned, strict=True):
+            same_episodes = zip(*same_trajectory, strict=True)
+            first = [min(episodes, key=partial(place, facet)) for episodes in same_episodes]
+            rewards = [reward for _, reward in of_bound]
+            earned.append(list(zip(first, rewards, strict=True)))
         functions[facet] = functions_of(earned)[facet]
     return replace(bound, functions=functions)
 
 
 def _highest_rewards(
-    of_runs: Sequence[Sequence[UnitRecord[P]]],
+    same_trajectory: Sequence[Sequence[UnitRecord[P]]],
 ) -> Iterator[tuple[UnitRecord[P], float | None]]:
-    """Yield the episodes of a trajectory with the highest possible reward that any run recorded;
-    None if none did."""
-    for same in zip(*of_runs, strict=True):
-        recorded = [
-            record.payload.max_reward for record in same if record.payload.max_reward is not None
-        ]
-        yield same[0], max(recorded, default=None)
+    """Yield episodes with the highest possible reward that any run recorded; None if none did."""
+    for same_episode in zip(*same_trajectory, strict=True):
+        rewards = [record.payload.max_reward for record in same_episode]
+        yield same_episode[0], max((r for r in rewards if r is not None), default=None)
 
 
 def _missing_notes(runs: Sequence[_Drawn[Any]], facets: Mapping[str, Facet]) -> Iterator[str]:
@@ -320,19 +313,19 @@ def _lent_notes(bound: _Drawn[Any], lent: Sequence[Facet]) -> Iterator[str]:
         )
 
 
-def _grid(runs: Sequence[Sequence[StepFunction]]) -> np.ndarray:
-    """Return all places where a function of a run steps, or evenly spaced ones if these are too
-    many."""
-    places = np.unique([place for functions in runs for item in functions for place in item.places])
+def _grid(facet: str, runs: Sequence[_Drawn[Any]]) -> np.ndarray:
+    """Return all places where a run's function steps; evenly spaced ones if these are too many."""
+    functions = [function for run in runs for function in run.functions.get(facet, ())]
+    places = np.unique([place for function in functions for place in function.places])
     return places if len(places) <= _MAX_POINTS else np.linspace(places[0], places[-1], _MAX_POINTS)
 
 
 def _mean_curve(functions: Sequence[StepFunction], grid: np.ndarray) -> Curve:
-    """Return the mean of a run's functions, one of each trajectory, up to the end of the
-    longest."""
-    last = max(item.places[-1] for item in functions)
+    """Return the mean of functions, one of each trajectory, up to the end of the longest."""
+
+    def mean_at(place: float) -> MeanEstimate:
+        return mean_over_clusters([function.at(place) for function in functions])
+
+    last = max(function.places[-1] for function in functions)
     places = tuple(float(place) for place in grid if place <= last)
-    return Curve(
-        places,
-        tuple(mean_over_clusters([item.at(place) for item in functions]) for place in places),
-    )
+    return Curve(places, tuple(map(mean_at, places)))

@@ -11,7 +11,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from infthor_eval.episodes.config import EpisodesConfig
 from infthor_eval.episodes.options import SimulatorOptions
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.episodes.simulators import Simulators
 from infthor_eval.episodes.tasks import EpisodeTask
 from infthor_eval.episodes.trajectory_sets import TaskTrajectory
@@ -31,6 +31,7 @@ from infthor_eval.storage.digests import fingerprint
 
 __all__ = ["BoundEpisodes", "EpisodeEvaluation", "EpisodeUnit"]
 
+P = TypeVar("P", bound=EpisodeRecord)
 T = TypeVar("T", bound=TaskTrajectory)
 E = TypeVar("E")
 K = TypeVar("K", bound=EpisodeTask[Any, Any])
@@ -84,9 +85,9 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
         self._scenes = Path(self.options.scenes) if self.options.scenes is not None else None
         self._floor_plans = floor_plans_digest(self._scenes) if self._scenes is not None else None
         by_name = {
-            item.traj_id: item.data
+            trajectory.traj_id: trajectory.data
             for task in self.tasks.values()
-            for item in task.trajectories.trajectories
+            for trajectory in task.trajectories.trajectories
         }
         self.trajectories = list(by_name.values())
 
@@ -120,9 +121,9 @@ class EpisodeEvaluation(ABC, Generic[Options, K, U]):
                 for units in listed
             ],
             skipped=[
-                Skipped(UnitKey(name, place), reason)
+                Skipped(UnitKey(name, path), reason)
                 for name, task in self.tasks.items()
-                for place, reason in task.trajectories.broken
+                for path, reason in task.trajectories.broken
             ],
             config=self.config,
         )
@@ -142,11 +143,9 @@ class BoundEpisodes(Generic[U, P]):
         simulators: Iterable[Simulators],
     ) -> None:
         """Take the work, and the simulators that it is done in, which are closed with this."""
-        self.workload, self.seed, self._simulators_to_close = (
-            workload,
-            evaluation.seed,
-            list(simulators),
-        )
+        self.workload = workload
+        self.seed = evaluation.seed
+        self._simulators_to_close = list(simulators)
         by_task = groupby(evaluation.units, key=lambda unit: unit.key.task)
         self._numbers = {
             unit.key: number for _, of_task in by_task for number, unit in enumerate(of_task)
@@ -177,9 +176,9 @@ class BoundEpisodes(Generic[U, P]):
     def _find_records(
         self, group: Group[U], session: Session[P]
     ) -> tuple[dict[UnitKey, str], dict[UnitKey, UnitRecord[P] | None]]:
-        """Return the fingerprints of a group's units, and the records of those that have a result
-        already."""
+        """Return the fingerprints of a group's units, and the records of results that are there."""
         fingerprints = {unit.key: self._fingerprint(unit) for unit in group.units}
-        return fingerprints, {
+        records = {
             unit.key: session.find_record(unit, fingerprints[unit.key]) for unit in group.units
         }
+        return fingerprints, records

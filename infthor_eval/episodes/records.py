@@ -1,12 +1,14 @@
-"""Records of episodes, as far as plans and arms have them alike."""
+"""Records of episodes, as far as plans and arms have them alike, and why one has no result."""
 
 from typing import Any, TypeVar
 
 import msgspec
 
-__all__ = ["DONE", "NOT_ATTEMPTED", "EpisodeRecord", "P"]
+from infthor_eval.errors import DataError
 
-# two of the ways in which an episode ends
+__all__ = ["DONE", "NOT_ATTEMPTED", "EpisodeRecord", "InfeasibleError", "P"]
+
+# Two of the ways in which an episode ends.
 DONE = "done"
 NOT_ATTEMPTED = "not attempted"
 
@@ -41,3 +43,7 @@ class EpisodeRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
 
 
 P = TypeVar("P", bound=EpisodeRecord)
+
+
+class InfeasibleError(DataError):
+    """Nobody can succeed in an episode in this simulator, so it is excluded for every subject."""

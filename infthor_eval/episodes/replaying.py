@@ -1,5 +1,4 @@
-"""Recorded episodes replayed, so that they can be looked at: a journal has every action, and no
-frame.
+"""Recorded episodes replayed, to be looked at: a journal has every action, and no frame.
 
 Actions, rewards and endings are shown as the run recorded them. What the subject saw is recomputed:
 the environment is reset to each episode and the recorded calls are repeated, which leads to the
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from infthor_eval.episodes.recorded_runs import RecordedRun
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.episodes.replay_frames import EpisodeFrame
 from infthor_eval.episodes.shared_units import only_name
 from infthor_eval.episodes.simulators import Simulators
@@ -34,6 +33,7 @@ __all__ = [
     "restore_trajectory",
 ]
 
+P = TypeVar("P", bound=EpisodeRecord)
 R = TypeVar("R", bound=RecordedRun[Any, Any])
 T = TypeVar("T", bound=TaskTrajectory)
 F = TypeVar("F", bound=EpisodeFrame[Any, Any])
@@ -41,8 +41,7 @@ F = TypeVar("F", bound=EpisodeFrame[Any, Any])
 
 @dataclass(frozen=True)
 class RecordedTrajectory(Generic[R, P]):
-    """What a run recorded of one trajectory: its name, and the records of its episodes in time
-    order."""
+    """What a run recorded of one trajectory, by name: its episodes' records in time order."""
 
     run: R
     trajectory: str
@@ -57,8 +56,7 @@ class RecordedTrajectory(Generic[R, P]):
 def records_of_trajectory(
     run: RecordedRun[P, Any], tasks: Collection[str], trajectory: str | None
 ) -> tuple[str, tuple[UnitRecord[P], ...]]:
-    """Return the name of a trajectory (None: the only one), and a run's records of it in some
-    tasks, in time order.
+    """Return a trajectory's name (None: the only one) and its records in some tasks, in time order.
 
     Raises:
         UsageError: there is no such trajectory, or none is given and there are several.
@@ -116,8 +114,7 @@ class EpisodeInReplay(Protocol):
     """An episode that is being replayed."""
 
     def repeat(self, step: Any, *, is_last: bool) -> str:
-        """Repeat a recorded step unless the episode is over; return how its result differs, empty
-        if it does not."""
+        """Repeat a recorded step unless the episode is over; return how it differs, if it does."""
 
     def observe(self) -> Any:
         """Return the present observation; raises DataError if the simulator sent no frame."""
@@ -137,11 +134,10 @@ class EpisodeReplay(ABC, Generic[P, F]):
 
     @abstractmethod
     def _frame(self, record: UnitRecord[P], number: int, observation: Any, note: str) -> F:
-        """Return the frame after a number of steps; `observation` is None if nobody acted in the
-        episode."""
+        """Return the frame after so many steps; `observation` is None if nobody acted."""
 
     @abstractmethod
-    def _place(self, record: UnitRecord[P], number: int) -> str:
+    def _describe_step(self, record: UnitRecord[P], number: int) -> str:
         """Describe a step of an episode."""
 
     def frames(self, records: Sequence[UnitRecord[P]]) -> Iterator[F]:
@@ -166,16 +162,14 @@ class EpisodeReplay(ABC, Generic[P, F]):
             difference = episode.repeat(step, is_last=number == len(steps))
             # Once the worlds differ all later steps may differ too, so the first difference alone
             # is noted.
-            note = (
-                f"{self._place(record, number)}: {difference}" if difference and not differs else ""
-            )
+            is_first = difference and not differs
+            note = f"{self._describe_step(record, number)}: {difference}" if is_first else ""
             differs = differs or bool(difference)
             yield self._frame(record, number, episode.observe(), note)
 
 
 def ending_of(record: UnitRecord[P], number: int) -> str:
-    """Return how an episode ended if it did with that step, or why nobody acted in it; else an
-    empty text."""
+    """Return how an episode ended with that step, or why nobody acted in it, or an empty text."""
     if record.excluded is not None:
         return f"excluded: {record.excluded}"
     if not record.payload.attempted and record.failure is not None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.episodes.retries import with_retries
 from infthor_eval.errors import InfthorError, SceneError
 from infthor_eval.runs import NOTHING, Session, Tokens, Unit, UnitRecord, Usage
@@ -44,16 +44,14 @@ class EpisodeRunner(Generic[E, P]):
     usage: Usage
 
     def __init__(self, simulator: Simulator, build: Callable[[], E]) -> None:
-        """Take the trajectory's simulator, and what builds the environment, which restores the
-        scene."""
+        """Take a trajectory's simulator, and what builds its environment and restores the scene."""
         self._simulator = simulator
         self._build = build
         self._environment: E | None = None
 
     @property
     def environment(self) -> E:
-        """The environment. It is built for the first episode, and again after the simulator failed
-        for good."""
+        """The environment, built for the first episode and after the simulator failed for good."""
         if self._environment is None:
             self._environment = self._build()
         return self._environment
@@ -65,8 +63,7 @@ class EpisodeRunner(Generic[E, P]):
         run: Callable[[], EpisodeResult[P]],
         session: Session[P],
     ) -> UnitRecord[P]:
-        """Run an episode and return its record, also of an error; `run` is repeated if the
-        simulator fails for good."""
+        """Run an episode, again if the simulator fails for good, and record it or its error."""
         self.begun = None
         self.usage = NOTHING
         start = time.perf_counter()

@@ -2,15 +2,16 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import Any, Generic, TypeVar
 
 from infthor_eval.episodes.recorded_runs import RecordedRun
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.errors import DataError, UsageError, unknown_name
 from infthor_eval.runs.journals.records import UnitRecord
 
 __all__ = ["SharedUnits", "difference_notes", "only_name", "shared_tasks", "shared_units"]
 
+P = TypeVar("P", bound=EpisodeRecord)
 Units = Mapping[str, Mapping[Any, UnitRecord[P]]]  # by trajectory, then by their order in time
 
 
@@ -32,19 +33,20 @@ class SharedUnits(Generic[P]):
 
 
 def shared_tasks(runs: Sequence[RecordedRun[Any, Any]], chosen: Sequence[str] | None) -> list[str]:
-    """Return the names of the tasks that all runs (at least one) have, or the chosen ones; in the
-    first run's order.
+    """Return the names of the tasks that all runs (at least one) have, in the first run's order.
+
+    If some are chosen, return these.
 
     Raises:
         UsageError: there is no shared task, or a chosen one is not shared.
     """
     first = runs[0]
-    shared = [name for name in first.config.tasks if all(name in run.config.tasks for run in runs)]
+    tasks_of_runs = [run.config.tasks.keys() for run in runs]
+    of_all = set.intersection(*map(set, tasks_of_runs))
+    shared = [name for name in first.config.tasks if name in of_all]
     if not shared:
-        other = next(
-            (run for run in runs if not run.config.tasks.keys() & first.config.tasks.keys()),
-            runs[-1],
-        )
+        disjoint = (run for run in runs if not run.config.tasks.keys() & first.config.tasks.keys())
+        other = next(disjoint, runs[-1])
         raise UsageError(
             f"{first.label} and {other.label} share no task; draw runs of the same task"
         )
@@ -60,8 +62,7 @@ def shared_units(
     excluded: str,
     differences: Iterable[str] = (),
 ) -> SharedUnits[P]:
-    """Find the episodes of trajectories that all runs (at least one) have in full, in tasks that
-    all have.
+    """Find the episodes of trajectories that all runs (at least one) have in full, in shared tasks.
 
     Args:
         excluded: description of episodes that some run excludes, for a note.
@@ -73,11 +74,11 @@ def shared_units(
     units = [run.by_trajectory(tasks) for run in runs]
     digests = [run.digests(tasks) for run in runs]
     names = sorted(set().union(*digests, *units))
-    excluded_units = {name: _excluded_units(name, units) for name in names}
+    left_out = {name: _excluded(name, units) for name in names}
     shared = [
         name
         for name in names
-        if _is_shared(name, digests, units) and units[0][name].keys() - excluded_units[name]
+        if _is_shared(name, digests, units) and units[0][name].keys() - left_out[name]
     ]
     if not shared:
         which = " and ".join(tasks)
@@ -85,7 +86,10 @@ def shared_units(
             f"the runs share no trajectory of {which} that all of them have in full; draw runs on "
             "the same data"
         )
-    records = tuple(_counted_records(of_run, shared, excluded_units) for of_run in units)
+    records = []
+    for of_run in units:
+        counted = [_without(of_run[name], left_out[name]) for name in shared]
+        records.append(tuple(counted))
     notes = []
     if len(shared) < len(names):
         notes.append(
@@ -94,10 +98,25 @@ def shared_units(
         )
     if len(shared) == 1:
         notes.append("a mean over one trajectory has no interval")
-    if n_excluded := sum(len(excluded_units[name]) for name in shared):
+    if n_excluded := sum(len(left_out[name]) for name in shared):
         notes.append(f"{excluded}: {n_excluded}")
     notes += difference_notes("simulator", runs, [run.config.simulator for run in runs])
-    return SharedUnits(tuple(tasks), tuple(shared), records, (*notes, *differences))
+    return SharedUnits(tuple(tasks), tuple(shared), tuple(records), (*notes, *differences))
+
+
+def _excluded(name: str, units: Sequence[Units[P]]) -> set[Any]:
+    """Return which episodes of a trajectory some run excludes, by their order in time."""
+    of_runs = [of_run.get(name, {}) for of_run in units]
+    return {
+        order
+        for of_run in of_runs
+        for order, record in of_run.items()
+        if record.excluded is not None
+    }
+
+
+def _without(units: Mapping[Any, UnitRecord[P]], left_out: set[Any]) -> tuple[UnitRecord[P], ...]:
+    return tuple(units[order] for order in sorted(units.keys() - left_out))
 
 
 def difference_notes(
@@ -111,8 +130,13 @@ def difference_notes(
 
 
 def only_name(what: str, option: str, name: str | None, known: Sequence[str]) -> str:
-    """Return the given name, or the only one that a run has; `what` is its kind, `option` the
-    option that gives it.
+    """Return the name if it is given, or the only one that a run has.
+
+    Args:
+        what: kind of the name, for messages.
+        option: option that gives it.
+        name: the name, None if it is not given.
+        known: names that the run has.
 
     Raises:
         UsageError: the run has nothing of that name, or no name is given and there are several.
@@ -126,32 +150,14 @@ def only_name(what: str, option: str, name: str | None, known: Sequence[str]) ->
     return name or known[0]
 
 
-def _excluded_units(trajectory: str, units: Sequence[Units[P]]) -> set[Any]:
-    """Return the episodes of a trajectory that do not count in some run."""
-    excluded = set()
-    for of_run in units:
-        for episode, record in of_run.get(trajectory, {}).items():
-            if record.excluded is not None:
-                excluded.add(episode)
-    return excluded
-
-
-def _counted_records(
-    of_run: Units[P], trajectories: Sequence[str], excluded: Mapping[str, set[Any]]
-) -> tuple[tuple[UnitRecord[P], ...], ...]:
-    """Return a run's records of some trajectories that count in every run, in time order."""
-    records = []
-    for name in trajectories:
-        episodes = sorted(of_run[name].keys() - excluded[name])
-        records.append(tuple(of_run[name][episode] for episode in episodes))
-    return tuple(records)
-
-
 def _is_shared(name: str, digests: Sequence[Mapping[str, str]], units: Sequence[Units[P]]) -> bool:
     """Return whether all runs have the same trajectory of that name with the same episodes.
 
     A run that was stopped in the middle of a trajectory lacks episodes there.
     """
-    if any(name not in item for item in units) or len({known.get(name) for known in digests}) > 1:
+    if (
+        any(name not in of_run for of_run in units)
+        or len({known.get(name) for known in digests}) > 1
+    ):
         return False
-    return all(item[name].keys() == units[0][name].keys() for item in units)
+    return all(of_run[name].keys() == units[0][name].keys() for of_run in units)

@@ -1,5 +1,4 @@
-"""Simulator processes for episodes that run at the same time: each has its own, and they are used
-again."""
+"""Simulator processes for episodes that run at the same time: one each, used again."""
 
 import weakref
 from collections.abc import Iterator, Sequence
@@ -19,8 +18,7 @@ _COPIES = 512  # of the simulator's state: one for each plan of a long trajector
 
 
 class Simulators:
-    """Starts simulators as they are needed. They are stopped by `close`, or when nobody holds this
-    any more."""
+    """Starts simulators as they are needed, and stops them at `close` or when nobody holds this."""
 
     def __init__(
         self, name: str, scenes: Path | None, trajectories: Sequence[Trajectory], **options: Any

@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeVar
 import msgspec
 
 from infthor_eval.episodes.config import EpisodesConfig, EpisodeTaskConfig
-from infthor_eval.episodes.records import P
+from infthor_eval.episodes.records import EpisodeRecord
 from infthor_eval.rates import Rate, clustered_rate
 from infthor_eval.runs import UnitRecord
 
@@ -40,6 +40,7 @@ class EpisodeTaskSummary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 C = TypeVar("C", bound=EpisodeTaskConfig)
+P = TypeVar("P", bound=EpisodeRecord)
 T = TypeVar("T", bound=EpisodeTaskSummary)
 
 
@@ -55,8 +56,11 @@ def summarise_episodes(
     records: Sequence[UnitRecord[P]],
     summarise_task: Callable[[C, list[UnitRecord[P]]], T],
 ) -> EpisodesSummary[T]:
-    """Summarise a run; `summarise_task` returns a task's results, given its config and its records
-    in order."""
+    """Summarise a run.
+
+    Args:
+        summarise_task: returns a task's results, given its config and its records in order.
+    """
     ordered = sorted(records, key=lambda record: record.key)
     tasks = {}
     for name, task in config.tasks.items():
@@ -89,5 +93,5 @@ def success_rate(records: Sequence[UnitRecord[P]]) -> Rate | None:
     )
 
 
-def _count(items: Iterable[str]) -> dict[str, int]:
-    return dict(sorted(Counter(items).items()))
+def _count(reasons: Iterable[str]) -> dict[str, int]:
+    return dict(sorted(Counter(reasons).items()))

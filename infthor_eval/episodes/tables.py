@@ -25,8 +25,7 @@ def run_name(header: RunHeader) -> str:
 
 
 def named_tasks(runs: Sequence[RunSummary]) -> Iterator[tuple[str, str, Any]]:
-    """Yield the run's name, the task's name and the task's results (`EpisodeTaskSummary`), for all
-    runs."""
+    """Yield each run's name, each task's name, and its results (`EpisodeTaskSummary`)."""
     for run in runs:
         for task_name, task in run.summary.tasks.items():
             yield run_name(run.header), task_name, task
@@ -38,28 +37,20 @@ def endings_table(
     column: str = "",
     value: Callable[[T], Any] = str,
 ) -> Table:
-    """Return the table of how episodes ended, with a further column for a value of each task if it
-    has a heading."""
+    """Return the table of how episodes ended; with a heading, a last column of values by task."""
     endings = list(dict.fromkeys(ending for _, _, task in tasks for ending in task.endings))
     further = [column] if column else []
-    rows = [
-        Row(
-            (
-                *names,
-                *(str(task.endings.get(ending, 0)) for ending in endings),
-                *(str(value(task)) for _ in further),
-            )
-        )
-        for *names, task in tasks
-    ]
+    rows = []
+    for *names, task in tasks:
+        counts = [str(task.endings.get(ending, 0)) for ending in endings]
+        rows.append(Row((*names, *counts, *([str(value(task))] if column else []))))
     return Table(title, (*NAME_COLUMNS, *map(Column, (*endings, *further))), tuple(rows))
 
 
 def result_notes(runs: Sequence[RunSummary]) -> tuple[str, ...]:
-    """Return the notes below tables of results: on the embedded simulator, and on what was left
-    out."""
+    """Return the notes below results: on the embedded simulator, and on what was left out."""
     notes = [_EMBEDDED] if any(run.summary.simulator == "embedded" for run in runs) else []
-    left_out = left_out_notes(
-        [[(t.excluded, t.skipped) for t in run.summary.tasks.values()] for run in runs]
-    )
-    return (*notes, *left_out)
+    left_out = []
+    for run in runs:
+        left_out.append([(task.excluded, task.skipped) for task in run.summary.tasks.values()])
+    return (*notes, *left_out_notes(left_out))

@@ -22,15 +22,15 @@ _TYPES: dict[type, str] = {
 def task_settings(
     file: TaskFile,
     kind: type[T],
-    given: Mapping[str, Any],
+    overrides: Mapping[str, Any],
     choices: Mapping[str, Sequence[str]] | None = None,
 ) -> T:
-    """Return the settings of a task file, with those that are given instead.
+    """Return the settings of a task file, with those that override them.
 
     Args:
         kind: dataclass of all settings, with defaults; numbers are above 0, and a text may be
             optional.
-        given: settings by name that replace the file's; None keeps the file's.
+        overrides: settings by name that replace the file's; None keeps the file's.
         choices: allowed texts of settings, by name.
 
     Raises:
@@ -53,7 +53,7 @@ def task_settings(
         if value not in allowed:
             raise DataError(f"{where} is {value!r:.60}; there are {', '.join(allowed)}")
     return kind(
-        **{**settings, **{name: value for name, value in given.items() if value is not None}}
+        **{**settings, **{name: value for name, value in overrides.items() if value is not None}}
     )
 
 

@@ -22,8 +22,7 @@ T = TypeVar("T", bound=TaskTrajectory)
 
 
 class EpisodeTask(ABC, Generic[S, T]):
-    """A task file that was read, its trajectories, and its settings with what the command line
-    gives instead."""
+    """A task file, its trajectories, and its settings with what the command line gives instead."""
 
     def __init__(
         self,

@@ -1,5 +1,4 @@
-"""The trajectories of a task: from a file, a folder or an NIEH set, or from a set in the
-package."""
+"""The trajectories of a task: from a file, a folder, an NIEH set, or a set in the package."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -42,7 +41,7 @@ class TrajectorySet(Generic[T]):
 
     Attributes:
         trajectories: trajectories that can be used, ordered by name.
-        broken: places of the others within the folder, and what is wrong with each.
+        broken: paths of the others within the folder, and what is wrong with each.
     """
 
     trajectories: Sequence[T]
@@ -88,7 +87,7 @@ def find_trajectories(
     if not by_name:
         why = broken[0][1] if broken else "no trajectory there"
         raise DataError(f"{root}: nothing to evaluate ({why})")
-    within = [(_within(root, place), _within(root, reason)) for place, reason in broken]
+    within = [(_within(root, path), _within(root, reason)) for path, reason in broken]
     return TrajectorySet([by_name[name] for name in sorted(by_name)], within)
 
 
@@ -117,12 +116,13 @@ def find_recorded_trajectory(
             "FOLDER, as for the run"
         )
     available = find_trajectories(data, None if data is not None else bundled, read)
-    trajectory = next((item for item in available.trajectories if item.traj_id == name), None)
-    if trajectory is None:
-        names = ", ".join(item.traj_id for item in available.trajectories)
+    by_name = {trajectory.traj_id: trajectory for trajectory in available.trajectories}
+    if name not in by_name:
         raise DataError(
-            f"{name}: not among the trajectories of --data ({names:.200}); give those of the run"
+            f"{name}: not among the trajectories of --data ({', '.join(by_name):.200}); give those "
+            "of the run"
         )
+    trajectory = by_name[name]
     if trajectory.digest != digest:
         raise DataError(f"{name}: changed since the run; give the run's own trajectories as --data")
     return available, trajectory
@@ -134,8 +134,7 @@ def _within(root: Path, text: str) -> str:
 
 
 def _sources(root: Path, broken: _Broken) -> Iterator[TrajectorySource]:
-    """Yield the trajectories that are there; files that cannot be read to the end are added to the
-    broken ones.
+    """Yield the trajectories that are there, and add files that cannot be read to `broken`.
 
     The trajectories of an NIEH set are beside the logs of their replay.
     """

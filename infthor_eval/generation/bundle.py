@@ -82,8 +82,7 @@ def build_bundle(
     out: Path,
     progress: Callable[[bool], None] = lambda _: None,
 ) -> tuple[Manifest, GeneratedQuestions]:
-    """Build the set: generate and replay the trajectories, generate questions, and compress the
-    frames.
+    """Build the set: generate and replay trajectories, generate questions, compress the frames.
 
     Args:
         manifest: the manifest; its digests are not used.
@@ -99,11 +98,12 @@ def build_bundle(
     """
     if out.exists() and any(out.iterdir()):
         raise DataError(f"{out}: not empty; give a new folder")
-    jobs = [TrajectorySettings(**msgspec.structs.asdict(item)) for item in manifest.trajectories]
+    recipes = manifest.trajectories
+    jobs = [TrajectorySettings(**msgspec.structs.asdict(recipe)) for recipe in recipes]
     with ScratchFolder() as folder:
         _raise_first(generate_set(jobs, simulator, folder, progress).failures)
         replayed = replay_set(select([folder]), simulator, out, progress)
-    _raise_first([item.message for item in replayed.failures])
+    _raise_first([failure.message for failure in replayed.failures])
     generated = generate_questions(
         out,
         seed=manifest.question_seed,

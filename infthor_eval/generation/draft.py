@@ -41,9 +41,9 @@ def initial_scene(settings: TrajectorySettings, view: SimulatorView, start: Init
         init_action=start,
         scene_num=int("".join(filter(str.isdigit, settings.scene)) or 0),
         object_poses=[
-            ObjectPose(item.name, asdict(item.position), asdict(item.rotation))
-            for item in view.objects.values()
-            if item.pickupable
+            ObjectPose(loose.name, asdict(loose.position), asdict(loose.rotation))
+            for loose in view.objects.values()
+            if loose.pickupable
         ],
         random_seed=settings.seed,
     )
@@ -77,8 +77,7 @@ class Draft:
 
     @property
     def n_subgoals(self) -> int:
-        """Number of sub-goals in the sense of Algorithm 1: tasks, and put-downs of what they left
-        in the hand."""
+        """Number of sub-goals as Algorithm 1 counts: tasks, and put-downs of what they left."""
         return len(self._sub_tasks) + self._n_put_downs
 
     def add(self, trace: Trace) -> None:
@@ -91,7 +90,9 @@ class Draft:
 
     def cut(self, length: Length) -> None:
         """Remove what was added after the trajectory had this length."""
-        del self._low[length.low :], self._high[length.high :], self._log[length.low + 1 :]
+        del self._low[length.low :]
+        del self._high[length.high :]
+        del self._log[length.low + 1 :]
 
     def add_task(self, task: SubTask, start: Length, end: Length) -> None:
         """Add a completed task, with the lengths before its first action and after its last one.
@@ -107,8 +108,7 @@ class Draft:
         self._sub_tasks.append(task)
 
     def drop_last_task(self) -> None:
-        """Remove the last task with its actions, and those that put down what it left in the
-        hand."""
+        """Remove the last task with its actions, and those that put down what it left."""
         self._sub_tasks.pop()
         part = self._sub_trajs.pop()
         self._n_put_downs -= self.length.low > part.low_pddl_idx[1]
@@ -123,8 +123,7 @@ class Draft:
         return other
 
     def make_last_task_final(self) -> None:
-        """Make the last task the final one, which trajectories of test sets name once more beside
-        the others."""
+        """Make the last task the final one, which test sets name once more beside the others."""
         self._final = self._sub_tasks[-1]
 
     def object_log(self) -> list[dict[str, Any]]:
@@ -132,8 +131,7 @@ class Draft:
         return [msgspec.json.decode(entry) for entry in self._log]
 
     def trajectory(self, history: dict[str, Any]) -> Trajectory:
-        """Return the trajectory, with what happened while it was generated
-        (`AttemptStatistics.document`)."""
+        """Return the trajectory, with the history of its attempt (`AttemptStatistics.document`)."""
         return Trajectory(
             scene=self._scene,
             plan=ExpertPlan(self._low, self._high),
@@ -157,8 +155,7 @@ class Draft:
 
 
 def _image(low: LowAction) -> dict[str, Any]:
-    """Return the entry of the frame after an action, with its name in a replay; frame 0 is before
-    the first action."""
+    """Return the entry of the frame after an action; frame 0 is before the first action."""
     assert low.low_idx is not None
     return {
         "high_idx": low.high_idx,

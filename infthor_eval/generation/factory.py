@@ -38,12 +38,12 @@ __all__ = ["GeneratedTrajectory", "generate"]
 
 _MAX_EXTENSIONS = 4  # ordinary tasks that are added at most because no final task works
 _MIN_NOT_EXECUTED = 200  # tasks without any executed action that end an attempt, at least
+_OTHER_SETTINGS = "choose another scene or seed or a higher --max-fail"
 
 
 @dataclass
 class GeneratedTrajectory:
-    """One trajectory, with the planning problem of each of its tasks as PDDL (the final one
-    last)."""
+    """One trajectory, with each of its tasks' planning problems as PDDL, the final one last."""
 
     trajectory: Trajectory
     statistics: AttemptStatistics
@@ -100,9 +100,7 @@ class _Factory:
         self._statistics = AttemptStatistics()
         self._n_in_row = 0  # failures of executed tasks since the last one that was accepted
         self._n_roll_backs = 0  # since the last task that was accepted
-        self._n_not_executed = (
-            0  # failures of tasks of which nothing was executed, since the pool began
-        )
+        self._n_not_executed = 0  # failures of tasks with nothing executed, since the pool began
         self._problems: list[str] = []
         self._marks: list[SimulatorMark] = []  # the state before each task
         self._draft = self._start_draft()
@@ -117,9 +115,8 @@ class _Factory:
                 "scene"
             )
         x, z = grid.position(self._rng.choice(sorted(grid.cells)))
-        start = InitAction(
-            x, view.agent.position.y, z, float(self._rng.choice([0, 90, 180, 270])), 30.0
-        )
+        turn = float(self._rng.choice([0, 90, 180, 270]))
+        start = InitAction(x, view.agent.position.y, z, turn, 30.0)
         scene = initial_scene(self._settings, view, start)
         restore(self._simulator, scene)
         return Draft(self._settings, scene, self._simulator.view)
@@ -186,16 +183,13 @@ class _Factory:
         raise _GaveUp("no final task works; choose another scene or seed")
 
     def _add_final_task(self) -> bool:
-        """Try the tasks between the two ends of the trajectory, each once, in a direction drawn
-        anew for each."""
+        """Try the tasks between the trajectory's ends, each once, in a direction drawn anew."""
         directions = end_types(self._draft.object_log())
         pool = TaskPool(self._rng)
         while True:
             room = self._room()
-            candidates = [
-                [task for task in self._candidates(room) if types.allows_task(task)]
-                for types in directions
-            ]
+            possible = self._candidates(room)
+            candidates = [list(filter(types.allows_task, possible)) for types in directions]
             self._rng.shuffle(candidates)
             task = pool.draw(candidates[0]) or pool.draw(candidates[1])
             if task is None:
@@ -230,21 +224,16 @@ class _Factory:
             return
         self._n_not_executed += 1
         if self._n_not_executed > max(_MIN_NOT_EXECUTED, 10 * self._settings.max_fail):
-            raise _GaveUp(
-                self._no_further_task("choose another scene or seed or a higher --max-fail")
-            )
+            raise _GaveUp(self._no_further_task(_OTHER_SETTINGS))
 
     def _roll_back(self) -> None:
-        """Drop the last sub-goals, twice as many as the last time, and go on from the state before
-        them.
+        """Drop the last sub-goals, twice as many as last time, and go on from the state before.
 
         Raises:
             _GaveUp: there is nothing to drop.
         """
         if not self._draft.n_tasks:
-            raise _GaveUp(
-                self._no_further_task("choose another scene or seed or a higher --max-fail")
-            )
+            raise _GaveUp(self._no_further_task(_OTHER_SETTINGS))
         self._note_longest()
         before = self._draft.length
         n_before = self._draft.n_subgoals
@@ -280,9 +269,8 @@ class _Factory:
         return self._known_failures.room(self._simulator.view)
 
     def _candidates(self, room: SymbolicRoom) -> list[Task]:
-        """Return the tasks that are possible now: what is known to be full or out of reach is left
-        out."""
-        types = {item.object_type for item in self._simulator.view.objects.values()}
+        """Return the tasks that are possible now, not with what is known to be full or far."""
+        types = {one.object_type for one in self._simulator.view.objects.values()}
         tasks = [task for task in tasks_of(room, types) if task.task_type in self._task_types]
         return [
             task
@@ -343,16 +331,15 @@ class _Factory:
         held = room.start.held
         if held is None:
             return None
-        places = sorted(key for key in room.places & room.receptacles if room.fits(held, key))
-        self._rng.shuffle(places)
-        for place in places:
-            if self._execute([Operator("PutObject", held, place)]).failure is None:
+        fitting = sorted(key for key in room.places & room.receptacles if room.fits(held, key))
+        self._rng.shuffle(fitting)
+        for receptacle in fitting:
+            if self._execute([Operator("PutObject", held, receptacle)]).failure is None:
                 return None
         return RolloutError(f"no receptacle has room for {room.types[held]}", held)
 
     def _execute(self, operators: list[Operator]) -> _Outcome:
-        """Run operators and add their actions; if one fails, the simulator is rewound and nothing
-        is added."""
+        """Run operators and add their actions; if one fails, rewind and add nothing."""
         mark = self._simulator.mark()
         trace = Trace(self._simulator, self._draft.length.high)
         try:

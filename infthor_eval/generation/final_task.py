@@ -20,8 +20,7 @@ SHARE = 0.2  # of the frames, at either end
 
 @dataclass(frozen=True)
 class EndTypes:
-    """Object types seen at the two ends of a trajectory, with the object at one end and the
-    receptacle at the other.
+    """Types seen at a trajectory's ends: the object's at one, the receptacle's at the other.
 
     Attributes:
         pickupable: types that can be picked up, at the end with the object.
@@ -34,8 +33,7 @@ class EndTypes:
     either: frozenset[str]
 
     def allows(self, pickup: str, other: str | None, movable: str | None = None) -> bool:
-        """Return True if a task on these types satisfies the rule; a movable receptacle may be from
-        either end."""
+        """Return True if a task on these types fits the rule; `movable` may be of either end."""
         carried = movable is None or movable in self.either
         return carried and pickup in self.pickupable and other in self.visible
 
@@ -45,10 +43,10 @@ class EndTypes:
 
 
 def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]:
-    """Return the types at the ends of an object log (an entry per frame): with the object early,
-    and with it late."""
+    """Return the types at a log's ends (an entry per frame), with the object early and late."""
     count = max(1, math.floor(SHARE * len(object_log)))
-    first, last = object_log[:count], object_log[-count:]
+    first = object_log[:count]
+    last = object_log[-count:]
     either = _types(first, "visible") | _types(last, "visible")
     return (
         EndTypes(_types(first, "pickupable"), _types(last, "visible"), either),
@@ -57,19 +55,16 @@ def end_types(object_log: Sequence[dict[str, Any]]) -> tuple[EndTypes, EndTypes]
 
 
 def violation(trajectory: Trajectory) -> str | None:
-    """Return how a trajectory's final task violates the rule, by its object log, or None if it does
-    not."""
+    """Return how a final task violates the rule, by the object log, or None if it does not."""
     task = trajectory.long_horizon_task
     if task is None:
         return "there is no final task"
     before = trajectory.sub_trajs[-1].low_pddl_idx[0]
     info = task.task_info
     other = info.receptacle or task.pddl_params.get("toggle_target")
-    either_way = end_types(trajectory.object_log[: before + 1])
-    if info.pickup is not None and any(
-        ends.allows(info.pickup, other, info.movable) for ends in either_way
-    ):
-        return None
+    for ends in end_types(trajectory.object_log[: before + 1]):
+        if info.pickup is not None and ends.allows(info.pickup, other, info.movable):
+            return None
     return (
         f"'{task.task_desc}' is not about types seen at both ends of the {before} steps before it"
     )

@@ -10,9 +10,12 @@ import msgspec
 from infthor_eval.errors import InfthorError, UsageError, wrap_errors
 from infthor_eval.formats.trajectory import encode_trajectory, iter_sources
 from infthor_eval.generation.factory import GeneratedTrajectory, generate
-from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.settings import TrajectorySettings
-from infthor_eval.generation.simulator_jobs import SimulatorWorker, collect_outcomes
+from infthor_eval.generation.simulator_jobs import (
+    SimulatorWorker,
+    collect_outcomes,
+    freeze_existing_objects,
+)
 from infthor_eval.generation.statistics import AttemptStatistics
 from infthor_eval.household.pddl import DOMAIN
 from infthor_eval.storage.files import write_atomically
@@ -99,7 +102,7 @@ class GeneratedSet:
             tasks={name: TaskCounts(tried[name], accepted[name]) for name in sorted(tried)},
             refusals=dict(statistics.reasons.most_common()),
             not_executed=dict(statistics.not_executed.most_common()),
-            roll_backs=[str(item) for item in statistics.roll_backs],
+            roll_backs=list(map(str, statistics.roll_backs)),
             pool_restarts=len(statistics.pool_restarts),
             kept=self.kept,
             failures=self.failures,
@@ -134,8 +137,7 @@ def generate_set(
     out: Path,
     progress: Callable[[bool], None] = lambda _: None,
 ) -> GeneratedSet:
-    """Generate the trajectories that `out` does not have yet: a file each, with a folder of its
-    tasks as PDDL.
+    """Generate the trajectories that `out` lacks: a file each, with a folder of its tasks as PDDL.
 
     Args:
         jobs: settings of the trajectories.
@@ -159,8 +161,7 @@ def generate_with_workers(
     progress: Callable[[bool], None] = lambda _: None,
     say: Callable[[str], None] = lambda _: None,
 ) -> GeneratedSet:
-    """Generate as `generate_set` does, with the same files and errors, by workers that share the
-    folder.
+    """Generate as `generate_set` does, with equal files and errors, by workers of one folder.
 
     Args:
         jobs: see `generate_set`.
@@ -182,9 +183,11 @@ def _summarise(
     progress: Callable[[bool], None],
 ) -> GeneratedSet:
     result = GeneratedSet()
-    for outcome in collect_outcomes(
-        outcomes, lambda _, error: _GenerationOutcome(failure=str(error)), progress
-    ):
+
+    def failed(_: int, error: InfthorError) -> _GenerationOutcome:
+        return _GenerationOutcome(failure=str(error))
+
+    for outcome in collect_outcomes(outcomes, failed, progress):
         if outcome.path is None:
             result.failures.append(str(outcome.failure))
             continue
@@ -209,16 +212,14 @@ def _generate_one(job: TrajectorySettings, simulator: Simulator, out: Path) -> _
         return _GenerationOutcome(failure=str(error))
     # Outside of `try`: if this file has no room, generating the other trajectories would be wasted.
     _write(generated, path)
-    return _GenerationOutcome(
-        path, len(generated.trajectory.plan.low_actions), generated.statistics
-    )
+    n_steps = len(generated.trajectory.plan.low_actions)
+    return _GenerationOutcome(path, n_steps, generated.statistics)
 
 
 def _write(generated: GeneratedTrajectory, path: Path) -> None:
     folder = path.with_suffix(".pddl")
-    with wrap_errors(
-        f"{path}: cannot be written", "make room and run the same command again, which resumes"
-    ):
+    hint = "make room and run the same command again, which resumes"
+    with wrap_errors(f"{path}: cannot be written", hint):
         folder.mkdir(exist_ok=True)
         (folder / "domain.pddl").write_text(DOMAIN)
         for number, problem in enumerate(generated.problems):
@@ -228,8 +229,7 @@ def _write(generated: GeneratedTrajectory, path: Path) -> None:
 
 
 def _check_earlier(path: Path, job: TrajectorySettings) -> int:
-    """Check that a trajectory was generated with the same settings, and return its number of
-    actions."""
+    """Check that a trajectory has the same settings, and return its number of actions."""
     trajectory = next(iter_sources(path)).read()
     if (trajectory.gen_info or {}).get("settings") != job.document():
         raise UsageError(

@@ -1,5 +1,4 @@
-"""Failures of earlier tasks in a room, which are not tried again as long as the objects involved
-are unchanged."""
+"""Failures of earlier tasks in a room, not tried again while the objects involved are unchanged."""
 
 from collections.abc import Iterator
 
@@ -74,16 +73,14 @@ class KnownFailures:
         return room_of(view, self._blocked.keys(), set(self._without_room(view)))
 
     def _without_room(self, view: SimulatorView) -> Iterator[tuple[str, str]]:
-        """Yield (object, receptacle) pairs that do not fit: known ones, and those that follow from
-        sizes.
+        """Yield (object, receptacle) pairs that do not fit: known ones, and those by their sizes.
 
         An object does not fit where an object of at most its size did not, nor into a receptacle of
         a smaller base.
         """
         yield from self._refused
-        sizes = {
-            key: size for key, item in view.objects.items() if (size := _size(item)) is not None
-        }
+        all_sizes = {key: _size(thor_object) for key, thor_object in view.objects.items()}
+        sizes = {key: size for key, size in all_sizes.items() if size is not None}
         items = [key for key in sizes if view.objects[key].pickupable]
         for item, receptacle in self._refused:
             refused_size = self._sizes.get(item)

@@ -1,5 +1,4 @@
-"""Intermediate frames between two poses of the agent, for replays with several frames per
-action."""
+"""Intermediate frames between two poses of the agent, for replays with several per action."""
 
 from collections.abc import Iterator
 

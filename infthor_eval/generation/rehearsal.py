@@ -1,5 +1,4 @@
-"""Trying a plan before walking: its interactions are forced from where the agent stands, and taken
-back.
+"""Trying a plan before walking: interactions are forced from where the agent is, and taken back.
 
 So what is full, and what is not allowed where, is known before the first step. It costs a fifth of
 what the walks do.
@@ -23,7 +22,7 @@ _NO_PICTURES = {"renderImage": False, "renderInstanceSegmentation": False}
 class _Stage:
     """Stands in for a walker: everything is in reach."""
 
-    def go(self, shown: list[str], inside: str | None = None) -> None:
+    def go(self, object_ids: list[str], inside: str | None = None) -> None:
         """Do nothing."""
 
     def step_aside(self, item: str) -> None:
@@ -53,9 +52,9 @@ def rehearse(task: Task, operators: list[Operator], simulator: Simulator) -> Rol
     try:
         Rollout(_ForcedTrace(simulator), _Stage()).run(operators)
         works = task.light is not None or goal_holds(task, simulator.view)
-        return (
-            None if works else RolloutError(f"{task.task_type}: its plan would not reach its goal")
-        )
+        if works:
+            return None
+        return RolloutError(f"{task.task_type}: its plan would not reach its goal")
     except RolloutError as error:
         return error
     finally:

@@ -34,8 +34,7 @@ class Refusal(msgspec.Struct):
 
 
 class Overlap(msgspec.Struct):
-    """Overlap (IoU) of the rendered and the recorded box of an object, at the frame before the
-    action on it."""
+    """Overlap (IoU) of an object's rendered and recorded box, at the frame before the action."""
 
     step: int
     action: str
@@ -105,17 +104,15 @@ def replay(
     (folder / "traj.txt").write_text(sequence_text(trajectory, steps) + "\n")
     images = [{"low_idx": step.step, "image_name": step.img_filename} for step in steps]
     (folder / "expert_log.json").write_bytes(msgspec.json.encode({"images": images}) + b"\n")
-    ends = {item.low_pddl_idx[1] - 1 for item in trajectory.sub_trajs} | {
-        len(trajectory.plan.low_actions) - 1
-    }
+    ends = {part.low_pddl_idx[1] - 1 for part in trajectory.sub_trajs}
+    ends.add(len(trajectory.plan.low_actions) - 1)
     summaries = {str(index): text for index, text in state_summaries(steps, ends).items()}
     (folder / "state_summary.json").write_bytes(msgspec.json.encode(summaries) + b"\n")
     return report
 
 
 def box_iou(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> float:
-    """Return the intersection over union of two boxes [xmin, ymin, xmax, ymax], both ends
-    inclusive."""
+    """Return the IoU of two boxes [xmin, ymin, xmax, ymax], both ends inclusive."""
     width = min(one[2], other[2]) - max(one[0], other[0]) + 1
     height = min(one[3], other[3]) - max(one[1], other[1]) + 1
     shared = max(width, 0) * max(height, 0)
@@ -145,9 +142,9 @@ class _Run:
             self._report.accepted[api.action] = self._report.accepted.get(api.action, 0) + 1
         else:
             self._report.refusals.append(Refusal(index, text, error))
-        for view in intermediate_views(
-            self._simulator, before.agent, self._simulator.view.agent, self._report.frames
-        ):
+        after = self._simulator.view.agent
+        views = intermediate_views(self._simulator, before.agent, after, self._report.frames)
+        for view in views:
             self.recorder.record(view, step=index, high_idx=low.high_idx)
         putting = api.action == "PutObject"
         step = self.recorder.record(
@@ -165,8 +162,7 @@ class _Run:
     def _call(
         self, index: int, low: LowAction, before: SimulatorView
     ) -> tuple[str | None, str | None]:
-        """Execute an action; returns the id of the object acted on, and the reason if it was
-        refused."""
+        """Execute an action; returns the acted-on object's id, and the reason if it is refused."""
         try:
             call = translate(low, self._grounding, before)
         except MissingObjectError as missing:
@@ -179,8 +175,7 @@ class _Run:
     def _compare_box(
         self, index: int, low: LowAction, target: str | None, before: SimulatorView
     ) -> None:
-        """Compare the recorded box of the object acted on with the box in the frame before the
-        action."""
+        """Compare the recorded box of the object acted on with that in the frame before it."""
         recorded = low.discrete_action.box if low.discrete_action is not None else None
         if recorded is None or target is None or before.instances is None:
             return

@@ -25,9 +25,12 @@ from infthor_eval.formats.trajectory import (
     iter_sources,
     trajectory_files,
 )
-from infthor_eval.generation.garbage import freeze_existing_objects
 from infthor_eval.generation.replay import ReplayReport, replay
-from infthor_eval.generation.simulator_jobs import SimulatorWorker, collect_outcomes
+from infthor_eval.generation.simulator_jobs import (
+    SimulatorWorker,
+    collect_outcomes,
+    freeze_existing_objects,
+)
 from infthor_eval.storage.digests import digest
 from infthor_eval.storage.files import write_atomically
 from infthor_eval.thor.launch import Launch
@@ -90,8 +93,7 @@ class ReplayedSet:
 def select(
     paths: Iterable[Path], limit: int | None = None, per_floor_plan: int | None = None
 ) -> Selection:
-    """Read the trajectories of files and folders, at most `limit`, and at most `per_floor_plan` on
-    one floor plan.
+    """Read trajectories of files and folders, at most `limit`, and `per_floor_plan` on one plan.
 
     Raises:
         DataError: a path has no trajectory file.
@@ -104,9 +106,8 @@ def select(
         try:
             trajectory = source.read()
             with _wrap_malformed(f"{source.place}: "):
-                agent_path(
-                    trajectory
-                )  # read for all scenes before the first replay, so an error must show here
+                # Read for all scenes before the first replay, so an error must show here.
+                agent_path(trajectory)
         except DataError as error:
             selection.failures.append(ReplayFailure(source.place, str(error)))
             continue
@@ -139,8 +140,7 @@ def replay_set(
     progress: Callable[[bool], None] = lambda _: None,
     frames: int = 1,
 ) -> ReplayedSet:
-    """Replay the selected trajectories into `out/metadata/<traj_id>`; a failure does not stop the
-    others.
+    """Replay trajectories into `out/metadata/<traj_id>`; a failure does not stop the others.
 
     Args:
         selection: the trajectories.
@@ -175,11 +175,8 @@ def replay_with_workers(
         say: called with messages about the workers.
     """
     metadata = _prepare_set(out, launch.label)
-    start = partial(
-        SimulatorWorker,
-        partial(Simulator, launch),
-        partial(_replay_one, metadata=metadata, frames=frames),
-    )
+    replay_one = partial(_replay_one, metadata=metadata, frames=frames)
+    start = partial(SimulatorWorker, partial(Simulator, launch), replay_one)
     return _collect(run_jobs(start, selection.items, worker_settings, say), selection, progress)
 
 
@@ -198,9 +195,11 @@ def _collect(
 ) -> ReplayedSet:
     """Return the set of the outcomes, in the order of the selection."""
     started = time.monotonic()
-    collected = collect_outcomes(
-        outcomes, lambda number, error: _failure_outcome(selection.items[number], error), progress
-    )
+
+    def failed(number: int, error: InfthorError) -> _ReplayOutcome:
+        return _failure_outcome(selection.items[number], error)
+
+    collected = collect_outcomes(outcomes, failed, progress)
     result = ReplayedSet(failures=list(selection.failures), seconds=time.monotonic() - started)
     for outcome in collected:
         if outcome.report is not None:
@@ -230,8 +229,7 @@ def _failure_outcome(item: Item, error: InfthorError) -> _ReplayOutcome:
 def _all_sources(
     paths: Iterable[Path], failures: list[ReplayFailure]
 ) -> Iterator[TrajectorySource]:
-    """Yield the trajectories of all files; among several files, one that cannot be read is added to
-    `failures`."""
+    """Yield the trajectories of all files; one of several that cannot be read is in `failures`."""
     for path in paths:
         files = trajectory_files(path)
         for file in files:

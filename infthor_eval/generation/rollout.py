@@ -20,7 +20,7 @@ __all__ = ["Rollout", "Walking"]
 class Walking(Protocol):
     """Brings the agent to where it can act; see `walking.Walker`."""
 
-    def go(self, shown: list[str], inside: str | None = None) -> None:
+    def go(self, object_ids: list[str], inside: str | None = None) -> None:
         """Walk to where objects can be acted on."""
         ...
 
@@ -55,9 +55,8 @@ class Rollout:
         for number, operator in enumerate(operators, 1):
             if operator.name == "GotoLocation" and number == len(operators):
                 self._walker.go([operator.item])  # the plan ends at a lamp that is lit already
-            elif (
-                operator.name != "GotoLocation"
-            ):  # each sub-goal includes its walk: its object is known only then
+            elif operator.name != "GotoLocation":
+                # Each sub-goal includes its walk: its object is known only then.
                 _SUBGOALS[operator.name](self, operator)
 
     # -- sub-goals
@@ -121,8 +120,7 @@ class Rollout:
             self._interact("CloseObject", holder)
 
     def _interact(self, action: str, item: str, receptacle: str | None = None) -> None:
-        """Execute an action on an object; the stored form of PutObject has the held object and the
-        receptacle."""
+        """Execute an action on an object; a stored PutObject has the held object and receptacle."""
         acted_on = item if receptacle is None else receptacle
         if acted_on not in self._view.objects:
             raise RolloutError(f"{action}: {acted_on.split('|')[0]} is gone")
@@ -145,8 +143,7 @@ class Rollout:
         return self.trace.view
 
     def _resolve(self, item: str) -> str:
-        """Return the object id of a planned item; a planned slice gets a real one when it is first
-        needed."""
+        """Return the object id of a planned item; a planned slice gets a real one when needed."""
         if "#" not in item:
             return item
         if item not in self._slices:
@@ -162,9 +159,8 @@ class Rollout:
             ]
             if not free:
                 raise RolloutError(f"slicing left no {object_type}")
-            self._slices[item] = min(
-                free, key=lambda key: (not self._view.objects[key].visible, key)
-            )
+            visible = [key for key in free if self._view.objects[key].visible]
+            self._slices[item] = min(visible or free)
         return self._slices[item]
 
     def _closed_around(self, item: str) -> str | None:

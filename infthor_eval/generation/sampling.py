@@ -37,22 +37,19 @@ class TaskPool:
         return tasks[0]
 
     def begin_again(self, candidates: Collection[Task]) -> bool:
-        """Let all tasks be drawn again; returns False if that does not help, as none of
-        `candidates` was drawn."""
+        """Let all tasks be drawn again; returns False if none of `candidates` was drawn."""
         if self._drawn.isdisjoint(candidates):
             return False
         self._drawn.clear()
         return True
 
     def _narrow(self, tasks: Sequence[Task]) -> list[Task]:
-        """Return the tasks with the value that leads by most; there are at least two tasks, and
-        fewer afterwards."""
+        """Return the tasks, fewer than before (at least two), with the value that leads by most."""
         variable, value = max(self._leads(tasks))[2:]
         return [task for task in tasks if _values(task)[variable] == value]
 
     def _leads(self, tasks: Sequence[Task]) -> list[tuple[float, float, int, str]]:
-        """Return the lead of each value over the last of its variable, a tie-breaker, the variable,
-        and the value."""
+        """Return each value's lead over its variable's last, a tie-breaker, variable and value."""
         leads = []
         for variable in range(_N_VARIABLES):
             values = sorted({_values(task)[variable] for task in tasks} - {""})
@@ -65,6 +62,5 @@ class TaskPool:
 
 
 def _values(task: Task) -> tuple[str, str, str, str]:
-    """Return the variables of a task, as published: slices are objects of their own; "" for
-    none."""
+    """Return the variables of a task, as published: slices are objects; "" for none."""
     return str(task.task_type), task.target, task.movable or "", task.receptacle or task.light or ""

@@ -9,7 +9,7 @@ from infthor_eval.household.tasks import SAMPLED, TaskType
 
 __all__ = ["MAX_FAIL", "MIN_STEPS", "MIN_SUBGOALS", "TrajectorySettings"]
 
-# values of the paper's Algorithm 1
+# Values of the paper's Algorithm 1
 MIN_STEPS = 300
 MIN_SUBGOALS = 10
 MAX_FAIL = 20

@@ -1,12 +1,14 @@
 """Jobs that each need a simulator, done by workers with one simulator each."""
 
+import gc
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.thor.simulator import Simulator
 
-__all__ = ["SimulatorWorker", "collect_outcomes"]
+__all__ = ["SimulatorWorker", "collect_outcomes", "freeze_existing_objects"]
 
 
 class _JobOutcome(Protocol):
@@ -20,8 +22,7 @@ T = TypeVar("T", bound=_JobOutcome)
 
 
 class SimulatorWorker:
-    """A worker with a simulator; see `infthor_eval.workers.Worker`. A `partial` with its first
-    arguments opens it.
+    """A worker with a simulator (`workers.Worker`); a `partial` of its first arguments opens it.
 
     Args:
         open_simulator: starts the simulator; pickled as `run_job` is.
@@ -64,8 +65,23 @@ def collect_outcomes(
     """
     by_number: dict[int, T] = {}
     for number, outcome in outcomes:
-        by_number[number] = (
-            failed(number, outcome) if isinstance(outcome, InfthorError) else outcome
-        )
-        progress(by_number[number].is_resumed)
+        result = failed(number, outcome) if isinstance(outcome, InfthorError) else outcome
+        by_number[number] = result
+        progress(result.is_resumed)
     return [by_number[number] for number in sorted(by_number)]
+
+
+@contextmanager
+def freeze_existing_objects() -> Iterator[None]:
+    """Exempt all existing objects, which are mainly those of libraries, from garbage collection.
+
+    Each reply of the simulator decodes to thousands of objects, which trigger collections over all
+    objects again and again: 40 % of the processor time of a long loop of steps
+    (`benchmarks/generation_growth.py`).
+    """
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()

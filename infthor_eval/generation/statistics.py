@@ -1,5 +1,4 @@
-"""What happened while trajectories were generated: tasks tried, failures, and how often generation
-went back."""
+"""What happened while trajectories were generated: tasks tried, failures, and roll-backs."""
 
 from collections import Counter
 from dataclasses import dataclass, field

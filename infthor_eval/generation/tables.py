@@ -25,8 +25,7 @@ def tasks_table(summary: GenerationSummary) -> Table:
 
 
 def generation_notes(summary: GenerationSummary) -> list[str]:
-    """Return lines on the failures of a run, its dead ends, and the pools of tasks that began
-    again."""
+    """Return lines on a run's failures, its dead ends, and the pools of tasks that began again."""
     n_not_executed = sum(summary.not_executed.values())
     notes = [
         (
@@ -45,14 +44,12 @@ def generation_notes(summary: GenerationSummary) -> list[str]:
 
 
 def _most_frequent(reasons: dict[str, int]) -> str:
-    return "; ".join(
-        f"{reason} ({count})" for reason, count in list(reasons.items())[:_MAX_REASONS]
-    )
+    first = list(reasons.items())[:_MAX_REASONS]
+    return "; ".join(f"{reason} ({count})" for reason, count in first)
 
 
 def refusals_table(summary: ReplaySummary) -> Table | None:
-    """Return the numbers of the actions that were refused at least once, one row per name, or None
-    without any."""
+    """Return the numbers of actions that were ever refused, a row per name; None without any."""
     rows = []
     for name, counts in summary.actions.items():
         share = counts.accepted / (counts.accepted + counts.refused)
@@ -63,35 +60,28 @@ def refusals_table(summary: ReplaySummary) -> Table | None:
 
 
 def overlaps_table(summary: ReplaySummary) -> Table | None:
-    """Return the overlaps of boxes that differ from the recording, by action and object type; None
-    without any."""
+    """Return the overlaps of boxes that differ, by action and type; None without any."""
     rows = [
         Row((name, str(overlap.count), f"{overlap.median:.2f}", f"{overlap.mean:.2f}"))
         for name, overlap in {**summary.iou_by_action, **summary.iou}.items()
         if not _is_exact(overlap)
     ]
-    columns = (
-        Column("action, object type", False),
-        *map(Column, ("boxes", "median IoU", "mean IoU")),
-    )
+    numbers = map(Column, ("boxes", "median IoU", "mean IoU"))
+    columns = (Column("action, object type", False), *numbers)
     return Table("", columns, tuple(rows)) if rows else None
 
 
 def regular_numbers(summary: ReplaySummary) -> str:
-    """Return one line on the actions and boxes that the tables leave out because they are as
-    recorded."""
+    """Return one line on the actions and boxes that are as recorded, which the tables leave out."""
     accepted = [counts.accepted for counts in summary.actions.values() if not counts.refused]
     exact = [overlap.count for overlap in summary.iou_by_action.values() if _is_exact(overlap)]
-    parts = (
-        [f"{_all_or_other(accepted, summary.actions)}{sum(accepted)} actions accepted"]
-        if accepted
-        else []
-    )
+    parts = []
+    if accepted:
+        which = _all_or_other(accepted, summary.actions)
+        parts.append(f"{which}{sum(accepted)} actions accepted")
     if exact:
-        parts.append(
-            f"{_all_or_other(exact, summary.iou_by_action)}{sum(exact)} boxes as recorded (IoU "
-            "1.00)"
-        )
+        which = _all_or_other(exact, summary.iou_by_action)
+        parts.append(f"{which}{sum(exact)} boxes as recorded (IoU 1.00)")
     return (
         f"{', '.join(parts) or 'nothing as recorded'} (--json has the numbers by action and object "
         "type)"

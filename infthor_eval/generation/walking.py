@@ -1,5 +1,4 @@
-"""Walking to poses from which objects can be acted on, replanned when the simulator refuses a
-step."""
+"""Walking to poses from which objects can be acted on, replanned when a step is refused."""
 
 from infthor_eval.formats.trajectory import ApiAction, PlannerAction
 from infthor_eval.generation.trace import RolloutError, Trace
@@ -26,27 +25,26 @@ class Walker:
         self._trace = trace
         self._grid: Grid | None = None
 
-    def go(self, shown: list[str], inside: str | None = None) -> None:
-        """Walk to where objects can be acted on; this is a sub-goal, unless the agent is there
-        already.
+    def go(self, object_ids: list[str], inside: str | None = None) -> None:
+        """Walk to where objects can be acted on; a sub-goal, unless the agent is there already.
 
         Args:
-            shown: ids of the objects; the agent faces the first.
+            object_ids: ids of the objects; the agent faces the first.
             inside: id of an object hidden in the first one.
 
         Raises:
             RolloutError: there is no such pose, or no path to it.
         """
-        target = self._trace.view.objects[shown[0]]
-        viewpoint = self._viewpoint(shown, inside)
+        target = self._trace.view.objects[object_ids[0]]
+        viewpoint = self._viewpoint(object_ids, inside)
         if self._moves(viewpoint) == []:
             return
-        (x, z) = viewpoint.pose.cell
+        x, z = viewpoint.pose.cell
         facing = viewpoint.pose.facing
         location = f"loc|{x}|{z}|{facing // _TURN}|{viewpoint.horizon}"
         action = PlannerAction("GotoLocation", location=location, object_id=target.object_id)
         self._trace.begin([compact_name(target.object_type)], action)
-        self._walk(viewpoint, shown)
+        self._walk(viewpoint, object_ids)
 
     def step_aside(self, item: str) -> None:
         """Walk to where an object is visible, within the current sub-goal.
@@ -60,24 +58,26 @@ class Walker:
         """Discard the cached grid, after an action that may have blocked or freed cells."""
         self._grid = None
 
-    def _viewpoint(self, shown: list[str], inside: str | None = None) -> Viewpoint:
+    def _viewpoint(self, object_ids: list[str], inside: str | None = None) -> Viewpoint:
         """Return a pose from which the objects can be acted on."""
-        viewpoint = find_viewpoint(self._trace.simulator, self._cells(), shown, inside, _MIN_PIXELS)
+        viewpoint = find_viewpoint(
+            self._trace.simulator, self._cells(), object_ids, inside, _MIN_PIXELS
+        )
         if viewpoint is None:
-            target = self._trace.view.objects[inside or shown[0]]
+            target = self._trace.view.objects[inside or object_ids[0]]
             raise RolloutError(f"no place to reach {target.object_type} from", target.object_id)
         return viewpoint
 
-    def _walk(self, viewpoint: Viewpoint, shown: list[str]) -> None:
+    def _walk(self, viewpoint: Viewpoint, object_ids: list[str]) -> None:
         # A refused step changes nothing and is not part of the trajectory. Its cell is removed from
         # the grid, so that the next path leads around it.
-        target = self._trace.view.objects[shown[0]].object_type
+        target = self._trace.view.objects[object_ids[0]].object_type
         while (moves := self._moves(viewpoint)) is not None:
             if all(self._move(action) for action in moves):
                 break
         else:
             raise RolloutError(f"no way to {target}")
-        if not all(self._trace.view.objects[key].visible for key in shown):
+        if not all(self._trace.view.objects[key].visible for key in object_ids):
             raise RolloutError(f"{target} is out of sight after walking to it")
 
     def _moves(self, viewpoint: Viewpoint) -> list[str] | None:
@@ -96,8 +96,7 @@ class Walker:
         return ["LookDown" if steps > 0 else "LookUp"] * abs(steps)
 
     def _move(self, action: str) -> bool:
-        """Execute one action of a walk; returns False if a step is blocked, and removes its cell
-        from the grid."""
+        """Execute one action of a walk; returns False if blocked, and removes the cell."""
         if action != "MoveAhead":
             degrees = _TURN if action.startswith("Rotate") else HORIZON_STEP
             self._trace.act(ApiAction(action), {"degrees": float(degrees)}, str(degrees))

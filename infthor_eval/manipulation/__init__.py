@@ -1,2 +1,1 @@
-"""Pick-up and put with an arm: vision-language-action policies in single actions of long
-trajectories."""
+"""Pick-up and put with an arm: policies in single actions of long trajectories."""

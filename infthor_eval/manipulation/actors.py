@@ -26,8 +26,7 @@ _MAX_TURN = 0.17  # radians of a random turn about each axis: 10 degrees
 
 @dataclass(frozen=True)
 class ArmSituation:
-    """An episode that begins in an environment reset to it; `max_step` is the longest movement,
-    metres."""
+    """An episode that begins in an environment reset to it; `max_step` is in metres."""
 
     environment: ArmEnvironment
     instruction: str
@@ -83,8 +82,7 @@ class PolicyActor:
 
 
 def _check_step(step: object) -> None:
-    """Check that a policy, which is code of others, gives three lengths, three angles and a
-    gripper, all finite."""
+    """Check that a policy, which is code of others, gives 7 finite numbers in an `ArmDelta`."""
     if not isinstance(step, ArmDelta):
         raise ModelError(f"the policy gives {step!r:.60} for a step; it must be an ArmDelta")
     numbers = (*step.translation, *step.rotation, step.gripper)
@@ -128,9 +126,13 @@ class _RandomArmActor:
         self._max_step = situation.max_step
 
     def act(self, frame: FrameRef | None) -> Sequence[Step]:
-        x, y, z = (self._random.uniform(-self._max_step, self._max_step) for _ in range(3))
-        roll, pitch, yaw = (self._random.uniform(-_MAX_TURN, _MAX_TURN) for _ in range(3))
-        return [ArmDelta((x, y, z), (roll, pitch, yaw), self._random.random())]
+        translation = self._random_vector(self._max_step)
+        rotation = self._random_vector(_MAX_TURN)
+        return [ArmDelta(translation, rotation, self._random.random())]
+
+    def _random_vector(self, most: float) -> tuple[float, float, float]:
+        uniform = self._random.uniform
+        return uniform(-most, most), uniform(-most, most), uniform(-most, most)
 
 
 class _PlannerActor:

@@ -36,15 +36,14 @@ class Conversion:
     return_to_start: bool = True
 
     def calls(self, delta: ArmDelta) -> list[Call]:
-        """Return the movements of a step in order, without the gripper; none if the arm stands
-        still."""
+        """Return the movements of a step in order, without the gripper; none if the arm stays."""
         calls = [self._translation(delta), self._rotation(delta) if self.rotation else None]
         return [
             call | {"returnToStart": self.return_to_start} for call in calls if call is not None
         ]
 
     def _translation(self, delta: ArmDelta) -> Call | None:
-        x, y, z = (self.translation_scale * value for value in delta.translation)
+        x, y, z = [self.translation_scale * value for value in delta.translation]
         length = math.hypot(x, y, z)
         if length < _STILL:
             return None

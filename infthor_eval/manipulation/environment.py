@@ -1,12 +1,11 @@
-"""An environment with the episodes of one trajectory: an arm in the true state before the expert's
-pick-up or put."""
+"""An environment with the episodes of one trajectory, which begin in the expert's true states."""
 
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.containment import is_in
@@ -21,8 +20,7 @@ from infthor_eval.manipulation.geometry import (
     size_of,
     xyz,
 )
-from infthor_eval.manipulation.kinds import ManipulationKind
-from infthor_eval.manipulation.protocol import Closing, Hand, Stand
+from infthor_eval.manipulation.kinds import Closing, Hand, ManipulationKind, Stand
 from infthor_eval.manipulation.records import ArmEnded
 from infthor_eval.manipulation.trajectories import ArmEpisode
 from infthor_eval.thor.frames import FrameKeeper
@@ -44,7 +42,7 @@ __all__ = ["ArmEnvironment", "ArmOutcome", "Grasp", "arm_of"]
 _MAX_WAITS = 20  # until a released object lies still
 _HALVINGS = 8  # of the range of heights, to half a centimetre
 _HELD_GAP = 0.02  # metres between the palm and an object that is held before it
-_PLACES = 5  # places between there and the centre of the sphere that are tried
+_N_SHARES = 5  # of the way from there to the centre of the sphere, at which it is tried
 
 
 @dataclass(frozen=True)
@@ -125,8 +123,7 @@ class ArmEnvironment:
         grasp: Grasp,
         frames: FrameKeeper,
     ) -> ArmOutcome:
-        """Bring the world to the true state before an episode, with the arm at rest; for a put,
-        with the object in it.
+        """Bring the world to the true state before an episode; the arm rests, or holds the object.
 
         Raises:
             InfeasibleError: the episode's objects cannot be brought to where they were, or not into
@@ -139,9 +136,8 @@ class ArmEnvironment:
         self._grasp = grasp
         self._frames = frames
         view = self._simulator.rewind(self._initial, exactly=True)
-        missing = {start.object_id, start.receptacle_id} & set(
-            transfer(self._simulator, start.view)
-        )
+        missing = set(transfer(self._simulator, start.view))
+        missing &= {start.object_id, start.receptacle_id}
         if missing:
             raise InfeasibleError(f"{min(map(str, missing))} cannot be brought to where it was")
         self._target = start.view.objects[start.receptacle_id or start.object_id]
@@ -202,8 +198,7 @@ class ArmEnvironment:
         return self._simulator.view
 
     def query(self, action: str, **arguments: Any) -> Any:
-        """Return the simulator's answer to a question (`GetSpawnCoordinatesAboveReceptacle`); None
-        if it refuses."""
+        """Return the result of a query (`GetSpawnCoordinatesAboveReceptacle`); None if refused."""
         answer = self._simulator.query(action, **arguments)
         return answer.result if answer.success else None
 
@@ -218,8 +213,7 @@ class ArmEnvironment:
         return done, refusals
 
     def _gripper(self, delta: ArmDelta) -> list[Call]:
-        """Return the calls of the gripper: it closes around something, or releases what it
-        holds."""
+        """Return the calls of the gripper: it closes around something, or releases what it has."""
         arm = arm_of(self._simulator.view)
         picks_up = self.episode.kind == ManipulationKind.PICKUP
         if picks_up and self._grasp.closing is not Closing.ASKED:
@@ -234,17 +228,14 @@ class ArmEnvironment:
         return self.episode.kind == ManipulationKind.PICKUP and self._grasp.closing is Closing.END
 
     def closing_calls(self) -> list[Call]:
-        """Return the calls with which the hand closes around what is in its sphere; none if nothing
-        is."""
+        """Return the calls that close the hand around what is in its sphere; none if nothing is."""
         arm = arm_of(self._simulator.view)
         if self._grasp.takes_all:
             return [{"action": "PickupObject"}] if arm.pickupable else []
         target = self.start.object_id
-        return (
-            [{"action": "PickupObject", "objectIdCandidates": [target]}]
-            if target in arm.pickupable
-            else []
-        )
+        if target not in arm.pickupable:
+            return []
+        return [{"action": "PickupObject", "objectIdCandidates": [target]}]
 
     def _ending(self, released: bool) -> ArmEnded | None:
         target = self.start.object_id
@@ -278,10 +269,10 @@ class ArmEnvironment:
             view = self._simulator.step("MoveArmBase", y=share)
             low, high = (share, high) if arm_of(view).wrist.y < height else (low, share)
         view = self._require({"action": "SetHandSphereRadius", "radius": self._grasp.radius})
-        places = [0] if self._grasp.at_palm else range(_PLACES, -1, -1)
+        numerators = [0] if self._grasp.at_palm else range(_N_SHARES, -1, -1)
         calls = [
-            _teleport_to_hand(view.objects[target], arm_of(view), place / _PLACES)
-            for place in places
+            _teleport_to_hand(view.objects[target], arm_of(view), numerator / _N_SHARES)
+            for numerator in numerators
         ]
         if not any(self._simulator.step(**call).success for call in calls):
             self._require(calls[-1] | {"forceAction": True})
@@ -294,41 +285,36 @@ class ArmEnvironment:
         return view
 
     def _distance(self, view: SimulatorView) -> float:
-        # An object that broke (an egg) is no longer listed; its last place counts.
-        self._target = view.objects.get(
-            self.start.receptacle_id or self.start.object_id, self._target
-        )
+        # An object that broke (an egg) is no longer listed; its last position counts.
+        target = self.start.receptacle_id or self.start.object_id
+        self._target = view.objects.get(target, self._target)
         return distance_to(point_of(arm_of(view).sphere_center), self._target)
 
 
 def arm_of(view: SimulatorView) -> ArmState:
-    """Return the arm of the agent; raises InfeasibleError if the simulator was not started with
-    agentMode "arm"."""
+    """Return the agent's arm; raises InfeasibleError if its agentMode is not "arm"."""
     if view.arm is None:
         raise InfeasibleError("the simulator reports no arm; start it with agentMode arm")
     return view.arm
 
 
-def _teleport_to_hand(item: ThorObject, arm: ArmState, share: float) -> Call:
-    """Return the call that brings an object, turned as it is, before the palm (0) or to the
-    sphere's centre (1)."""
+def _teleport_to_hand(target: ThorObject, arm: ArmState, share: float) -> Call:
+    """Return the call that brings an object, turned as it is, to the palm (0) or the centre (1)."""
     wrist = point_of(arm.wrist)
     center = point_of(arm.sphere_center)
     length = math.dist(wrist, center) or 1.0
     ahead = offset(wrist, center)
+    by_axis = zip(ahead, size_of(target), strict=True)
     # Half the extent of the object's box along the hand's direction.
-    depth = (
-        sum(abs(part) / length * extent for part, extent in zip(ahead, size_of(item), strict=True))
-        / 2
-    )
+    depth = sum(abs(part) / length * extent for part, extent in by_axis) / 2
     nearest = length - arm.sphere_radius + _HELD_GAP + depth
     goal = interpolate(wrist, center, (nearest + share * max(0.0, length - nearest)) / length)
     # The call places the object's origin, which need not be the middle of its box.
-    lever = offset(middle_of(item), point_of(item.position))
+    lever = offset(middle_of(target), point_of(target.position))
     return {
         "action": "TeleportObject",
-        "objectId": item.object_id,
+        "objectId": target.object_id,
         "position": xyz((goal[0] + lever[0], goal[1] + lever[1], goal[2] + lever[2])),
-        "rotation": xyz(point_of(item.rotation)),
+        "rotation": xyz(point_of(target.rotation)),
         "forceKinematic": True,
     }

@@ -47,8 +47,7 @@ class ManipulationEvaluation(EpisodeEvaluation[ManipulationOptions, Manipulation
         return ManipulationConfig(**self._shared_config)
 
     def bind(self, subject: Subject) -> "BoundManipulation":
-        """See `infthor_eval.runs.Evaluation.bind`; TypeError for neither a policy nor a baseline of
-        manipulation."""
+        """See `runs.Evaluation.bind`; TypeError for neither a policy nor an arm's baseline."""
         if isinstance(subject, ArmBaseline):
             create_actor: Callable[[], ArmActor] = subject.arm_actor
         elif isinstance(subject, Policy):
@@ -68,8 +67,7 @@ class BoundManipulation(BoundEpisodes[ArmUnit, ArmRecord]):
         *,
         sees: bool,
     ) -> None:
-        """Take the work, what creates the actor of a trajectory, and whether actors look at
-        frames."""
+        """Take the work, what creates a trajectory's actor, and whether actors look at frames."""
         self._tasks = evaluation.tasks
         self._create_actor = create_actor
         self._sees = sees

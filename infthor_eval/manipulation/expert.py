@@ -1,10 +1,9 @@
-"""The true states in which episodes of an arm begin: before each pick-up and put of a trajectory's
-expert."""
+"""The true states in which episodes of an arm begin: before each pick-up and put of the expert."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.trajectory import LowAction, Trajectory
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.trajectories import EXPERT_ACTIONS, ArmEpisode
@@ -49,17 +48,16 @@ class ExpertStates:
     refusal: str = ""
 
     def before(self, episode: ArmEpisode) -> EpisodeStart:
-        """Return the state before an episode; raises InfeasibleError if the expert is refused up to
-        its end."""
-        start = self.starts.get(episode.index)
-        if start is None:
+        """Return the state before an episode; raises InfeasibleError if the expert is refused."""
+        if episode.index not in self.starts:
             raise InfeasibleError(self.refusal)
-        return start
+        return self.starts[episode.index]
 
 
 def replay_expert(trajectory: Trajectory, simulator: Simulator) -> ExpertStates:
-    """Replay the expert with AI2-THOR's default agent; keep the state before each pick-up and put
-    that succeeds.
+    """Replay the expert with AI2-THOR's default agent; keep states before pick-ups and puts.
+
+    A state is kept if the action succeeds.
 
     Raises:
         SceneError: the simulator has no such scene.

@@ -22,8 +22,7 @@ Point = tuple[float, float, float]
 
 
 class Corners(NamedTuple):
-    """A box along the world's axes, by its corners with the lowest and the highest coordinates,
-    metres."""
+    """A box along the world's axes: corners with the lowest and highest coordinates, metres."""
 
     low: Point
     high: Point
@@ -46,32 +45,31 @@ def offset(start: Point, end: Point) -> Point:
 
 def interpolate(start: Point, end: Point, share: float) -> Point:
     """Return the point at a share of the way from one to another."""
-    x, y, z = (a + share * (b - a) for a, b in zip(start, end, strict=True))
-    return x, y, z
+    way = offset(start, end)
+    return start[0] + share * way[0], start[1] + share * way[1], start[2] + share * way[2]
 
 
-def middle_of(item: ThorObject) -> Point:
+def middle_of(thor_object: ThorObject) -> Point:
     """Return the middle of an object's box; its origin if it has none."""
-    box = item.axis_aligned_bounding_box
-    return point_of(item.position if box is None else box.center)
+    box = thor_object.axis_aligned_bounding_box
+    return point_of(thor_object.position if box is None else box.center)
 
 
-def size_of(item: ThorObject) -> Point:
+def size_of(thor_object: ThorObject) -> Point:
     """Return the size of an object's box; zeros if it has none."""
-    box = item.axis_aligned_bounding_box
+    box = thor_object.axis_aligned_bounding_box
     return (0.0, 0.0, 0.0) if box is None else point_of(box.size)
 
 
-def distance_to(point: Point, item: ThorObject) -> float:
+def distance_to(point: Point, thor_object: ThorObject) -> float:
     """Return the metres from a point to the nearest point of an object's box."""
-    apart = offset(middle_of(item), point)
-    return math.hypot(
-        *(max(0.0, abs(d) - size / 2) for d, size in zip(apart, size_of(item), strict=True))
-    )
+    apart = zip(offset(middle_of(thor_object), point), size_of(thor_object), strict=True)
+    return math.hypot(*(max(0.0, abs(distance) - size / 2) for distance, size in apart))
 
 
-def corners_of(item: ThorObject) -> Corners:
+def corners_of(thor_object: ThorObject) -> Corners:
     """Return the box of an object."""
-    (x, y, z), (width, height, depth) = middle_of(item), size_of(item)
+    x, y, z = middle_of(thor_object)
+    width, height, depth = size_of(thor_object)
     half = width / 2, height / 2, depth / 2
     return Corners((x - half[0], y - half[1], z - half[2]), (x + half[0], y + half[1], z + half[2]))

@@ -1,8 +1,11 @@
-"""Kinds of manipulation episodes."""
+"""Kinds of manipulation episodes, and how they begin and a hand closes in them.
+
+What the paper does not say of its protocol can be set (docs/manipulation.md).
+"""
 
 from enum import StrEnum
 
-__all__ = ["KIND_NAMES", "ManipulationKind"]
+__all__ = ["KIND_NAMES", "Closing", "Hand", "ManipulationKind", "Stand"]
 
 
 class ManipulationKind(StrEnum):
@@ -12,7 +15,28 @@ class ManipulationKind(StrEnum):
     PUT = "put"
 
 
-KIND_NAMES = {
-    ManipulationKind.PICKUP: "Pick-up",
-    ManipulationKind.PUT: "Put",
-}  # as the paper calls them
+# As the paper calls them.
+KIND_NAMES = {ManipulationKind.PICKUP: "Pick-up", ManipulationKind.PUT: "Put"}
+
+
+class Stand(StrEnum):
+    """Where the agent stands at the start: where the expert does, or did before the way there."""
+
+    EXPERT = "expert"
+    BEFORE = "before"
+
+
+class Closing(StrEnum):
+    """When a policy's hand closes in a pick-up: if it says so, with each step, once at the end."""
+
+    ASKED = "asked"
+    ALWAYS = "always"
+    END = "end"
+
+
+class Hand(StrEnum):
+    """The height of the arm's base at the start of a pick-up: at rest, the lowest, the highest."""
+
+    REST = "rest"
+    LOW = "low"
+    HIGH = "high"

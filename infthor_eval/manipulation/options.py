@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from infthor_eval.episodes.options import SimulatorOptions
 from infthor_eval.errors import UsageError
-from infthor_eval.manipulation.protocol import Closing, Hand, Stand
+from infthor_eval.manipulation.kinds import Closing, Hand, Stand
 
 __all__ = ["RADII", "ManipulationOptions"]
 
@@ -55,8 +55,7 @@ class ManipulationOptions(SimulatorOptions):
     )
 
     def __post_init__(self) -> None:
-        """Check the options; raises UsageError for unknown frames, or a radius that AI2-THOR does
-        not allow."""
+        """Check the options; raises UsageError for unknown frames, or a radius out of range."""
         super().__post_init__()
         if self.radius_metres is not None and not RADII[0] <= self.radius_metres <= RADII[1]:
             raise UsageError(

@@ -1,5 +1,4 @@
-"""What the suite of manipulation writes into a run's journal: episodes, each with everything that
-the arm did."""
+"""What manipulation writes into a run's journal: episodes, with everything that the arm did."""
 
 from enum import StrEnum
 from typing import Any
@@ -13,7 +12,7 @@ from infthor_eval.runs.journals.records import RecordTypes
 __all__ = ["RECORDS", "ArmEnded", "ArmRecord", "ArmStep"]
 
 Call = dict[str, Any]
-Place = tuple[float, float, float]
+Point = tuple[float, float, float]
 _COLLIDED = "Collided"  # beginning of AI2-THOR's message
 
 
@@ -41,7 +40,7 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
     delta: tuple[float, ...] | None = None
     calls: tuple[Call, ...] = ()
-    hand: Place = (0.0, 0.0, 0.0)
+    hand: Point = (0.0, 0.0, 0.0)
     distance: float = 0.0
     refusals: tuple[str, ...] = ()
 
@@ -54,8 +53,9 @@ class ArmStep(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 class ArmRecord(
     EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="arm"
 ):
-    """One pick-up or put, and what an arm did in it; `index` is that of the expert's low-level
-    action it replaces.
+    """One pick-up or put, and what an arm did in it.
+
+    `index` is that of the expert's low-level action that it replaces.
 
     Attributes:
         object_id: id of the object that is picked up or put, in this simulator.

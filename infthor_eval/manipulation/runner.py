@@ -10,7 +10,6 @@ from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.manipulation.actors import ArmActor, ArmSituation, Step
 from infthor_eval.manipulation.environment import ArmEnvironment, ArmOutcome, arm_of
 from infthor_eval.manipulation.expert import ExpertStates
-from infthor_eval.manipulation.geometry import point_of
 from infthor_eval.manipulation.records import ArmEnded, ArmRecord, ArmStep
 from infthor_eval.manipulation.task import ManipulationTask
 from infthor_eval.manipulation.trajectories import ArmEpisode
@@ -47,8 +46,7 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
         sees: bool,
         seed: int,
     ) -> None:
-        """Take a trajectory, the true states that its episodes begin in, and a simulator of an
-        agent with an arm."""
+        """Take a trajectory, the states that its episodes begin in, and a simulator with an arm."""
         super().__init__(simulator, lambda: ArmEnvironment(trajectory, simulator))
         self._states = states
         self._actor = actor
@@ -98,8 +96,7 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
     def _act(
         self, environment: ArmEnvironment, outcome: ArmOutcome, max_steps: int
     ) -> tuple[list[ArmStep], ArmEnded]:
-        """Let the actor act until the episode is over; the steps of a chunk are executed before it
-        is asked again."""
+        """Let the actor act until the episode is over, chunk by chunk of steps."""
         steps: list[ArmStep] = []
         chunk: list[Step] = []
         step: Step = ()
@@ -129,7 +126,7 @@ class ArmRunner(EpisodeRunner[ArmEnvironment, ArmRecord]):
 
 
 def _arm_step(step: Step, outcome: ArmOutcome) -> ArmStep:
-    x, y, z = (round(value, _DIGITS) for value in point_of(arm_of(outcome.view).sphere_center))
+    hand = arm_of(outcome.view).sphere_center
     delta = None
     if isinstance(step, ArmDelta):
         delta = tuple(
@@ -138,7 +135,7 @@ def _arm_step(step: Step, outcome: ArmOutcome) -> ArmStep:
     return ArmStep(
         delta=delta,
         calls=outcome.calls,
-        hand=(x, y, z),
+        hand=(round(hand.x, _DIGITS), round(hand.y, _DIGITS), round(hand.z, _DIGITS)),
         distance=round(outcome.distance, _DIGITS),
         refusals=outcome.refusals,
     )

@@ -1,5 +1,4 @@
-"""Manipulation as a suite: an arm does the pick-ups and puts of the experts of long
-trajectories."""
+"""Manipulation as a suite: an arm does the pick-ups and puts of long trajectories' experts."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar

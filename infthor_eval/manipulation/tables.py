@@ -1,5 +1,4 @@
-"""Results of arms as tables: Table 6 beside the published rows, details of the episodes, and how
-they ended."""
+"""Tables of arms: Table 6 beside the published rows, details of episodes, how they ended."""
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
@@ -24,13 +23,11 @@ _STILL = "still"  # the baseline that never moves
 _ABOVE = ("Pick-up above still", "Put above still")
 _FLOOR = (
     "Above still: percentage points more than the baseline that never moves, in the same episodes. "
-    "With a sphere of"
-    " 0.5 m it alone is above Table 6, so the paper's protocol differs from this one "
-    "(docs/manipulation.md)."
+    "With a sphere of 0.5 m it alone is above Table 6, so the paper's protocol differs from this "
+    "one (docs/manipulation.md)."
 )
-_N_OVERVIEW = (
-    6  # columns of the success table that the overview has: those before what was left out
-)
+# Columns of the success table that the overview has: those before what was left out.
+_N_OVERVIEW = 6
 
 
 def overview_table(runs: Sequence[RunSummary]) -> Table:
@@ -57,10 +54,11 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
     notes = [*result_notes(runs)]
     for run in runs:
         named = list(run.summary.tasks.items())
-        by_kind = [[item for item in named if item[1].kind == kind] for kind in ManipulationKind]
-        for pair in zip_longest(*by_kind):
-            above = [None if item is None else _above_floor(run, item, runs) for item in pair]
-            cells = _cells([None if item is None else item[1] for item in pair])
+        pickups = [(name, task) for name, task in named if task.kind == ManipulationKind.PICKUP]
+        puts = [(name, task) for name, task in named if task.kind == ManipulationKind.PUT]
+        for pair in zip_longest(pickups, puts):
+            above = [None if task is None else _above_floor(run, task, runs) for task in pair]
+            cells = _cells([None if task is None else task[1] for task in pair])
             rows.append(Row((run_name(run.header), *cells, *map(format_percent, above))))
     notes.append(_FLOOR)
     for table in published_tables("manipulation"):
@@ -86,8 +84,7 @@ def _success_table(runs: Sequence[RunSummary]) -> Table:
 def _above_floor(
     run: RunSummary, named: tuple[str, ArmTaskSummary], runs: Sequence[RunSummary]
 ) -> Rate | None:
-    """Return a task's success less that of `still` in the same episodes; None without a run of
-    `still` like this."""
+    """Return a task's success less that of `still` in the same episodes; None without its run."""
     name, task = named
     stills = [
         other.summary.tasks[name]
@@ -100,9 +97,9 @@ def _above_floor(
         return None
     both = sorted(task.outcomes.keys() & stills[0].outcomes.keys())
     trajectories = [episode.rpartition("/")[0] for episode in both]
-    return paired_rate(
-        [stills[0].outcomes[it] for it in both], [task.outcomes[it] for it in both], trajectories
-    )
+    of_still = [stills[0].outcomes[episode] for episode in both]
+    of_task = [task.outcomes[episode] for episode in both]
+    return paired_rate(of_still, of_task, trajectories)
 
 
 def _cells(pair: Sequence[ArmTaskSummary | None]) -> Iterator[str]:

@@ -11,9 +11,8 @@ from infthor_eval.household.wording import canonical_type, noun
 from infthor_eval.manipulation.config import ArmTaskConfig
 from infthor_eval.manipulation.conversion import Conversion
 from infthor_eval.manipulation.environment import Grasp
-from infthor_eval.manipulation.kinds import KIND_NAMES, ManipulationKind
+from infthor_eval.manipulation.kinds import KIND_NAMES, Closing, Hand, ManipulationKind, Stand
 from infthor_eval.manipulation.options import RADII, ManipulationOptions
-from infthor_eval.manipulation.protocol import Closing, Hand, Stand
 from infthor_eval.manipulation.trajectories import ArmEpisode, ArmTrajectory, read_arm_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
 from infthor_eval.runs.limiting import limit_items
@@ -117,8 +116,7 @@ class ArmTaskSettings:
 
 
 def check_task_file(file: TaskFile) -> None:
-    """Check the settings of a task file; raises DataError if one is unknown or has a value that is
-    not allowed."""
+    """Check a task file's settings; raises DataError if one is unknown or its value not allowed."""
     file.require("dataset_kwargs")
     task_settings(file, ArmTaskSettings, {}, _CHOICES)
 
@@ -134,9 +132,9 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             DataError: the file is malformed, or none of its trajectories can be used.
         """
         file.require("dataset_kwargs")
-        given = {"radius": request.options.radius_metres}
-        given |= {name: getattr(request.options, name) for name in _GIVEN}
-        settings = task_settings(file, ArmTaskSettings, given, _CHOICES)
+        overrides = {"radius": request.options.radius_metres}
+        overrides |= {name: getattr(request.options, name) for name in _GIVEN}
+        settings = task_settings(file, ArmTaskSettings, overrides, _CHOICES)
         self.kind = ManipulationKind(settings.kind)
         self._template = (
             _INSTRUCTIONS[self.kind] if settings.instruction is None else settings.instruction
@@ -151,7 +149,7 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
             if episode.kind == self.kind
         ]
         self.episodes = limit_items(
-            episodes, lambda item: item[0].traj_id, request.seed, request.limit
+            episodes, lambda pair: pair[0].traj_id, request.seed, request.limit
         )
         if not self.episodes:
             raise UsageError(f"{self.name}: no trajectory there has a {KIND_NAMES[self.kind]}")
@@ -179,22 +177,20 @@ class ManipulationTask(EpisodeTask[ArmTaskSettings, ArmTrajectory]):
         )
 
     def _check_instruction(self, name: str) -> None:
-        """Check that the instruction names the object, and has nothing in braces that cannot be
-        filled in."""
+        """Check that the instruction names the object, and all in braces can be filled in."""
         template = self._template
         known = {"object", "receptacle"} if self.kind == ManipulationKind.PUT else {"object"}
         try:
-            parsed = [item for item in string.Formatter().parse(template) if item[1] is not None]
+            parsed = [part for part in string.Formatter().parse(template) if part[1] is not None]
         except ValueError:
             parsed = []
         fields = {field for _, field, _, _ in parsed}
-        is_plain = all(not form and not conversion for _, _, form, conversion in parsed)
+        is_plain = all(not spec and not conversion for _, _, spec, conversion in parsed)
         if template != "short" and ("object" not in fields or not fields <= known or not is_plain):
             raise UsageError(
                 f"{name}: the instruction {template!r:.60} must have {{object}}"
                 f"{' and may have {receptacle}' if len(known) > 1 else ''}, and nothing else in "
-                "braces; "
-                f'or be "short" for {KIND_NAMES[self.kind]!r} alone'
+                f'braces; or be "short" for {KIND_NAMES[self.kind]!r} alone'
             )
 
 

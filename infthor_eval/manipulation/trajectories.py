@@ -39,11 +39,11 @@ class ArmTrajectory(TaskTrajectory):
 
 
 def arm_episodes(trajectory: Trajectory) -> list[ArmEpisode]:
-    """Return the pick-ups and puts of a trajectory, in time order; raises DataError if one names no
-    object."""
-    numbered = enumerate(trajectory.plan.low_actions)
+    """Return a trajectory's pick-ups and puts in time order; DataError if one names no object."""
     return [
-        _episode(number, low) for number, low in numbered if low.api_action.action in EXPERT_ACTIONS
+        _episode(number, low)
+        for number, low in enumerate(trajectory.plan.low_actions)
+        if low.api_action.action in EXPERT_ACTIONS
     ]
 
 

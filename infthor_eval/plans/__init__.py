@@ -1,2 +1,1 @@
-"""Plan-level evaluation (Algorithm 2): an agent meets a long trajectory plan by plan, each from the
-true history."""
+"""Plan-level evaluation (Algorithm 2): an agent meets a trajectory plan by plan, each time anew."""

@@ -149,10 +149,8 @@ def _check_state_is_the_plans_own(environment: Environment, plans: Sequence[int]
     for plan in (*reversed(plans), *plans):
         observation, info = environment.reset(plan)
         before, before_info = first[plan]
-        states = [
-            (view.agent, view.inventory, view.objects) for view in (observation.view, before.view)
-        ]
-        _require(states[0] == states[1], f"plan {plan} begins in another state the second time")
+        is_same = _state(observation) == _state(before)
+        _require(is_same, f"plan {plan} begins in another state the second time")
         _require(
             _same_picture(observation, before),
             f"plan {plan} begins with another picture the second time",
@@ -216,14 +214,14 @@ def _check_outcome(outcome: StepOutcome) -> None:
 
 def _check_observation(observation: Observation) -> None:
     view = observation.view
-    for key, item in view.objects.items():
-        _require(key == item.object_id, f"the object {item.object_id} is kept as {key}")
+    for key, thor_object in view.objects.items():
+        object_id = thor_object.object_id
+        object_type = thor_object.object_type
+        _require(key == object_id, f"the object {object_id} is kept as {key}")
         _require(bool(_ID.fullmatch(key)), f"{key!r:.80} is no id of the form Type|x|y|z")
         named = object_type_of(key)
-        _require(
-            named == item.object_type,
-            f"{key} says that it is a {named}, and is a {item.object_type}",
-        )
+        problem = f"{key} says that it is a {named}, and is a {object_type}"
+        _require(named == object_type, problem)
     for key in view.inventory:
         _require(key in view.objects, f"{key}, which is held, is not among the objects")
     if view.frame is not None:
@@ -240,6 +238,10 @@ def _check_observation(observation: Observation) -> None:
             np.array_equal(kept, view.frame),
             f"{observation.frame.path} is another picture than the view's",
         )
+
+
+def _state(observation: Observation) -> tuple[Any, ...]:
+    return observation.view.agent, observation.view.inventory, observation.view.objects
 
 
 def _same_picture(one: Observation, other: Observation) -> bool:

@@ -1,5 +1,4 @@
-"""One trajectory as an environment like Gymnasium's: reset to any of its plans, then step until it
-is over."""
+"""One trajectory as an environment like Gymnasium's: reset to any plan, step until it is over."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -180,7 +179,8 @@ class PlanEnvironment:
         # The whole plan is replayed before its start is restored: a plan whose expert fails here is
         # infeasible, and the expert's end is the goal of GotoLocation.
         expert_actions = self._expert.actions(plan)
-        start, end = self._expert.start(plan), self._expert.start(plan + 1)
+        start = self._expert.start(plan)
+        end = self._expert.start(plan + 1)
         view = self._simulator.rewind(start.mark, exactly=True)
         self._plan = present
         self._n_steps = 0
@@ -191,14 +191,12 @@ class PlanEnvironment:
             self._reward = PublishedReward(scripted.task.copy(), scripted.sub_goal)
             info |= {"max_reward": scripted.planner_reward, "expert_reward": scripted.expert_reward}
         else:
-            info["max_reward"] = self._begin_default(
-                present, view, start.treatments, end.mark.view.agent
-            )
+            goal = end.mark.view.agent
+            info["max_reward"] = self._begin_default(present, view, start.treatments, goal)
         return Observation(view, start.frame), info
 
     def go_on(self, plan: int) -> tuple[Observation, Mapping[str, Any]]:
-        """Begin a later plan of the same task where the world is, without a reset; returns what
-        `reset` does.
+        """Begin a later plan of the same task without a reset; returns what `reset` does.
 
         The expert must have passed it (`expert_actions`) before the reset, as it would otherwise
         act in this world.
@@ -234,9 +232,8 @@ class PlanEnvironment:
         target = self._target(plan, view, end, grid)
         self._preferred = _preferred_objects(target, view)
         self._reward = PlanReward(self._rules, target, task, view, treatments, grid)
-        n_actions = count_actions_to_goal(
-            self._rules, target, [action.pose for action in actions], grid
-        )
+        poses = [action.pose for action in actions]
+        n_actions = count_actions_to_goal(self._rules, target, poses, grid)
         completes = any(action.completes for action in actions[:n_actions])
         return max_reward(self._rules, target, view, grid, task if completes else None)
 
@@ -263,8 +260,7 @@ class PlanEnvironment:
         return self._execute(text, call, before)
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as
-        `reset` does."""
+        """Return the history before a plan, if frames are kept; raises as `reset` does."""
         return self._expert.past(plan)
 
     def expert_actions(self, plan: int) -> Sequence[ExpertAction]:
@@ -272,22 +268,17 @@ class PlanEnvironment:
         return self._expert.actions(plan)
 
     def named_objects(self, plan: int) -> Sequence[str]:
-        """Return the ids of the objects that a plan names and that the scene has; for pictures, not
-        for rewards.
+        """Return the ids of a plan's objects in the scene; for pictures, not for rewards.
 
         Raises:
             ExpertRefusedError: as `reset`.
         """
         present = self.plans[plan]
         view = self._expert.start(plan).mark.view
-        grounding = deepcopy(
-            self._expert.grounding
-        )  # it remembers its choices, and a picture must not decide any
-        ids = (
-            grounding.ground(key, view)
-            for key in (present.object_id, present.receptacle_id)
-            if key is not None
-        )
+        # A grounding remembers its choices, and a picture must not decide any.
+        grounding = deepcopy(self._expert.grounding)
+        recorded = filter(None, (present.object_id, present.receptacle_id))
+        ids = [grounding.ground(key, view) for key in recorded]
         return [key for key in ids if key is not None]
 
     def _ground(
@@ -317,20 +308,18 @@ class PlanEnvironment:
         if ended is not None or truncated:
             conditions = self._conditions(after)
             self._plan = None
-        said = Ended.LIMIT if truncated else ended
-        info = StepInfo(call, text, after.error, said, self._reward.goal_reached, conditions)
+        ending = Ended.LIMIT if truncated else ended
+        info = StepInfo(call, text, after.error, ending, self._reward.goal_reached, conditions)
         observation = Observation(after, self._frames.keep(after))
         return StepOutcome(observation, earned.reward, ended is not None, truncated, info)
 
     def _target(
         self, plan: Plan, view: SimulatorView, end: AgentPose, grid: Grid | None
     ) -> PlanTarget:
-        """Return the target of a plan; that of GotoLocation is the pose in which the expert
-        ended."""
+        """Return a plan's target; that of GotoLocation is the pose in which the expert ended."""
         if grid is not None:
-            return PlanTarget(
-                plan.kind, goal_stand=grid_pose_of(end, grid), goal_horizon=end.horizon
-            )
+            stand = grid_pose_of(end, grid)
+            return PlanTarget(plan.kind, goal_stand=stand, goal_horizon=end.horizon)
         return target_of(plan, self._expert.grounding, view)
 
     def _grid(
@@ -356,19 +345,16 @@ def _ending(earned: StepReward) -> Ended | None:
 
 
 def _preferred_objects(target: PlanTarget, start: SimulatorView) -> set[str]:
-    """Return the ids that ambiguous words mean: the plan's objects, and what they are in (one of
-    ten drawers)."""
-    named = [
-        start.objects[key]
-        for key in (target.object_id, target.receptacle_id)
-        if key in start.objects
-    ]
-    return {key for item in named for key in (item.object_id, *(item.parent_receptacles or ()))}
+    """Return the ids that ambiguous words mean: the plan's objects, and what they are in."""
+    preferred = set()
+    for key in (target.object_id, target.receptacle_id):
+        if key in start.objects:
+            preferred |= {key, *(start.objects[key].parent_receptacles or ())}
+    return preferred
 
 
 def _look_degrees(trajectory: Trajectory) -> float:
-    """Return the angle of most looks up or down in this trajectory: 15 degrees in ALFRED's, 30 in
-    others."""
+    """Return the angle of most looks up or down: 15 degrees in ALFRED's trajectories, else 30."""
     looks = Counter(
         degrees_of(low)
         for low in trajectory.plan.low_actions

@@ -59,17 +59,14 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         """Take the work, and what creates the subject's actors."""
         self._tasks = evaluation.tasks
         self._factory = factory
-        # Nothing is rendered that nobody looks at, and instance masks are needed for the state in
-        # words alone.
+        # Nothing is rendered that nobody looks at; masks are for the state in words alone.
         in_words = factory.sees and any(task.history.needs_state for task in self._tasks.values())
         self._simulators = evaluation.simulators(image=factory.sees, instances=in_words)
-        # A trajectory is a group: its plans share the expert's history, in the simulator and in the
-        # prefix cache.
+        # A trajectory is a group: its plans share a history, in simulator and prefix cache.
         groups = groupby(evaluation.units, lambda unit: (unit.key.task, unit.cluster))
+        warnings = _warnings(factory.trained_words, self._tasks.values())
         workload = evaluation.workload(same for _, same in groups)
-        workload = replace(
-            workload, warnings=_warnings(factory.trained_words, self._tasks.values())
-        )
+        workload = replace(workload, warnings=warnings)
         super().__init__(evaluation, workload, [self._simulators])
 
     def run(
@@ -106,8 +103,7 @@ class BoundPlans(BoundEpisodes[PlanUnit, PlanRecord]):
         runner: PlanRunner,
         session: Session[PlanRecord],
     ) -> Iterator[UnitRecord[PlanRecord]]:
-        """Run the plans of a final task as the published scripts do, all of them even if some have
-        records."""
+        """Run all plans of a final task as the published scripts do, even if some have records."""
         fingerprints, known = self._find_records(group, session)
         tried = 0
         goes_on = True
@@ -156,8 +152,7 @@ def _warnings(trained: str | None, tasks: Iterable[PlansTask]) -> list[str]:
     """Return a line for each task that asks a checkpoint in other words than it was trained on."""
     return [
         f"{task.name}: the checkpoint was trained on {trained} words and is asked in {task.words} "
-        "ones; give --words"
-        f" {trained}"
+        f"ones; give --words {trained}"
         for task in tasks
         if trained is not None and trained != task.words
     ]

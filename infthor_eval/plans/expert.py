@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import Trajectory
@@ -71,8 +71,7 @@ class Replayed(NamedTuple):
 
 
 class Expert:
-    """Replays the expert of a trajectory, plan by plan; `grounding` has the ids of its objects in
-    this simulator."""
+    """Replays a trajectory's expert plan by plan; `grounding` has its objects' ids here."""
 
     def __init__(
         self,
@@ -126,14 +125,12 @@ class Expert:
         return self._starts[plan]
 
     def actions(self, plan: int) -> Sequence[ExpertAction]:
-        """Return the expert's actions of a plan; raises ExpertRefusedError as `start` of the next
-        plan does."""
+        """Return the expert's actions of a plan; raises as `start` of the next plan does."""
         self.start(plan + 1)
         return self._actions[plan]
 
     def past(self, plan: int) -> Past:
-        """Return the history before a plan, only if frames are kept; raises ExpertRefusedError as
-        `start` does."""
+        """Return the history before a plan, if frames are kept; raises as `start` does."""
         segment = self._open_segment(plan)
         present = self._plans[plan]
         first = present.low[0]
@@ -172,17 +169,14 @@ class Expert:
                 self._log.record(step.view, step=number, action=step.action.text)
         if start.frame is not None:
             segment = self._open_segment(plan.index)
-            after = tuple(
-                (step.action.text, step.frame) for step in steps if step.frame is not None
-            )
-            self._segments.append(replace(segment, steps=after))
+            after = [(step.action.text, step.frame) for step in steps if step.frame is not None]
+            self._segments.append(replace(segment, steps=tuple(after)))
         self._actions.append([step.action for step in steps])
         self._watch(plan, steps)
         following = self._plans[plan.index + 1 : plan.index + 2]
-        task_goes_on = any(item.task == plan.task for item in following)
-        self._starts.append(
-            PlanStart(mark, last.frame, last.treatments if task_goes_on else Treatments())
-        )
+        task_goes_on = [after.task for after in following] == [plan.task]
+        treatments = last.treatments if task_goes_on else Treatments()
+        self._starts.append(PlanStart(mark, last.frame, treatments))
 
     def _steps(self, plan: Plan, start: PlanStart) -> Iterator[Replayed]:
         view = self._simulator.rewind(start.mark, exactly=True)

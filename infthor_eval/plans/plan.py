@@ -30,8 +30,7 @@ class PlanKind(StrEnum):
 
 @dataclass(frozen=True)
 class TrajectoryTask:
-    """One task of a trajectory: its goal in words, as recorded and as a condition; its sub-goals
-    [first, end)."""
+    """One task: its goal in words, as recorded and as a condition; its sub-goals [first, end)."""
 
     text: str
     info: TaskInfo
@@ -49,8 +48,8 @@ class Plan:
     """One plan.
 
     Attributes:
-        index: place among the trajectory's plans.
-        high: place of its sub-goal in the trajectory.
+        index: index among the trajectory's plans.
+        high: index of its sub-goal in the trajectory.
         text: the plan in words ("pick up the mug").
         task: index of the task that it belongs to; the earlier one if it is between two tasks.
         in_task: whether it belongs to a task, and not to the way from one to the next, as putting
@@ -91,19 +90,16 @@ def tasks_of(trajectory: Trajectory) -> list[TrajectoryTask]:
     for sub_task, span in zip(_sub_tasks(trajectory), trajectory.sub_trajs, strict=True):
         first, end = span.high_pddl_idx
         if not 0 <= first <= end <= n_high:
-            raise _error(
-                trajectory, f"task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}"
-            )
+            problem = f"task {span.sub_traj_idx} has sub-goals {first} to {end} of {n_high}"
+            raise _error(trajectory, problem)
         task = _task(trajectory, span.sub_traj_idx, sub_task)
-        tasks.append(
-            TrajectoryTask(goal_text(trajectory, sub_task), sub_task.task_info, task, first, end)
-        )
+        text = goal_text(trajectory, sub_task)
+        tasks.append(TrajectoryTask(text, sub_task.task_info, task, first, end))
     return tasks
 
 
 def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
-    """Return the plans of a trajectory, in time order; sub-goals without an action (ALFRED's last
-    one) are left out.
+    """Return a trajectory's plans in order; a sub-goal without action (ALFRED's last) is none.
 
     Raises:
         DataError: a task has no goal, a sub-goal is of an unknown kind or cannot be said in these
@@ -113,35 +109,33 @@ def plans_of(trajectory: Trajectory, words: Words) -> list[Plan]:
     spans = _spans(trajectory)
     final = len(tasks) - 1 if trajectory.long_horizon_task is not None else None
     plans: list[Plan] = []
-    for place, high in enumerate(trajectory.plan.high_pddl):
+    for index, high in enumerate(trajectory.plan.high_pddl):
         low = spans.get(high.high_idx)
         if low is None:
             continue
-        task = max(
-            (number for number, item in enumerate(tasks) if item.first_high <= place), default=0
-        )
+        begun = [number for number, task in enumerate(tasks) if task.first_high <= index]
+        number = max(begun, default=0)
         object_id, receptacle_id = _ids(trajectory, high, low)
         plans.append(
             Plan(
                 index=len(plans),
-                high=place,
+                high=index,
                 kind=_kind(trajectory, high),
                 text=_text(trajectory, high, words),
-                task=task,
-                in_task=tasks[task].holds(place),
+                task=number,
+                in_task=tasks[number].holds(index),
                 low=low,
                 object_id=object_id,
                 receptacle_id=receptacle_id,
                 location=high.planner_action.location,
-                is_final=task == final and tasks[task].holds(place),
+                is_final=number == final and tasks[number].holds(index),
             )
         )
     return plans
 
 
 def _sub_tasks(trajectory: Trajectory) -> Sequence[SubTask]:
-    """Return a task for each part of the trajectory; some files have the final task apart from the
-    others."""
+    """Return a task for each part; some files have the final task apart from the others."""
     tasks = trajectory.sub_tasks
     parts = trajectory.sub_trajs
     final = trajectory.long_horizon_task
@@ -177,9 +171,8 @@ def _spans(trajectory: Trajectory) -> dict[int, tuple[int, int]]:
     previous = -1
     for number, low in enumerate(trajectory.plan.low_actions):
         if low.high_idx < previous:
-            raise _error(
-                trajectory, f"action {number} belongs to sub-goal {low.high_idx}, out of order"
-            )
+            problem = f"action {number} belongs to sub-goal {low.high_idx}, out of order"
+            raise _error(trajectory, problem)
         first, _ = spans.get(low.high_idx, (number, number))
         spans[low.high_idx] = (first, number + 1)
         previous = low.high_idx
@@ -199,14 +192,9 @@ def _ids(
     planner = high.planner_action
     if "|" not in (planner.object_id or "|"):
         for action in trajectory.plan.low_actions[slice(*low)]:
-            if (
-                action.api_action.action == high.discrete_action.action
-                and action.api_action.object_id is not None
-            ):
-                return (
-                    action.api_action.object_id,
-                    action.api_action.receptacle_id or planner.receptacle_id,
-                )
+            api = action.api_action
+            if api.action == high.discrete_action.action and api.object_id is not None:
+                return api.object_id, api.receptacle_id or planner.receptacle_id
     return planner.object_id, planner.receptacle_id
 
 

@@ -1,5 +1,4 @@
-"""What the suite of plans writes into a run's journal: plans, each with everything that the agent
-did."""
+"""What plans write into a run's journal: each plan with everything that the agent did."""
 
 import msgspec
 
@@ -33,8 +32,7 @@ class StepRecord(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 class PlanRecord(
     EpisodeRecord, frozen=True, kw_only=True, omit_defaults=True, tag_field="type", tag="plan"
 ):
-    """One plan, and what an agent did in it; `kind` is that of the plan ("PickupObject"), `ended`
-    see `Ended`.
+    """One plan, and what an agent did in it; `kind` as in `PlanKind`, `ended` as in `Ended`.
 
     A plan from imported counts (`infthor_eval.plans.published.imported_counts`) has its kind and
     whether it was done, no more: the goal is empty, and all numbers but its index are 0.

@@ -18,7 +18,7 @@ class RewardRules(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A set of rules, as in `rewards.yaml`.
 
     Attributes:
-        scoring: who rewards actions: "default" (`rewards`) or "published" (`published_rewards`).
+        scoring: who rewards actions: "default" (`rewards`) or "published" (`published.rewards`).
         grounding: how a name becomes an object: "strict" (`thor.actions`) or "published"
             (`thor.published_actions`).
         force_action: whether calls of agents have `forceAction`, with which held objects never

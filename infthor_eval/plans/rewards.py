@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.household.containment import contents_of, is_in
 from infthor_eval.household.goals import goal_holds
 from infthor_eval.household.navigation import Grid, GridPose
@@ -24,12 +24,11 @@ from infthor_eval.thor.view import AgentPose, SimulatorView, ThorObject
 
 __all__ = ["PlanReward", "StepReward", "count_actions_to_goal", "max_reward"]
 
-# share of a look below which the camera's angle is right: simulators report rounded angles
+# Share of a look below which the camera's angle is right: simulators report rounded angles
 _SMALL_LOOK = 0.01
 _COOLING_STAGES = 3  # cooled, opened again, picked up again
-_TAKING_WHILE_CLOSED = {
-    "Toilet"
-}  # the receptacle that AI2-THOR need not have opened; experts put things onto its lid
+# The receptacle that AI2-THOR need not have opened; experts put things onto its lid.
+_TAKING_WHILE_CLOSED = {"Toilet"}
 _NOTHING = Treatments()
 
 
@@ -76,8 +75,7 @@ class PlanReward:
         self._task = task
         self._start = start
         self.treatments = treatments
-        # The plan's own treatments are apart: an object that was washed before is to be washed
-        # again by this plan.
+        # The plan's own treatments are apart: what was washed before is to be washed again.
         self._in_plan = Treatments()
         self._subject = subject_of(target, start)
         self._paths = _paths_to_goal(rules, target, grid)
@@ -89,16 +87,14 @@ class PlanReward:
     def after(
         self, call: Mapping[str, Any], before: SimulatorView, after: SimulatorView
     ) -> StepReward:
-        """Return the reward of an action, as `Simulator.step(**call)` takes it; ValueError if the
-        plan is over."""
+        """Return the reward of a call of `Simulator.step`; ValueError if the plan is over."""
         if self._is_over:
             raise ValueError("the plan is over; begin the next one")
         action = call["action"]
         object_id = call.get("objectId")
         rules = self._rules
         kind = self._target.kind
-        # Before validity is looked at: an action that is not valid can treat an object
-        # nevertheless.
+        # Before validity is looked at: an action that is not valid can treat an object too.
         self.treatments = self.treatments.after(action, object_id, after)
         self._in_plan = self._in_plan.after(action, object_id, after)
         if not after.success:
@@ -156,11 +152,8 @@ class PlanReward:
             return StepReward()
         if action == "OpenObject":
             return self._complete_stage("open")
-        return (
-            self._complete_stage("close", last=True)
-            if is_there and "put" in self._stages
-            else StepReward()
-        )
+        is_put = is_there and "put" in self._stages
+        return self._complete_stage("close", last=True) if is_put else StepReward()
 
     def _open_or_close(
         self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView
@@ -180,11 +173,8 @@ class PlanReward:
     def _slice(
         self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
     ) -> StepReward:
-        return (
-            self._success()
-            if action == "SliceObject" and object_id == self._object_id
-            else StepReward()
-        )
+        is_done = action == "SliceObject" and object_id == self._object_id
+        return self._success() if is_done else StepReward()
 
     def _wash_or_heat(
         self, _: str, object_id: str | None, before: SimulatorView, after: SimulatorView
@@ -195,8 +185,7 @@ class PlanReward:
     def _cool(
         self, action: str, object_id: str | None, before: SimulatorView, after: SimulatorView
     ) -> StepReward:
-        """Reward three stages in their order: an object in the closed fridge is cold, but still to
-        be taken out."""
+        """Reward three stages in order: what is cold in the fridge is still to be taken out."""
         subject = self._subject or ""
         if subject not in self._in_plan.cold:
             return StepReward()
@@ -206,10 +195,9 @@ class PlanReward:
         if action == "OpenObject" and fridge is not None and fridge.object_type == "Fridge":
             holds = subject in contents_of(fridge.object_id, before.objects)
             return self._complete_stage("reopened") if holds else StepReward()
-        picked = (
-            action == "PickupObject" and subject in after.inventory and "reopened" in self._stages
-        )
-        return self._complete_stage("picked up", last=True) if picked else StepReward()
+        picked = action == "PickupObject" and subject in after.inventory
+        is_done = picked and "reopened" in self._stages
+        return self._complete_stage("picked up", last=True) if is_done else StepReward()
 
     # -- their parts
 
@@ -262,8 +250,7 @@ def max_reward(
 def count_actions_to_goal(
     rules: RewardRules, target: PlanTarget, poses: Sequence[AgentPose], grid: Grid | None = None
 ) -> int:
-    """Return how many of some actions a plan takes: GotoLocation is done some steps before the end
-    of a path.
+    """Return how many actions a plan takes: GotoLocation is done before its path's end.
 
     Args:
         target: target of the plan; plans of other kinds than GotoLocation take all actions.
@@ -271,10 +258,11 @@ def count_actions_to_goal(
         grid: reachable cells; GotoLocation needs it.
     """
     paths = _paths_to_goal(rules, target, grid)
-    left = [math.inf if paths is None else paths.remaining(pose) for pose in poses]
-    return next(
-        (number for number, steps in enumerate(left, 1) if steps < rules.nearer_than), len(poses)
-    )
+    if paths is not None:
+        for number, pose in enumerate(poses, 1):
+            if paths.remaining(pose) < rules.nearer_than:
+                return number
+    return len(poses)
 
 
 def _max_path_reward(
@@ -303,8 +291,7 @@ class _PathsToGoal:
         self._distances = grid.distances_to(goal)
 
     def remaining(self, pose: AgentPose) -> float:
-        """Return the number of remaining actions; a partial look counts as one. Infinite if there
-        is no path."""
+        """Return the remaining actions, a partial look as one; infinite if there is no path."""
         steps = self._distances.get(grid_pose_of(pose, self._grid), math.inf)
         looks = abs(self._horizon - pose.horizon) / self._look_degrees
         return steps + math.ceil(looks - _SMALL_LOOK)
@@ -321,9 +308,11 @@ def _paths_to_goal(
     return _PathsToGoal(target.goal_stand, target.goal_horizon, grid, rules.look_degrees)
 
 
-def _is_closed(item: ThorObject) -> bool:
+def _is_closed(receptacle: ThorObject) -> bool:
     """Return whether a receptacle is to be opened before anything is put there."""
-    return bool(item.openable and not item.is_open and item.object_type not in _TAKING_WHILE_CLOSED)
+    if receptacle.object_type in _TAKING_WHILE_CLOSED:
+        return False
+    return bool(receptacle.openable and not receptacle.is_open)
 
 
 def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:
@@ -335,11 +324,9 @@ def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:
         return
     subject = subject_of(target, start)
     if subject not in start.objects:
-        problem = (
-            "has no object"
-            if subject is None
-            else f"is about {subject}, which the scene does not have"
-        )
+        problem = "has no object"
+        if subject is not None:
+            problem = f"is about {subject}, which the scene does not have"
         raise InfeasibleError(f"this {kind} plan {problem}; leave it out")
     if kind == PlanKind.PUT and target.receptacle_id not in start.objects:
         raise InfeasibleError(
@@ -348,9 +335,8 @@ def _require_feasible(target: PlanTarget, start: SimulatorView) -> None:
         )
 
 
-_BY_KIND: dict[
-    PlanKind, Callable[[PlanReward, str, str | None, SimulatorView, SimulatorView], StepReward]
-] = {
+_Rule = Callable[[PlanReward, str, str | None, SimulatorView, SimulatorView], StepReward]
+_BY_KIND: dict[PlanKind, _Rule] = {
     PlanKind.GOTO: PlanReward._goto,
     PlanKind.PICKUP: PlanReward._pickup,
     PlanKind.PUT: PlanReward._put_down,

@@ -55,8 +55,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         folder: Path,
         seed: int,
     ) -> None:
-        """Take a trajectory, its simulator, what creates the actor, and an empty folder for
-        frames."""
+        """Take a trajectory, its simulator, the actor's factory, and an empty folder for frames."""
         frames = FrameFolder(folder) if factory.sees else NoFrames()
         super().__init__(
             simulator,
@@ -71,12 +70,12 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
                 in_one_go=task.final_form is not None,
             ),
         )
-        self._trajectory, self._actor = trajectory, factory.create(task, trajectory.data)
+        self._trajectory = trajectory
+        self._actor = factory.create(task, trajectory.data)
         self._seed = f"{seed}/{task.name}/{trajectory.traj_id}"
 
     def prepare(self, plans: Sequence[Plan]) -> None:
-        """Have the expert pass plans that are to follow each other without a reset, as far as it
-        can here.
+        """Have the expert pass plans that follow each other without a reset, as far as it can.
 
         Raises:
             SceneError: the simulator has no such scene.
@@ -98,19 +97,16 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             SimulatorError: the simulator fails.
         """
         environment = self.environment
-        observation, info = (
-            environment.go_on(plan.index) if goes_on else environment.reset(plan.index)
-        )
-        record = plan_record(self._trajectory, plan)
+        begin = environment.go_on if goes_on else environment.reset
+        observation, info = begin(plan.index)
         of_expert = info["expert_reward"]
         self.begun = msgspec.structs.replace(
-            record,
+            plan_record(self._trajectory, plan),
             max_reward=round(info["max_reward"], _DIGITS),
             expert_reward=None if of_expert is None else round(of_expert, _DIGITS),
         )
-        self._actor.begin(
-            PlanSituation(environment, plan, f"{self._seed}/{plan.index}", observation, goes_on)
-        )
+        seed = f"{self._seed}/{plan.index}"
+        self._actor.begin(PlanSituation(environment, plan, seed, observation, goes_on))
         self.begun = self._with_clue_tokens(self.begun, plan)
         acts: list[tuple[Act, StepOutcome]] = []
         while not acts or not (acts[-1][1].terminated or acts[-1][1].truncated):
@@ -127,8 +123,7 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
         return EpisodeResult(_completed_record(self.begun, acts), _tokens(replies), faults)
 
     def _with_clue_tokens(self, begun: PlanRecord, plan: Plan) -> PlanRecord:
-        """Return the record with how far back the clue of a final task's plan is, in tokens of the
-        whole history."""
+        """Return the record with the distance of a final plan's clue, in tokens of the history."""
         clue = self._trajectory.clue(plan) if plan.is_final else None
         if clue is None or not isinstance(self._actor, CountingActor):
             return begun
@@ -146,9 +141,8 @@ class PlanRunner(EpisodeRunner[PlanEnvironment, PlanRecord]):
             SimulatorError: as `run`.
         """
         self.environment.expert_actions(plan.index)
-        return EpisodeResult(
-            msgspec.structs.replace(plan_record(self._trajectory, plan), ended=NOT_ATTEMPTED)
-        )
+        record = plan_record(self._trajectory, plan)
+        return EpisodeResult(msgspec.structs.replace(record, ended=NOT_ATTEMPTED))
 
 
 def _completed_record(begun: PlanRecord, acts: Sequence[tuple[Act, StepOutcome]]) -> PlanRecord:
@@ -177,8 +171,7 @@ def _step_record(act: Act, outcome: StepOutcome) -> StepRecord:
 
 
 def _tokens(replies: Sequence[Reply]) -> Tokens:
-    """Return the context of the last request, which holds those before it, and the tokens of all
-    replies."""
+    """Return the context of the last request, which holds earlier ones, and all reply tokens."""
     if not replies:
         return Tokens()
     counts = [reply.n_reply_tokens for reply in replies]

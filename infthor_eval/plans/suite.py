@@ -50,8 +50,7 @@ class PlansSuite:
         return summarise_plans(header.config, records)
 
     def scores(self, record: UnitRecord[PlanRecord]) -> Mapping[str, float]:
-        """See `Suite.scores`: whether the plan was completed, and its reward if there are
-        rewards."""
+        """See `Suite.scores`: whether the plan was completed, and its reward if it has one."""
         payload = record.payload
         if not payload.attempted:
             return {}

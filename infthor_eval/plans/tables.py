@@ -32,17 +32,10 @@ _PUBLISHED_RULES = (
 
 def overview_table(runs: Sequence[RunSummary]) -> Table:
     """Return completed plans and reward, one number a task."""
-    rows = [
-        Row(
-            (
-                *names,
-                format_percent(task.success.get("total")),
-                format_percent(task.reward_share),
-                *_sizes(task)[:3],
-            )
-        )
-        for *names, task in named_tasks(runs)
-    ]
+    rows = []
+    for *names, task in named_tasks(runs):
+        success = format_percent(task.success.get("total"))
+        rows.append(Row((*names, success, format_percent(task.reward_share), *_sizes(task)[:3])))
     columns = (*NAME_COLUMNS, *map(Column, ("completed, %", "reward, % of the most", *_COUNTS[:3])))
     return Table("Plans, 95 % interval in brackets", columns, tuple(rows), result_notes(runs))
 
@@ -58,17 +51,10 @@ def _success_table(
     runs: Sequence[RunSummary], tasks: Sequence[tuple[str, str, PlanTaskSummary]]
 ) -> Table:
     """Return completed plans, by the columns of the published table of final tasks."""
-    rows = [
-        Row(
-            (
-                *names,
-                *(format_percent(task.success.get(column)) for column in FINAL_COLUMNS),
-                format_percent(task.path_weighted),
-                *_sizes(task),
-            )
-        )
-        for *names, task in tasks
-    ]
+    rows = []
+    for *names, task in tasks:
+        success = [format_percent(task.success.get(column)) for column in FINAL_COLUMNS]
+        rows.append(Row((*names, *success, format_percent(task.path_weighted), *_sizes(task))))
     notes = [*result_notes(runs), *_conduct_notes(runs)]
     if any(_is_comparable(run) for run in runs):
         for table in published_tables("plans"):
@@ -91,29 +77,32 @@ def _success_table(
 
 
 def _distance_tables(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> list[Table]:
-    """Return the final tasks' plans by the distance of their clues: in frames, and in tokens if
-    they are counted."""
-    tables = []
-    for title, of_task, order in (
-        (
-            "frames since what they need was in view",
-            lambda task: task.by_distance,
-            (*DISTANCES, NEVER),
-        ),
-        ("thousand tokens since then", lambda task: task.by_tokens, LENGTHS),
-    ):
-        names = [name for name in order if any(name in of_task(task) for *_, task in tasks)]
-        rows = [
-            Row((*run, *(_rate_and_n(of_task(task).get(name)) for name in names)))
-            for *run, task in tasks
-            if of_task(task)
-        ]
-        if rows:
-            columns = (*NAME_COLUMNS, *map(Column, names))
-            tables.append(
-                Table(f"Final tasks: plans completed, % (plans), by {title}", columns, tuple(rows))
-            )
-    return tables
+    """Return tables of final tasks' plans by the distance of their clues, in frames and tokens."""
+    by_frames = [((run, name), task.by_distance) for run, name, task in tasks]
+    by_tokens = [((run, name), task.by_tokens) for run, name, task in tasks]
+    title = "frames since what they need was in view"
+    tables = [
+        _distance_table(title, by_frames, (*DISTANCES, NEVER)),
+        _distance_table("thousand tokens since then", by_tokens, LENGTHS),
+    ]
+    return [table for table in tables if table.rows]
+
+
+def _distance_table(
+    title: str,
+    tasks: Sequence[tuple[tuple[str, str], Mapping[str, Rate]]],
+    order: Sequence[str],
+) -> Table:
+    """Return the table of tasks' rates by distance; without rows if there is no rate."""
+    known = {distance for _, rates in tasks for distance in rates}
+    distances = [distance for distance in order if distance in known]
+    rows = []
+    for names, rates in tasks:
+        if rates:
+            cells = [_rate_and_n(rates.get(distance)) for distance in distances]
+            rows.append(Row((*names, *cells)))
+    columns = (*NAME_COLUMNS, *map(Column, distances))
+    return Table(f"Final tasks: plans completed, % (plans), by {title}", columns, tuple(rows))
 
 
 def _rate_and_n(rate: Rate | None) -> str:
@@ -121,18 +110,14 @@ def _rate_and_n(rate: Rate | None) -> str:
 
 
 def _conduct_notes(runs: Sequence[RunSummary]) -> list[str]:
-    """Return how the runs went on after a failed plan; Algorithm 2 of the paper and its script
-    differ in it."""
+    """Return how runs went on after a failed plan; the paper's Algorithm 2 and script differ."""
     ways = {task.after_failure for run in runs for task in run.header.config.tasks.values()}
     return [text for way, text in _AFTER_FAILURE.items() if way in ways]
 
 
 def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
-    logged = [
-        name
-        for name in ("total_reward", "agent_reward")
-        if any(name in task.logged for *_, task in tasks)
-    ]
+    known = {name for *_, task in tasks for name in task.logged}
+    logged = [name for name in ("total_reward", "agent_reward") if name in known]
     rows = []
     for *names, task in tasks:
         of_trajectory = (
@@ -143,15 +128,9 @@ def _reward_table(tasks: Sequence[tuple[str, str, PlanTaskSummary]]) -> Table:
         totals = (format_number(task.logged.get(name)) for name in logged)
         goals = format_percent(task.goals), format_percent(task.goal_conditions)
         rows.append(Row((*names, task.rules or "-", *of_trajectory, *goals, *totals)))
-    of_log = (f"logged {name}" for name in logged)
-    columns = (
-        *NAME_COLUMNS,
-        Column("rules", False),
-        *map(
-            Column,
-            ("reward", "at most", "% of it", "goals reached, %", "goal conditions, %", *of_log),
-        ),
-    )
+    numbers = ["reward", "at most", "% of it", "goals reached, %", "goal conditions, %"]
+    numbers += [f"logged {name}" for name in logged]
+    columns = (*NAME_COLUMNS, Column("rules", False), *map(Column, numbers))
     notes = (_PUBLISHED_RULES,) if logged else ()
     return Table("Reward of a trajectory, 95 % interval in brackets", columns, tuple(rows), notes)
 
@@ -177,8 +156,7 @@ def _has_final_task(run: RunSummary) -> bool:
 
 
 def _is_comparable(run: RunSummary) -> bool:
-    """Return whether a run has a task that was run as the published final tasks were, or comes from
-    their logs."""
+    """Return whether a run has a task run as the published final tasks were, or from their logs."""
     comparable = any(
         task.rewards is None or _is_published(task, task.rewards)
         for task in run.header.config.tasks.values()

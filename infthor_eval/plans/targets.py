@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.household.navigation import GridPose
 from infthor_eval.plans.plan import Plan, PlanKind
@@ -34,8 +34,7 @@ class PlanTarget:
 
 
 def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarget:
-    """Return the target of a recorded plan at its start; GotoLocation's needs a grid, see
-    `PlanEnvironment`.
+    """Return a recorded plan's target at its start; GotoLocation's is of `PlanEnvironment`.
 
     Raises:
         InfeasibleError: the scene has no object for an id.
@@ -48,8 +47,7 @@ def target_of(plan: Plan, grounding: Grounding, view: SimulatorView) -> PlanTarg
 
 
 def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
-    """Return the id of the object that a plan changes; None if no object is named and none is held
-    at its start.
+    """Return the id of the object that a plan changes; None if none is named or held.
 
     ALFRED's plans of washing, heating and cooling name the appliance; their object is the one held
     at the start.
@@ -62,8 +60,7 @@ def subject_of(target: PlanTarget, start: SimulatorView) -> str | None:
 
 
 def in_hand(wanted: str, view: SimulatorView) -> bool:
-    """Return whether an object of this name is held, whole or sliced: an agent's words cannot tell
-    which one it is."""
+    """Return whether an object of this name is held, whole or sliced: words do not tell which."""
     return any(
         Words.PUBLISHED.name_of(held) == Words.PUBLISHED.name_of(wanted) for held in view.inventory
     )

@@ -16,9 +16,8 @@ from infthor_eval.plans.history.recalled import MemoryChoice, RecalledHistory
 from infthor_eval.plans.history.retrieved import require_retrieved
 from infthor_eval.plans.options import PlansOptions
 from infthor_eval.plans.plan import Plan
-from infthor_eval.plans.published.chat_forms import chat_form
 from infthor_eval.plans.published.final_protocol import MAX_STEPS as MAX_FINAL_STEPS
-from infthor_eval.plans.published.final_protocol import FinalForm, final_form
+from infthor_eval.plans.published.final_protocol import FinalForm, chat_form, final_form
 from infthor_eval.plans.reward_rules import reward_rules
 from infthor_eval.plans.trajectories import PlanTrajectory, read_plan_trajectory
 from infthor_eval.runs import TaskFile, TaskRequest
@@ -34,13 +33,8 @@ _CHOICES = {
     "words": tuple(map(str, Words)),
 }
 
-_GIVEN = (
-    "rewards",
-    "words",
-    "history",
-    "protocol",
-    "after_failure",
-)  # settings that are options too
+# Settings that are options too.
+_GIVEN = ("rewards", "words", "history", "protocol", "after_failure")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +66,7 @@ class PlanTaskSettings:
 
 
 def check_task_file(file: TaskFile) -> None:
-    """Check the settings of a task file; raises DataError if one is unknown or has a value that is
-    not allowed."""
+    """Check a task file's settings; raises DataError if one is unknown or its value not allowed."""
     file.require("dataset_kwargs")
     task_settings(file, PlanTaskSettings, {}, _CHOICES)
 
@@ -98,8 +91,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         """
         file.require("dataset_kwargs", "generation_kwargs")
         self._options = request.options
-        given = {name: getattr(self._options, name) for name in _GIVEN}
-        settings = task_settings(file, PlanTaskSettings, given, _CHOICES)
+        overrides = {name: getattr(self._options, name) for name in _GIVEN}
+        settings = task_settings(file, PlanTaskSettings, overrides, _CHOICES)
         rules = reward_rules(settings.rewards)
         self.rules = rules.forcing() if self._options.force_action else rules
         self.words = Words(settings.words)
@@ -111,18 +104,19 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
         self.final_form = self._final_form(settings)
         self._form = self.final_form or chat_form(self.history)
         if self._form is not None:
-            self.history, self.decoding = self._form.history, self._form.decoding(request.seed)
+            self.history = self._form.history
+            self.decoding = self._form.decoding(request.seed)
         super().__init__(file, request, settings, partial(read_plan_trajectory, words=self.words))
-        having_plans = [item for item in self.trajectories.trajectories if self.plans(item)]
+        having_plans = [one for one in self.trajectories.trajectories if self.plans(one)]
         self.evaluated_trajectories = limit_items(
-            having_plans, lambda item: item.traj_id, request.seed, request.limit
+            having_plans, lambda trajectory: trajectory.traj_id, request.seed, request.limit
         )
         if not self.evaluated_trajectories:
             raise UsageError(
                 f"{self.name}: no trajectory there has a final task; make some with --test-set"
             )
         if settings.history.startswith("retrieved:"):
-            require_retrieved((item.data for item in self.evaluated_trajectories), self.name)
+            require_retrieved((one.data for one in self.evaluated_trajectories), self.name)
 
     def _memory_choice(self) -> MemoryChoice:
         options = self._options
@@ -149,11 +143,8 @@ class PlansTask(EpisodeTask[PlanTaskSettings, PlanTrajectory]):
     @property
     def max_steps(self) -> int:
         """Number of actions after which a plan is over."""
-        return (
-            self.settings.max_steps
-            if self.final_form is None
-            else max(self.settings.max_steps, MAX_FINAL_STEPS)
-        )
+        own = self.settings.max_steps
+        return own if self.final_form is None else max(own, MAX_FINAL_STEPS)
 
     def agent_config(self) -> AgentConfig:
         """Return how a model is prompted."""

@@ -30,8 +30,7 @@ class PlanTrajectory(TaskTrajectory):
         )
 
     def clue(self, plan: Plan) -> int | None:
-        """Return the last frame, up to the first of its task, with what a plan needs in view; see
-        `clue_step`."""
+        """Return the last frame up to its task's first that shows a plan's need (`clue_step`)."""
         return clue_step(self._logs, self.data, plan, self.first_frame(plan))
 
     @cached_property

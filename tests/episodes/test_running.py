@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import msgspec
 import pytest
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.episodes.running import EpisodeResult, EpisodeRunner
 from infthor_eval.errors import ModelError, SceneError, SimulatorError
 from infthor_eval.manipulation.records import ArmRecord

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.household.containment import is_in
 from infthor_eval.manipulation.actors import BASELINES
 from infthor_eval.manipulation.conversion import Conversion

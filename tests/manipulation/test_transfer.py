@@ -7,7 +7,7 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.transfer import transfer
 

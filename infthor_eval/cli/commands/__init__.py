@@ -1,2 +1,1 @@
-"""The commands, one module each, imported when the command is called:
-`infthor_eval.cli.commands.NAME.command`."""
+"""The commands, a module each or one of related ones, imported when the command is called."""

@@ -32,8 +32,7 @@ def command(set_folder: Path, runs: tuple[Path, ...], balanced: Path | None) -> 
     of a question, the number of its clue frames or their place, and learn from questions on other
     trajectories.
     """
-    from infthor_eval.cli.progress.left_out import print_left_out
-    from infthor_eval.cli.progress.notes import print_note
+    from infthor_eval.cli.progress.notes import print_left_out, print_note
     from infthor_eval.errors import DataError, UsageError
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.formats.qa_csv import encode_questions, write_questions

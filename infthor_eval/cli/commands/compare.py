@@ -31,7 +31,8 @@ def command(first: Path, second: Path) -> None:
 
     folders = (first, second)
     headers = [read_header(folder) for folder in folders]
-    name, other = (header.suite for header in headers)
+    name = headers[0].suite
+    other = headers[1].suite
     if name != other:
         raise UsageError(
             f"{first} is a run of {name}, {second} of {other}; compare runs of one suite"

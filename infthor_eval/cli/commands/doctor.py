@@ -17,10 +17,9 @@ import click
 import msgspec
 from rich.text import Text
 
-from infthor_eval.cli.checks import Check
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
-from infthor_eval.cli.set_checks import set_checks
+from infthor_eval.cli.set_checks import Check, set_checks
 from infthor_eval.errors import UsageError, in_one_line
 from infthor_eval.nieh.published.hub_data import default_folder
 from infthor_eval.storage.folders import user_cache
@@ -212,9 +211,8 @@ def _hub() -> Check:
 def _connection_problem(url: str) -> str:
     """Return why a server cannot be reached; empty if it can."""
     try:
-        urllib.request.urlopen(
-            urllib.request.Request(url, method="HEAD"), timeout=_HUB_TIMEOUT_S
-        ).close()
+        request = urllib.request.Request(url, method="HEAD")
+        urllib.request.urlopen(request, timeout=_HUB_TIMEOUT_S).close()
     except urllib.error.HTTPError:  # an error page is an answer
         return ""
     except (OSError, ValueError) as error:
@@ -236,8 +234,8 @@ def _call_with_timeout(seconds: float, function: Callable[[], str]) -> str:
 
 
 def _disks() -> Iterator[Check]:
-    for name, place in (("disk, here", Path.cwd()), ("disk, cache", user_cache(""))):
-        folder = next(path for path in (place, *place.parents) if path.exists())
+    for name, wanted in (("disk, here", Path.cwd()), ("disk, cache", user_cache(""))):
+        folder = next(path for path in (wanted, *wanted.parents) if path.exists())
         free = shutil.disk_usage(folder).free / _GB
         if free < _MIN_DISK_GB:
             hint = (

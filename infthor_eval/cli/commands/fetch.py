@@ -20,7 +20,7 @@ def command(what: str, folder: Path | None, token: str | None, endpoint: str | N
 
     Tasks such as `--tasks nieh` find it without --data; after --dir DIR, they need --data DIR.
     """
-    from infthor_eval.cli.progress.left_out import print_left_out
+    from infthor_eval.cli.progress.notes import print_left_out
     from infthor_eval.nieh.published.hub_data import default_folder, fetch_nieh
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.terminal import print_line

@@ -106,8 +106,7 @@ def command(
     as_json: bool,
     **workers: Any,
 ) -> None:
-    """Generate trajectories: sample tasks, plan them, and execute the plans in the embedded
-    simulator.
+    """Generate trajectories: sample tasks, plan them, and run the plans in the embedded simulator.
 
     Trajectories in the folder are not generated again. Exit code 1 if one cannot be generated.
     """

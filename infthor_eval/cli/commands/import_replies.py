@@ -1,5 +1,4 @@
-"""`infthor-eval import-replies`: what others made, as runs: replies to questions, and counts of
-plans."""
+"""`infthor-eval import-replies`: replies and counts of plans that others made, as runs."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -34,8 +33,7 @@ __all__ = ["command"]
     "--output", type=PATH, default=Path("results"), show_default=True, help="Folder of the runs."
 )
 def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output: Path) -> int:
-    """Score replies to NIEH questions that others made, and store them as runs; counts of plans
-    too.
+    """Score replies to NIEH questions that others made, or counts of plans; store them as runs.
 
     LOG is a published log of replies or of plans, lm-eval's samples, or has a JSON object a line
     with question_id and reply. SET needs no frames; logs of plans need no SET. Logs of one model in
@@ -47,15 +45,15 @@ def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output
     from infthor_eval.errors import UsageError
     from infthor_eval.formats.plan_logs import is_plan_log
 
-    of_plans = [log for log in logs if is_plan_log(log)]
-    of_replies = [log for log in logs if log not in of_plans]
-    if of_replies and data is None:
+    plan_logs = [log for log in logs if is_plan_log(log)]
+    reply_logs = [log for log in logs if log not in plan_logs]
+    if reply_logs and data is None:
         raise UsageError(
-            f"{of_replies[0]}: has replies to questions; give their NIEH set with --data"
+            f"{reply_logs[0]}: has replies to questions; give their NIEH set with --data"
         )
-    imported = [*_import_plans(of_plans, model, output)]
+    imported = [*_import_plans(plan_logs, model, output)]
     if data is not None:
-        imported += _import_replies(of_replies, data, model, output)
+        imported += _import_replies(reply_logs, data, model, output)
     print_results([results for results, _ in imported], ShowOptions())
     return 1 if any(n_refused for _, n_refused in imported) else 0
 
@@ -63,11 +61,8 @@ def command(logs: tuple[Path, ...], data: Path | None, model: str | None, output
 def _import_replies(
     logs: Sequence[Path], data: Path, model: str | None, output: Path
 ) -> Iterator[tuple["RunResults", int]]:
-    """Yield the results of the runs of logs of replies, and the number of rows that are not
-    imported."""
-    from infthor_eval.cli.progress.left_out import print_left_out
-    from infthor_eval.cli.progress.notes import print_note
-    from infthor_eval.cli.progress.refused_lines import print_refused
+    """Yield the results of runs of logs of replies, and the number of rows not imported."""
+    from infthor_eval.cli.progress.notes import print_left_out, print_note, print_refused
     from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.nieh_set import NiehSet
     from infthor_eval.nieh.published.imported_replies import import_logs
@@ -88,24 +83,18 @@ def _import_replies(
                 "counts"
             )
             print_note(f"{name}: the prompt it was asked with: {run.settings['prompt'] or unknown}")
-        for what, rows in (
-            ("not imported", run.refused),
-            ("scored otherwise than logged", run.rescored),
-        ):
+        problems = {"not imported": run.refused, "scored otherwise than logged": run.rescored}
+        for what, rows in problems.items():
             print_refused(name, what, [(row.log, row.line, row.reason) for row in rows])
-        yield (
-            RunResults(stored.folder, suite, stored.summary, stored.usage, run.n_missing),
-            len(run.refused),
-        )
+        results = RunResults(stored.folder, suite, stored.summary, stored.usage, run.n_missing)
+        yield results, len(run.refused)
 
 
 def _import_plans(
     logs: Sequence[Path], model: str | None, output: Path
 ) -> Iterator[tuple["RunResults", int]]:
-    """Yield the results of the runs of logs of plans, and the number of rows that are not
-    imported."""
-    from infthor_eval.cli.progress.notes import print_note
-    from infthor_eval.cli.progress.refused_lines import print_refused
+    """Yield the results of runs of logs of plans, and the number of rows not imported."""
+    from infthor_eval.cli.progress.notes import print_note, print_refused
     from infthor_eval.cli.results import RunResults
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.published.imported_counts import import_counts

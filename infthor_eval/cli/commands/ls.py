@@ -1,7 +1,9 @@
 """`infthor-eval ls`: models, memories, tasks, scenes, and runs."""
 
 import inspect
+import re
 import time
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import click
@@ -11,20 +13,25 @@ from rich.table import Table as RichTable
 from infthor_eval.cli.help import ExampleCommand, ExampleGroup
 from infthor_eval.cli.options.values import PATH, SCENE_KINDS, floor_plans_option, include_option
 from infthor_eval.cli.progress.notes import print_note
-from infthor_eval.errors import InfthorError, ModelError
+from infthor_eval.errors import InfthorError, ModelError, unknown_name
 from infthor_eval.memory import MEMORIES, accepted_options, memory_class
 from infthor_eval.report.terminal import print_table, table_console
-from infthor_eval.runs.catalog import Catalog
+from infthor_eval.runs.catalog import Catalog, TaskFile
 from infthor_eval.runs.stored.labels import label_runs
 from infthor_eval.runs.stored.search import BrokenRun, StoredRun, find_runs
 from infthor_eval.suites import baseline_suites, find_suite, split_by_suite
 from infthor_eval.tables import Column, Row, Table
 from infthor_eval.terminal import console, print_line
-from model_adapters import names, options
+from model_adapters import has_option, is_known, names, options
+from model_adapters.built_in import BUILT_IN
 from model_adapters.registry import model_description
 
 __all__ = ["command"]
 
+_TaskRow = tuple[str, str, str]  # name, description, data
+
+_SIZE = re.compile(r"(?<=_)\d+[km]$")  # tokens, at the end of a task's name
+_SIZE_HERE = "\0"  # stands for the size in a description
 _MAX_TASKS = 3  # tasks of a run that are listed with their numbers
 _AGES = ((86_400, "d"), (3_600, "h"), (60, "min"), (1, "s"))
 _COUNTS = ("done", "missing", "failed")
@@ -33,46 +40,80 @@ _COUNTS = ("done", "missing", "failed")
 @click.group("ls", cls=ExampleGroup, invoke_without_command=True, example="infthor-eval ls models")
 @click.pass_context
 def command(context: click.Context) -> None:
-    """List the models with their options, the memories, the tasks, the scenes, or the runs in a
-    folder."""
+    """List the models, the memories, the tasks, the scenes, or the runs in a folder."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
 
-@command.command("models", cls=ExampleCommand, example="infthor-eval ls models")
-def _models() -> None:
-    """Models and baselines, with their options and defaults."""
+@command.command("models", cls=ExampleCommand, example="infthor-eval ls models qwen2.5-vl")
+@click.argument("name", required=False)
+def _models(name: str | None) -> None:
+    """Models and baselines, one a line; or the options of model NAME, with their defaults."""
+    if name is not None:
+        _print_options(name)
+        return
+    table = RichTable("model", "what it is", "engine", box=box.SIMPLE_HEAD)
+    for baseline, suites in baseline_suites().items():
+        table.add_row(baseline, _baseline_text(suites), "-")
+    for model in names():
+        try:
+            table.add_row(model, model_description(model) or _checkpoint(model), _engine(model))
+        except ModelError as error:
+            # An installed package's model that does not import: say so, list the others.
+            table.add_row(model, f"not usable: {error}", "", style="red")
+    table_console().print(table, soft_wrap=False)
+
+
+def _print_options(model: str) -> None:
+    """Print the options of a model or a baseline; raises UsageError for an unknown name."""
+    suites = baseline_suites().get(model)
+    if suites is None and not is_known(model):
+        raise unknown_name("model", model, [*baseline_suites(), *names()])
+    about = _baseline_text(suites) if suites is not None else model_description(model)
     table = RichTable("model", "options and defaults (--model-args)", box=box.SIMPLE_HEAD)
-    for name, suites in baseline_suites().items():
-        table.add_row(name, f"no options; a baseline of {', '.join(suites)}")
-    for name in names():
-        try:
-            note = model_description(name)
-            table.add_row(name, f"{note}; {options(name)}" if note else options(name))
-        except (
-            ModelError
-        ) as error:  # an installed package's model that does not import: say so, list the others
-            table.add_row(name, f"not usable: {error}", style="red")
+    text = "no options" if suites is not None else options(model)
+    table.add_row(model, f"{about}; {text}" if about else text)
     console().print(table, soft_wrap=False)
 
 
-@command.command("memories", cls=ExampleCommand, example="infthor-eval ls memories")
-def _memories() -> None:
-    """Memories for `--memory`, with their options and defaults."""
-    table = RichTable(
-        "memory", "what it recalls", "options and defaults (--memory-args)", box=box.SIMPLE_HEAD
-    )
-    for name in MEMORIES.names:
+def _baseline_text(suites: Sequence[str]) -> str:
+    return f"a baseline of {', '.join(suites)}"
+
+
+def _checkpoint(model: str) -> str:
+    """Return the checkpoint that a model loads unless told otherwise; an empty text for none."""
+    default = re.search(r"\bpretrained=([^,]+)", options(model))
+    return f"usually {default[1]}" if default else ""
+
+
+def _engine(model: str) -> str:
+    """Return the library that runs a model; "-" for its own code, or where nothing runs here."""
+    name, _, engine = model.partition("@")
+    if engine or name not in BUILT_IN:
+        return engine or "-"
+    return "transformers" if has_option(model, "threads") else "-"
+
+
+@command.command("memories", cls=ExampleCommand, example="infthor-eval ls memories clip")
+@click.argument("name", required=False)
+def _memories(name: str | None) -> None:
+    """Memories for `--memory`, one a line; or the options of memory NAME, with their defaults."""
+    if name is not None:
+        table = RichTable("memory", "options and defaults (--memory-args)", box=box.SIMPLE_HEAD)
+        defaults = {key: option.default for key, option in accepted_options(name).items()}
+        text = ", ".join(f"{key}={default}" for key, default in defaults.items())
+        table.add_row(name, text or "no options")
+        console().print(table, soft_wrap=False)
+        return
+    table = RichTable("memory", "what it recalls", box=box.SIMPLE_HEAD)
+    for memory in MEMORIES.names:
         try:
-            shown = ", ".join(
-                f"{key}={item.default}" for key, item in accepted_options(name).items()
-            )
-            about = (inspect.getdoc(memory_class(name)) or "").partition("\n")[0]
+            paragraph = (inspect.getdoc(memory_class(memory)) or "").partition("\n\n")[0]
         except InfthorError as error:  # an installed package's memory that does not import
-            table.add_row(name, f"not usable: {error}", "", style="red")
+            table.add_row(memory, f"not usable: {error}", style="red")
         else:
-            table.add_row(name, about, shown or "-")
-    console().print(table, soft_wrap=False)
+            table.add_row(memory, " ".join(paragraph.split()).partition(". ")[0])
+    table_console().print(table, soft_wrap=False)
 
 
 @command.command(
@@ -80,28 +121,67 @@ def _memories() -> None:
 )
 @include_option
 def _tasks(include: tuple[Path, ...]) -> None:
-    """Tasks and groups of tasks."""
+    """Tasks and groups of tasks; those that differ in a size alone in one line."""
     catalog = Catalog.find_installed(include)
     packaged = Catalog.find_packaged().tasks
     for suite, tasks in split_by_suite(catalog.tasks.values()).items():
         table = RichTable(suite, "what it evaluates", "data", box=box.SIMPLE_HEAD)
         for group, members in catalog.groups.items():
             if any(task in tasks for task in catalog.expand(members)):
-                table.add_row(group, f"group: {', '.join(members)}", "")
+                joined = _join_sizes([(member, "", "") for member in members], full=True)
+                table.add_row(group, f"group: {', '.join(name for name, *_ in joined)}", "")
+        usable = []
+        unusable = []
         for task in tasks:
             try:
                 if task.name not in packaged:  # which are good, and suites take long to import
                     find_suite(suite).check_task(task)
-            except (
-                InfthorError
-            ) as error:  # a file of one's own, or another package's: say so, list the others
-                table.add_row(task.name, f"not usable: {error}", "", style="red")
-                continue
-            settings = dict(task.settings.get("dataset_kwargs", {}))
-            data = settings.pop("bundled", "--data")
-            without_description = ", ".join(f"{name} {value}" for name, value in settings.items())
-            table.add_row(task.name, task.description or without_description, str(data))
-        console().print(table, soft_wrap=False)
+            except InfthorError as error:
+                # A file of one's own, or another package's: say so, list the others.
+                unusable.append((task.name, f"not usable: {error}", ""))
+            else:
+                usable.append(_task_row(task))
+        for row in _join_sizes(usable):
+            table.add_row(*row)
+        for row in unusable:
+            table.add_row(*row, style="red")
+        table_console().print(table, soft_wrap=False)
+
+
+def _task_row(task: TaskFile) -> _TaskRow:
+    settings = dict(task.settings.get("dataset_kwargs", {}))
+    data = settings.pop("bundled", "--data")
+    without_description = ", ".join(f"{name} {value}" for name, value in settings.items())
+    return task.name, task.description or without_description, str(data)
+
+
+def _join_sizes(rows: Iterable[_TaskRow], *, full: bool = False) -> list[_TaskRow]:
+    """Join the tasks that differ in the size at their names' end alone into one row each.
+
+    Args:
+        rows: name, description and data of each task; descriptions have sizes in capitals.
+        full: whether to write every size of several, rather than the first and the last.
+    """
+    families: dict[_TaskRow, list[str]] = {}
+    for name, about, data in rows:
+        match = _SIZE.search(name)
+        size = match[0] if match is not None else ""
+        pattern = about.replace(size.upper(), _SIZE_HERE) if size else about
+        families.setdefault((name.removesuffix(size), pattern, data), []).append(size)
+    joined = []
+    for (stem, pattern, data), sizes in families.items():
+        text = sizes[0]
+        if len(sizes) > 1:
+            ordered = sorted(sizes, key=_tokens)
+            listed = ordered if full or len(ordered) == 2 else [ordered[0], "...", ordered[-1]]
+            text = f"{{{','.join(listed)}}}"
+        joined.append((f"{stem}{text}", pattern.replace(_SIZE_HERE, text.upper()), data))
+    return joined
+
+
+def _tokens(size: str) -> int:
+    """Return the thousands of tokens of a size at the end of a task's name, such as 8k or 1m."""
+    return int(size[:-1]) * (1000 if size.endswith("m") else 1)
 
 
 @command.command("scenes", cls=ExampleCommand, example="infthor-eval ls scenes")
@@ -125,8 +205,7 @@ def _scenes(data: Path | None) -> None:
 @command.command("runs", cls=ExampleCommand, example="infthor-eval ls runs results")
 @click.argument("folder", metavar="[DIR]", type=PATH, default=Path("results"))
 def _runs(folder: Path) -> None:
-    """Runs below DIR (default: results): units done, missing and failed, and the primary metric of
-    each task."""
+    """Runs below DIR (default: results): units done, missing, failed; primary metrics of tasks."""
     runs = list(find_runs(folder))
     stored = [run for run in runs if isinstance(run, StoredRun)]
     if not runs:
@@ -144,33 +223,21 @@ def _runs(folder: Path) -> None:
 
 def _row(label: str, run: StoredRun) -> Row:
     n_missing = "?" if run.n_missing is None else str(run.n_missing)
+    counts = (str(run.n_done), n_missing, str(run.n_failed))
     age = _age(time.time() - run.changed)
-    return Row(
-        (
-            label,
-            run.header.suite,
-            str(run.n_done),
-            n_missing,
-            str(run.n_failed),
-            _numbers(run),
-            age,
-            str(run.folder),
-        )
-    )
+    return Row((label, run.header.suite, *counts, _numbers(run), age, str(run.folder)))
 
 
 def _numbers(run: StoredRun) -> str:
     """The tasks with their primary metrics, as many as fit into a row."""
     tasks = list(run.header.config.tasks)
-    numbers = [
-        f"{task} {100 * run.primary_metrics[task].mean:.1f}"
-        if task in run.primary_metrics
-        else task
-        for task in tasks[:_MAX_TASKS]
-    ]
-    return ", ".join(
-        [*numbers, *([f"{len(tasks) - _MAX_TASKS} more"] if len(tasks) > _MAX_TASKS else [])]
-    )
+    numbers = []
+    for task in tasks[:_MAX_TASKS]:
+        metric = run.primary_metrics.get(task)
+        numbers.append(task if metric is None else f"{task} {100 * metric.mean:.1f}")
+    if len(tasks) > _MAX_TASKS:
+        numbers.append(f"{len(tasks) - _MAX_TASKS} more")
+    return ", ".join(numbers)
 
 
 def _age(seconds: float) -> str:

@@ -44,17 +44,13 @@ _COLUMNS = ("units", "measured", "frames", "requests", "tokens read", "encoded",
     help="Price of a worker's machine, for the cost.",
 )
 @run_options
-def command(measure: int, price_per_hour: float | None, **given: Any) -> int:
+def command(measure: int, price_per_hour: float | None, **params: Any) -> int:
     """Estimate what a run would take: requests, tokens, frames, memory, time and money.
 
     Takes the options of `run`. A few units of each task are evaluated to measure, and not kept.
     """
-    return max(
-        [
-            plan(*request, measure, price_per_hour)
-            for request in RunOptions.from_click(given).requests()
-        ]
-    )
+    requests = RunOptions.from_click(params).requests()
+    return max([plan(*request, measure, price_per_hour) for request in requests])
 
 
 def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float | None) -> int:
@@ -87,37 +83,29 @@ def plan(request: RunRequest, suite: Suite, measure: int, price_per_hour: float 
 
 def _table(request: RunRequest, tasks: Sequence[TaskEstimate]) -> Table:
     title = (
-        f"Estimate for {request.label}, from {sum(item.n_measured for item in tasks)} measured "
+        f"Estimate for {request.label}, from {sum(task.n_measured for task in tasks)} measured "
         "samples"
     )
     return Table(title, (Column("task", False), *map(Column, _COLUMNS)), tuple(map(_row, tasks)))
 
 
-def _row(item: TaskEstimate) -> Row:
-    total = item.total
-    counts = (
-        item.n_units,
-        item.n_measured,
-        item.frames,
-        total.requests,
-        total.read,
-        total.encoded,
-        total.written,
-    )
-    return Row(
-        (item.task, *(f"{round(count):,}" for count in counts), format_duration(total.seconds))
-    )
+def _row(task: TaskEstimate) -> Row:
+    total = task.total
+    counts = [task.n_units, task.n_measured, task.frames, total.requests]
+    counts += [total.read, total.encoded, total.written]
+    cells = (f"{round(count):,}" for count in counts)
+    return Row((task.task, *cells, format_duration(total.seconds)))
 
 
 def _totals(
     request: RunRequest, tasks: Sequence[TaskEstimate], price_per_hour: float | None
 ) -> list[str]:
-    seconds = sum(item.total.seconds for item in tasks)
+    seconds = sum(task.total.seconds for task in tasks)
     workers = request.worker_settings.workers
     by_all = f", {format_duration(seconds / workers)} by {workers} workers" if workers > 1 else ""
     lines = [f"time: {format_duration(seconds)} of one worker{by_all}, loading not counted"]
     lines.append(f"memory: {_peak_megabytes():,} MB at most while measuring{_gpu_memory()}")
-    cost = sum(item.total.cost for item in tasks)
+    cost = sum(task.total.cost for task in tasks)
     if cost:
         lines.append(f"money: {cost:.2f} US dollars, by the prices of the model")
     if price_per_hour is not None:

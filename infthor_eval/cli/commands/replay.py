@@ -103,8 +103,8 @@ def _print(summary: ReplaySummary, output: Console) -> None:
         if table is not None:
             print_table(table, output)
     output.print(regular_numbers(summary))
-    for item in summary.diverged[:_MAX_SHOWN]:
-        line = f"diverged: {item.traj_id}: step {item.step}: {item.action}: {item.error}"
+    for first in summary.diverged[:_MAX_SHOWN]:
+        line = f"diverged: {first.traj_id}: step {first.step}: {first.action}: {first.error}"
         output.print(line)
     hidden = len(summary.diverged) - _MAX_SHOWN
     if hidden > 0:

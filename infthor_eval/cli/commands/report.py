@@ -57,8 +57,7 @@ _FOLDER = Path("results/figures")
     "--figure",
     metavar="WHICH",
     help="Draw a figure instead: 6 (reward of arms along trajectories), 7 (reward of plans over "
-    "steps and context "
-    "tokens), radius (success of arms by the hand's radius).",
+    "steps and context tokens), radius (success of arms by the hand's radius).",
 )
 @click.option(
     "--panels",
@@ -148,11 +147,8 @@ def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Pat
         suite: find_presenter(suite).figures for suite in suite_names()
     }
     if not any(name in figures for figures in owners.values()):
-        abouts = sorted(
-            f"{key} ({figure.about})"
-            for figures in owners.values()
-            for key, figure in figures.items()
-        )
+        known = [item for figures in owners.values() for item in figures.items()]
+        abouts = sorted(f"{key} ({figure.about})" for key, figure in known)
         raise UsageError(
             f"--figure {name}: is none that can be drawn; there are {', '.join(abouts)}"
         )
@@ -171,16 +167,13 @@ def _draw(folders: tuple[Path, ...], name: str, request: FigureRequest, out: Pat
 def _require_figure(
     runs: Sequence[ReportRun], name: str, owners: Mapping[str, Mapping[str, Figure]]
 ) -> Figure:
-    """Return the figure of a name; two packages may offer different ones, so the first run
-    decides."""
+    """Return the figure of a name; of different ones of two packages the first run decides."""
     from infthor_eval.errors import UsageError
 
     first = runs[0].suite.name
-    owner = (
-        first
-        if name in owners[first]
-        else next(suite for suite, figures in owners.items() if name in figures)
-    )
+    owner = first
+    if name not in owners[first]:
+        owner = next(suite for suite, figures in owners.items() if name in figures)
     for run in runs:
         if run.suite.name != owner:
             raise UsageError(

@@ -99,8 +99,8 @@ def command(
     source = read_source(folder)
     own = find_scorer(scorer) if scorer is not None else None
     prompt = judge_prompt or _JUDGE_PROMPT
-    asked = (judge_tokens or _JUDGE_TOKENS[prompt], seed, prompt)
-    with _load_judge(judge[0], judge_args, *asked) if judge else nullcontext() as loaded:
+    settings = (judge_tokens or _JUDGE_TOKENS[prompt], seed, prompt)
+    with _load_judge(judge[0], judge_args, *settings) if judge else nullcontext() as loaded:
         rescoring = score_again(source, own, loaded)
         rescored = _store(rescoring, output)
     _print(rescoring, rescored)
@@ -164,11 +164,8 @@ def _print_counts(report: RescoringReport) -> None:
         (report.n_without_reply, "without a reply stay failed"),
         (report.n_missing, "were never asked"),
     )
-    print_note(
-        "; ".join(
-            [f"{report.n_scored} replies scored", *(f"{n} {what}" for n, what in counts if n)]
-        )
-    )
+    others = [f"{n} {what}" for n, what in counts if n]
+    print_note("; ".join([f"{report.n_scored} replies scored", *others]))
     for task, names in report.left_out.items():
         print_note(
             f"{task}: {', '.join(names)}: left out, as the journal does not say how to compute it",

@@ -9,8 +9,12 @@ import click
 
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.run import RunOptions, run_options
-from infthor_eval.cli.options.show import ShowOptions, show_options
-from infthor_eval.cli.options.trackers import parse_trackers, tracker_options
+from infthor_eval.cli.options.show import (
+    ShowOptions,
+    parse_trackers,
+    show_options,
+    tracker_options,
+)
 from infthor_eval.cli.progress.notes import NOTES, print_failure, print_note, quiet_notes
 from infthor_eval.cli.progress.runs import execute_with_progress
 from infthor_eval.cli.results import RunResults, print_results
@@ -34,14 +38,13 @@ __all__ = ["command", "evaluate"]
 @show_options
 @tracker_options
 @click.option("--quiet", is_flag=True, help="Print only failures, and the runs' folders.")
-def command(**given: Any) -> int:
-    """Evaluate MODEL on TASKS and print the results; --full prints all of them, beside the
-    published ones.
+def command(**params: Any) -> int:
+    """Evaluate MODEL on TASKS and print the results; --full prints all, beside the published ones.
 
     Stop it whenever you like: the same command continues where it stopped.
     """
-    requests = RunOptions.from_click(given).requests()
-    return evaluate(requests, ShowOptions.from_click(given), parse_trackers(given))
+    requests = RunOptions.from_click(params).requests()
+    return evaluate(requests, ShowOptions.from_click(params), parse_trackers(params))
 
 
 def evaluate(
@@ -66,9 +69,8 @@ def evaluate(
 
     senders = Trackers(**(trackers or {}))
     with quiet_notes(show.quiet):
-        with NOTES.status(
-            "reading the tasks and their data"
-        ):  # retrieval embeds every frame: minutes
+        # Retrieval embeds every frame, which takes minutes.
+        with NOTES.status("reading the tasks and their data"):
             runs = [prepare(request, suite) for request, suite in requests]
         for model in dict.fromkeys(request.model for request, _ in requests):
             if note := model_note(model):
@@ -80,8 +82,10 @@ def evaluate(
             if outcomes[-1].n_missing:
                 break
     results = [
-        RunResults(run.folder, run.run.suite, run.summary, run.usage, run.n_missing)
-        for run in outcomes
+        RunResults(
+            outcome.folder, outcome.run.suite, outcome.summary, outcome.usage, outcome.n_missing
+        )
+        for outcome in outcomes
     ]
     print_results(results, show)
     n_failed = sum(map(_print_failures, outcomes))  # every run prints its failures
@@ -91,9 +95,8 @@ def evaluate(
 
 
 def _print_if_void(outcome: RunOutcome) -> bool:
-    is_void = bool(outcome.records) and all(
-        record.excluded is not None for record in outcome.records
-    )
+    counted = [record for record in outcome.records if record.excluded is None]
+    is_void = bool(outcome.records) and not counted
     if is_void:
         print_failure(f"{outcome.summary.header.name}: no result: every sample was excluded")
     return is_void

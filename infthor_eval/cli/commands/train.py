@@ -57,8 +57,7 @@ _STAGES = {
     type=PATH,
     metavar="SET",
     help="Replayed set (`replay`) to train on, with a question file if the recipe needs questions; "
-    "may be repeated. "
-    "The recipe tiny generates its own by default.",
+    "may be repeated. The recipe tiny generates its own by default.",
 )
 @click.option(
     "--model", metavar="NAME", help="Model to use instead of the recipe's, without its options."
@@ -134,9 +133,8 @@ def command(
     settings = parse_pairs(changes, "--set")
     settings |= {} if model is None else {"model": model}
     settings |= {} if words is None else {"words": words}
-    settings |= {
-        f"model_args.{key}": value for key, value in parse_model_args(model_args or "").items()
-    }
+    model_options = parse_model_args(model_args or "")
+    settings |= {f"model_args.{key}": value for key, value in model_options.items()}
     recipe = read_recipe(name, settings)
     if not dry_run and (gpus is not None or tflops is not None):
         raise click.UsageError("--gpus and --tflops are for --dry-run; add it, or leave them out")
@@ -160,8 +158,7 @@ def command(
 def _fine_tune(
     recipe: Recipe, folders: Sequence[Path], out: Path, machine: tuple[int, float] | None
 ) -> None:
-    """Fine-tune a model and print its last loss; for a machine (GPUs, TFLOP/s of each), print an
-    estimate instead."""
+    """Fine-tune a model; for a machine (GPUs, TFLOP/s of each), print an estimate instead."""
     from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 
     run = prepare_run(recipe, folders)
@@ -190,7 +187,7 @@ def _fine_tune(
 
 def _print_data(run: TrainingRun) -> None:
     data = run.data
-    longest = max(item.n_tokens for item in data.sequences)
+    longest = max(sequence.n_tokens for sequence in data.sequences)
     print_note(
         f"{run.recipe.title}: {len(data.sequences):,} sequences, {data.n_tokens:,} tokens (the "
         f"longest {longest:,}), loss on {data.n_loss_tokens:,}"
@@ -218,8 +215,7 @@ def _print_estimate(run: TrainingRun, n_gpus: int, tflops: float) -> None:
 def _train_small_model(
     recipe: NanoRecipe, folders: Sequence[Path], out: Path, worker_settings: WorkerSettings
 ) -> None:
-    """Train the small model on replayed sets with questions, or on sets generated in `out` if there
-    are none."""
+    """Train the small model on replayed sets with questions; without any, generate one in `out`."""
     from infthor_eval.storage.files import prepare_folder
     from infthor_eval.training.export import export
     from infthor_eval.training.nano.stages import train_small_model
@@ -242,8 +238,7 @@ def _train_small_model(
 def _generate_data(
     scenes: SceneSettings, seed: int, out: Path, worker_settings: WorkerSettings
 ) -> Path:
-    """Generate trajectories in procedural scenes, replay them, and write every question on them;
-    return the set.
+    """Generate and replay trajectories, write every question on them, and return the set.
 
     What is in the folder already is not generated again.
 
@@ -279,8 +274,8 @@ def _generate_data(
         replayed = replay_with_workers(
             selection, embedded_launch(), replayed_set, worker_settings, 1, bar.advance, print_note
         )
-    failures = [str(item) for item in generated.failures]
-    failures += [f"{item.place}: {item.message}" for item in replayed.failures]
+    failures = list(generated.failures)
+    failures += [f"{failure.place}: {failure.message}" for failure in replayed.failures]
     if failures:
         raise DataError(f"{out}: {failures[0]}; give other scenes")
     questions = generate_questions(

@@ -1,5 +1,4 @@
-"""`infthor-eval validate`: keep the questions of a set that at least one of several models can
-answer."""
+"""`infthor-eval validate`: keep the questions of a set that one of several models can answer."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -68,8 +67,7 @@ def command(
     seed: int,
     **workers: Any,
 ) -> int:
-    """Ask each model every question of SET with its clue frames alone; keep what one of them
-    answers.
+    """Ask each model every question of SET with its clue frames alone; keep what one answers.
 
     Rejected questions are written to rejected.jsonl with every reply. Questions with several clues
     that no model answers are written to inspection.csv and inspection.html: decide on them, and
@@ -121,10 +119,7 @@ def validate(
             return 130
     answered = {record.id for record in outcomes[0].records}
     questions = [question for question in data.questions if question.id in answered]
-    replies = [
-        {record.id: record.payload.reply for record in outcome.records} for outcome in outcomes
-    ]
-    by_model = dict(zip(_model_names(outcomes), replies, strict=True))
+    by_model = dict(zip(_model_names(outcomes), map(_replies, outcomes), strict=True))
     verdicts = judge_questions(
         questions, by_model, decisions, scorer, partial_credit=partial_credit
     )
@@ -141,9 +136,13 @@ def validate(
         f"{len(questions)} questions: {len(verdicts.kept)} kept, {len(verdicts.rejected)} "
         f"rejected, {len(verdicts.to_inspect)} to inspect: {out}"
     )
-    return int(
-        any(record.failure is not None for outcome in outcomes for record in outcome.records)
-    )
+    records = [record for outcome in outcomes for record in outcome.records]
+    return int(any(record.failure is not None for record in records))
+
+
+def _replies(outcome: RunOutcome) -> dict[str, Any]:
+    """Return the replies of a run by question."""
+    return {record.id: record.payload.reply for record in outcome.records}
 
 
 def _model_names(outcomes: Sequence[RunOutcome]) -> list[str]:
@@ -158,7 +157,7 @@ def _model_names(outcomes: Sequence[RunOutcome]) -> list[str]:
 
 def _summarise_kept(outcome: RunOutcome, verdicts: Verdicts) -> RunSummary:
     """The run's summary on the questions that are kept."""
-    kept = {item.question.id for item in verdicts.kept}
+    kept = {verdict.question.id for verdict in verdicts.kept}
     header = outcome.summary.header
     records = [record for record in outcome.records if record.id in kept]
     return RunSummary(header, outcome.run.suite.summarise(header, records))

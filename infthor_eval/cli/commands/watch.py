@@ -103,9 +103,8 @@ def command(
     choice = [text.strip() for text in (plans, episode) if text is not None]
     parts = [recorded.header.name, *recording.tasks, recording.trajectory, *choice]
     path = prepare_file(sheet or out or _default_file(parts))
-    _write(
-        recorded, recording, path, data=data, scenes=scenes, fps=None if sheet is not None else fps
-    )
+    rate = None if sheet is not None else fps
+    _write(recorded, recording, path, data=data, scenes=scenes, fps=rate)
 
 
 def _require_replay(run: PresentedRun) -> Replay:
@@ -113,10 +112,8 @@ def _require_replay(run: PresentedRun) -> Replay:
     from infthor_eval.suites import find_presenter, suite_names
 
     if run.presenter.replay is None:
-        others = sorted(
-            (name for name in suite_names() if find_presenter(name).replay is not None),
-            reverse=True,
-        )
+        others = [name for name in suite_names() if find_presenter(name).replay is not None]
+        others.sort(reverse=True)
         raise UsageError(
             f"{run.folder}: is a run of {run.suite.name}, and only runs of {' and '.join(others)} "
             "can be watched"
@@ -151,8 +148,7 @@ def _write(
     scenes: Path | None,
     fps: float | None,
 ) -> None:
-    """Replay the episodes of a recording and write their pictures: a film, or a sheet if `fps` is
-    None."""
+    """Replay recorded episodes and write a film of them, or a sheet if `fps` is None."""
     from infthor_eval.cli.progress.bar import PacedBar
     from infthor_eval.formats.animations import write_animation
     from infthor_eval.terminal import error_console, print_line, progress_bar

@@ -18,7 +18,8 @@ def _read_file(context: click.Context, option: click.Parameter, path: Path | Non
         return
     from infthor_eval.runs.stored.command import read_options
 
-    known = {_long_name(item): item for item in context.command.params if item is not option}
+    params = (param for param in context.command.params if param is not option)
+    known = {_long_name(param): param for param in params}
     context.default_map = {}
     for name, value in read_options(path).items():
         if name not in known:
@@ -48,11 +49,8 @@ def comes_from_file(name: str) -> bool:
 
 def _long_name(option: click.Parameter) -> str:
     """The name of an option in files."""
-    return (
-        next(name for name in option.opts if name.startswith("--"))
-        .removeprefix("--")
-        .replace("-", "_")
-    )
+    long = next(name for name in option.opts if name.startswith("--"))
+    return long.removeprefix("--").replace("-", "_")
 
 
 def _as_typed(path: Path, name: str, value: Any, option: click.Parameter) -> Any:
@@ -62,11 +60,11 @@ def _as_typed(path: Path, name: str, value: Any, option: click.Parameter) -> Any
             raise UsageError(f"{path}: {name} is {value!r:.60}; it is true or false")
         return value
     if isinstance(value, Mapping) and isinstance(option.type, ModelArgs):
-        return {str(key): _text(path, f"{name}: {key}", item) for key, item in value.items()}
+        return {str(key): _text(path, f"{name}: {key}", one) for key, one in value.items()}
     if option.multiple:
-        return [_text(path, name, item) for item in (value if isinstance(value, list) else [value])]
+        return [_text(path, name, one) for one in (value if isinstance(value, list) else [value])]
     if isinstance(value, list):
-        return ",".join(_text(path, name, item) for item in value)
+        return ",".join(_text(path, name, one) for one in value)
     return _text(path, name, value)
 
 

@@ -25,12 +25,8 @@ def refuse_repeated_options(
         if inner is not None:
             refuse_repeated_options(context, inner, arguments[1:])
         return
-    with_one_value = {
-        name: option
-        for option in command.params
-        if _takes_one_value(option)
-        for name in option.opts
-    }
+    options = filter(_takes_one_value, command.params)
+    with_one_value = {name for option in options for name in option.opts}
     seen: set[str] = set()
     rest = iter(arguments)
     for argument in rest:

@@ -42,8 +42,7 @@ _OPTIONS = (
         required=True,
         metavar="MODEL,...",
         help="Model name, or several with commas (see `ls models`); MODEL:K=V,... gives a model "
-        "its own options, "
-        "and it may be named again with others.",
+        "its own options, and it may be named again with others.",
     ),
     click.option(
         "--engine",
@@ -60,7 +59,7 @@ _OPTIONS = (
         type=ModelArgs(),
         default="",
         metavar="K=V,...",
-        help="Options of the model, or of all of them (see `ls models`).",
+        help="Options of the model, or of all of them (see `ls models NAME`).",
     ),
     click.option(
         "--rope",
@@ -96,9 +95,8 @@ _OPTIONS = (
         type=WholeNumber(1),
         metavar="N",
         help="Evaluate only N of each task (questions, trajectories of plans, episodes of arms), "
-        "evenly from all "
-        "trajectories, drawn by --seed; a larger N includes these. lm-eval's own command takes the "
-        "first N instead.",
+        "evenly from all trajectories, drawn by --seed; a larger N includes these. lm-eval's own "
+        "command takes the first N instead.",
     ),
     click.option(
         "--output", type=PATH, default=Path("results"), show_default=True, help="Results folder."
@@ -119,18 +117,14 @@ _OPTIONS = (
         "--recover", is_flag=True, help="Resume without the bad lines of a damaged journal."
     ),
 )
-_MODEL_OPTIONS = (
-    "rope",
-    "max_tokens_total",
-    "max_cost",
-)  # options of the command that are options of the model
+# Options of the command that are options of the model.
+_MODEL_OPTIONS = ("rope", "max_tokens_total", "max_cost")
 _CAPS = ("max_tokens_total", "max_cost")
 _AS_GIVEN = ("data", "output", "limit", "seed", "name", "fresh", "recover", "include")
 
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add all options of a run to a command, which passes its parameters to
-    `RunOptions.from_click`."""
+    """Add all options of a run to a command, for `RunOptions.from_click`."""
     for option in reversed((config_option, *_OPTIONS, worker_options, suite_options)):
         command = option(command)
     refuse_duplicate_options(command)
@@ -170,45 +164,43 @@ class RunOptions:
     suite_options: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
-    def from_click(cls, given: Mapping[str, Any]) -> "RunOptions":
+    def from_click(cls, params: Mapping[str, Any]) -> "RunOptions":
         """Return the options among the parameters of a command.
 
         Raises:
             click.UsageError: options that exclude each other.
             UsageError: an engine that does not run the model.
         """
-        for_all = _options_of_all_models(given)
-        engine = given["engine"]
-        models = _with_threads(
-            given["threads"],
-            [
-                ModelSpec(name_on_engine(name, engine) if engine else name, {**for_all, **options})
-                for name, options in given["models"]
-            ],
-        )
+        for_all = _options_of_all_models(params)
+        engine = params["engine"]
+        specs = []
+        for name, options in params["models"]:
+            on_engine = name_on_engine(name, engine) if engine else name
+            specs.append(ModelSpec(on_engine, {**for_all, **options}))
+        models = _with_threads(params["threads"], specs)
         workers = parse_worker_settings(
-            given["workers"], given["ray_address"], given["gpus_per_worker"]
+            params["workers"], params["ray_address"], params["gpus_per_worker"]
         )
-        capped = next((cap for cap in _CAPS if any(cap in model.options for model in models)), None)
+        used = {option for model in models for option in model.options}
+        capped = next((cap for cap in _CAPS if cap in used), None)
         if capped and not workers.is_local:
             raise click.UsageError(
                 f"{capped} counts the requests of one process; leave out --workers, or the cap"
             )
-        if given["name"] is not None and len(models) > 1:
+        if params["name"] is not None and len(models) > 1:
             raise click.UsageError(
-                f"--name {given['name']}: names one run, but {len(models)} models are given"
+                f"--name {params['name']}: names one run, but {len(models)} models are given"
             )
         return cls(
             models=models,
-            tasks=split_names(given["tasks"], "--tasks"),
+            tasks=split_names(params["tasks"], "--tasks"),
             worker_settings=workers,
-            suite_options=suite_values(given),
-            **{name: given[name] for name in _AS_GIVEN},
+            suite_options=suite_values(params),
+            **{name: params[name] for name in _AS_GIVEN},
         )
 
     def requests(self) -> list[tuple[RunRequest, Suite]]:
-        """Return the runs, each with its suite: one for each model, suite, and value of an option
-        that takes several.
+        """Return the runs, each with its suite: one a model, suite, and value of an `each` option.
 
         Raises:
             UsageError: an unknown task, a name that cannot be a folder's, or a baseline or an
@@ -224,16 +216,16 @@ class RunOptions:
         requests = []
         for model in self.models:
             for suite, tasks in by_suite.items():
+                # The folder of one suite's run has the tasks' names as typed; of several, each
+                # its own tasks.
+                names = tuple(task.name for task in tasks)
+                typed_names = self.tasks if len(by_suite) == 1 else names
                 _refuse_baseline_of_others(model.name, suite, tasks[0].name)
                 for options in expand_suite_options(suite, self.suite_options, by_suite.keys()):
                     request = RunRequest(
                         model=model.name,
                         tasks=TaskRequest(tasks, options, self.data, self.limit, self.seed),
-                        # The folder of one suite's run has the tasks' names as typed; of several,
-                        # each its own tasks.
-                        asked=self.tasks
-                        if len(by_suite) == 1
-                        else tuple(task.name for task in tasks),
+                        asked=typed_names,
                         output=self.output,
                         model_options=model.options,
                         name=self.name,
@@ -278,11 +270,11 @@ def _with_threads(threads: int | None, models: Sequence[ModelSpec]) -> tuple[Mod
     )
 
 
-def _options_of_all_models(given: Mapping[str, Any]) -> dict[str, str]:
+def _options_of_all_models(params: Mapping[str, Any]) -> dict[str, str]:
     """The options in --model-args, with those that are options of the command as well."""
-    options = dict(given["model_args"])
+    options = dict(params["model_args"])
     for name in _MODEL_OPTIONS:
-        if given[name] is None:
+        if params[name] is None:
             continue
         if name in options and comes_from_file(name) == comes_from_file("model_args"):
             typed = f"--{name.replace('_', '-')}"
@@ -290,5 +282,5 @@ def _options_of_all_models(given: Mapping[str, Any]) -> dict[str, str]:
                 f"{typed} and {name}= in --model-args are the same option; give one of them"
             )
         if name not in options or not comes_from_file(name):  # what is typed wins over the file
-            options[name] = str(given[name])
+            options[name] = str(params[name])
     return options

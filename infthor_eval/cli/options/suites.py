@@ -8,6 +8,7 @@ from types import NoneType
 from typing import Any
 
 import click
+import msgspec
 
 from infthor_eval.cli.options.values import WholeNumber, split_names
 from infthor_eval.errors import UsageError
@@ -22,34 +23,29 @@ def suite_options(command: Callable[..., Any]) -> Callable[..., Any]:
     Suites with an option of one name share it; its help has the text of each.
     """
     for name, by_suite in reversed(_options_by_name().items()):
-        first, item = next(iter(by_suite.items()))
+        first, option = next(iter(by_suite.items()))
         kind = _value_type(typing.get_type_hints(options_class(first))[name])
-        choices = item.metadata.get("choices")
+        choices = option.metadata.get("choices")
+        types = {bool: None, int: WholeNumber()}
         command = click.option(
             f"--{name.replace('_', '-')}",
-            type=None
-            if kind is bool
-            else click.Choice(choices)
-            if choices
-            else WholeNumber()
-            if kind is int
-            else kind,
+            type=click.Choice(choices) if choices else types.get(kind, kind),
             is_flag=kind is bool,
             default=None,
-            metavar=item.metadata.get("metavar"),
+            metavar=option.metadata.get("metavar"),
             help=_help(by_suite),
         )(command)
     return command
 
 
-def suite_values(given: Mapping[str, Any]) -> dict[str, Any]:
+def suite_values(params: Mapping[str, Any]) -> dict[str, Any]:
     """Return the options of all suites among the parameters of a command; None where not given."""
     # A suite that was installed after the command was imported has options that the command does
     # not know.
-    return {name: given.get(name) for name in _options_by_name()}
+    return {name: params.get(name) for name in _options_by_name()}
 
 
-def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[str]) -> list[Any]:
+def expand_suite_options(suite: str, params: Mapping[str, Any], used: Collection[str]) -> list[Any]:
     """Return the options of a suite for each of its runs.
 
     An option with `each` in its metadata takes several values with commas, and there is a run for
@@ -57,23 +53,23 @@ def expand_suite_options(suite: str, given: Mapping[str, Any], used: Collection[
 
     Args:
         suite: name of the suite.
-        given: options of all suites by name; None where not given.
+        params: options of all suites by name; None where not given.
         used: names of the suites that the tasks belong to.
 
     Raises:
         UsageError: an option belongs to no suite that is used.
     """
-    _refuse_unused(given, used)
+    _refuse_unused(params, used)
     kinds = typing.get_type_hints(options_class(suite))
     values: dict[str, list[Any]] = {}
-    for item in fields(options_class(suite)):
-        if given.get(item.name) is not None:
-            typed = (
-                split_names(given[item.name], f"--{item.name}")
-                if item.metadata.get("each")
-                else [given[item.name]]
-            )
-            values[item.name] = [_value_type(kinds[item.name])(value) for value in typed]
+    for option in fields(options_class(suite)):
+        if params.get(option.name) is not None:
+            typed = [params[option.name]]
+            if option.metadata.get("each"):
+                typed = list(split_names(params[option.name], f"--{option.name}"))
+            values[option.name] = [
+                msgspec.convert(value, kinds[option.name], strict=False) for value in typed
+            ]
     return [
         options_class(suite)(**dict(zip(values, chosen, strict=True)))
         for chosen in product(*values.values())
@@ -102,14 +98,14 @@ def _options_by_name() -> dict[str, dict[str, Field[Any]]]:
     """The options of all suites by name, then by suite."""
     options: dict[str, dict[str, Field[Any]]] = {}
     for suite in suite_names():
-        for item in fields(options_class(suite)):
-            options.setdefault(item.name, {})[suite] = item
+        for option in fields(options_class(suite)):
+            options.setdefault(option.name, {})[suite] = option
     return options
 
 
-def _refuse_unused(given: Mapping[str, Any], used: Collection[str]) -> None:
+def _refuse_unused(params: Mapping[str, Any], used: Collection[str]) -> None:
     for name, by_suite in _options_by_name().items():
-        if given.get(name) is not None and not set(by_suite) & set(used):
+        if params.get(name) is not None and not set(by_suite) & set(used):
             raise UsageError(
                 f"--{name.replace('_', '-')} is for tasks of {' and '.join(by_suite)}; --tasks "
                 "names none of these"
@@ -119,8 +115,8 @@ def _refuse_unused(given: Mapping[str, Any], used: Collection[str]) -> None:
 def _help(by_suite: Mapping[str, Field[Any]]) -> str:
     """The text of each suite with the suites' names; equal texts once."""
     suites: dict[str, list[str]] = {}
-    for suite, item in by_suite.items():
-        suites.setdefault(item.metadata.get("help", ""), []).append(suite)
+    for suite, option in by_suite.items():
+        suites.setdefault(option.metadata.get("help", ""), []).append(suite)
     return " ".join(f"{text} [{', '.join(names)}]" for text, names in suites.items())
 
 

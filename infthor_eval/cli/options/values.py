@@ -28,13 +28,7 @@ __all__ = [
 ]
 
 PATH = click.Path(path_type=Path)
-SCENE_KINDS = (
-    "kitchen",
-    "living-room",
-    "bedroom",
-    "bathroom",
-    "house",
-)  # procedural scenes, KIND-SEED
+SCENE_KINDS = ("kitchen", "living-room", "bedroom", "bathroom", "house")  # procedural: KIND-SEED
 _LARGEST = 2**63 - 1  # the largest integer of a run's JSON
 
 floor_plans_option = click.option(
@@ -65,8 +59,7 @@ class ModelSpec(NamedTuple):
 
 
 class WholeNumber(click.ParamType):
-    """A whole number that fits into a run's JSON. An `IntRange` would print that limit into every
-    help text.
+    """A whole number that fits into a run's JSON; an `IntRange` prints that limit in its help.
 
     Args:
         minimum: the smallest number allowed.
@@ -88,8 +81,7 @@ class WholeNumber(click.ParamType):
 
 
 class FiniteFloat(click.FloatRange):
-    """A number within a range. `FloatRange` lets "nan" through, which is neither below nor above a
-    bound."""
+    """A number within a range; `FloatRange` lets "nan" through, which no bound excludes."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -102,24 +94,18 @@ class FiniteFloat(click.FloatRange):
 
 
 class SceneName(click.ParamType):
-    """The name of a procedural scene or of a floor plan; whether there is such a floor plan is not
-    checked."""
+    """The name of a procedural scene or of a floor plan, which need not exist."""
 
     name = "SCENE"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """See `click.ParamType`."""
         kind, _, seed = str(value).rpartition("-")
-        if (kind in SCENE_KINDS and re.fullmatch(r"[0-9]+", seed)) or str(value).startswith(
-            "FloorPlan"
-        ):
+        has_seed = re.fullmatch(r"[0-9]+", seed) is not None
+        if (kind in SCENE_KINDS and has_seed) or str(value).startswith("FloorPlan"):
             return str(value)
-        number = seed if re.fullmatch(r"[0-9]+", seed) else "<seed>"
-        raise unknown_name(
-            "scene",
-            value,
-            [*(f"{kind}-{number}" for kind in SCENE_KINDS), "FloorPlan<N> with --data"],
-        )
+        procedural = [f"{kind}-{seed if has_seed else '<seed>'}" for kind in SCENE_KINDS]
+        raise unknown_name("scene", value, [*procedural, "FloorPlan<N> with --data"])
 
 
 class ModelArgs(click.ParamType):
@@ -137,8 +123,7 @@ class ModelArgs(click.ParamType):
 
 
 class ModelList(click.ParamType):
-    """Models by name, each with options where it has any: `A:k=v,k=v,B`. Each `A:` begins another
-    model."""
+    """Models by name, each with its options: `A:k=v,k=v,B`. Each `A:` begins another model."""
 
     name = "MODEL[:K=V,...],..."
 
@@ -146,32 +131,29 @@ class ModelList(click.ParamType):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[ModelSpec, ...]:
         """See `click.ParamType`."""
-        return (
-            value
-            if isinstance(value, tuple)
-            else _parse_models(value, param.opts[0] if param else "--model")
-        )
+        if isinstance(value, tuple):
+            return value
+        return _parse_models(value, param.opts[0] if param else "--model")
 
 
 def _parse_models(text: str, option: str) -> tuple[ModelSpec, ...]:
     models: list[tuple[str, list[str]]] = []
-    for item in filter(None, (part.strip() for part in text.split(","))):
-        before, equals, _ = item.partition("=")
-        name, colon, _ = before.rpartition(
-            ":"
-        )  # the last colon: a name may hold one (FILE.py:CLASS), a key may not
+    for part in filter(None, map(str.strip, text.split(","))):
+        before, equals, _ = part.partition("=")
+        # The last colon: a name may hold one (FILE.py:CLASS), a key may not.
+        name, colon, _ = before.rpartition(":")
         if not equals:
-            models.append((item, []))
+            models.append((part, []))
         elif colon:
-            models.append((name, [item.removeprefix(f"{name}:")]))
+            models.append((name, [part.removeprefix(f"{name}:")]))
         elif models:
-            models[-1][1].append(item)
+            models[-1][1].append(part)
         else:
-            raise click.UsageError(f"{option}: {item!r} comes before any model; write MODEL:{item}")
-    specs = [ModelSpec(name, parse_pairs(items, f"{option} {name}")) for name, items in models]
+            raise click.UsageError(f"{option}: {part!r} comes before any model; write MODEL:{part}")
+    specs = [ModelSpec(name, parse_pairs(pairs, f"{option} {name}")) for name, pairs in models]
     if not specs or not all(spec.name for spec in specs):
         raise click.UsageError(f"{option} is empty; give a name")
-    return tuple(spec for place, spec in enumerate(specs) if spec not in specs[:place])
+    return tuple(spec for number, spec in enumerate(specs) if spec not in specs[:number])
 
 
 def split_names(text: str, option: str) -> tuple[str, ...]:
@@ -195,13 +177,13 @@ def parse_model_args(text: str) -> dict[str, str]:
     return parse_pairs(text.split(","), "--model-args")
 
 
-def parse_pairs(items: Iterable[str], option: str) -> dict[str, str]:
+def parse_pairs(pairs: Iterable[str], option: str) -> dict[str, str]:
     """Return keys and values written as `k=v`; messages name the option that they belong to.
 
     Raises:
         click.UsageError: an item is not `k=v`, or a key is given twice.
     """
     try:
-        return read_pairs(items, option)
+        return read_pairs(pairs, option)
     except UsageError as error:
         raise click.UsageError(str(error)) from error

@@ -13,8 +13,7 @@ _MAX_WORKERS = 4096
 
 
 def worker_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add --workers, --ray-address and --gpus-per-worker to a command, which passes them to
-    `parse_worker_settings`."""
+    """Add the options of workers to a command, which passes them to `parse_worker_settings`."""
     for option in (
         click.option(
             "--gpus-per-worker",

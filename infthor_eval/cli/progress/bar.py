@@ -52,8 +52,7 @@ class PacedBar:
 
 
 class StepBars:
-    """A bar for each part of a training, started at its first step, when the number of steps is
-    known."""
+    """A bar for each part of a training, started at its first step, when its length is known."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress

@@ -1,5 +1,4 @@
-"""How fast work goes: units a second, the time left, and the share of tokens that came from a
-cache."""
+"""How fast work goes: units a second, time left, share of tokens from a cache."""
 
 __all__ = ["Pace", "format_duration"]
 
@@ -49,8 +48,7 @@ class Pace:
             self._cached_tokens += cached
 
     def speed(self, now: float) -> str:
-        """Return how fast it goes, `1.3 a second, 83 % of tokens cached`; empty before the first
-        new unit."""
+        """Return the pace, `1.3 a second, 83 % of tokens cached`; empty before a new unit."""
         rate = self._rate(now)
         if rate is None:
             return ""

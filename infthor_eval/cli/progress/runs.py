@@ -41,7 +41,8 @@ def print_workload(workload: Workload) -> None:
     """Print warnings, what is skipped, by reason, and what each task costs."""
     for warning in workload.warnings:
         print_note(warning, "yellow")
-    for task, reason, n in count_reasons((item.key.task, item.reason) for item in workload.skipped):
+    skipped = [(unit.key.task, unit.reason) for unit in workload.skipped]
+    for task, reason, n in count_reasons(skipped):
         print_note(f"{task}: {n} sample(s) skipped: {reason}", "yellow")
     for cost in workload.costs:
         print_note(f"{cost.task}: {cost.description}")

@@ -29,8 +29,7 @@ class Stop:
 
 @contextlib.contextmanager
 def handle_signal(number: int, handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    """Handle a signal within the context, if this is the main thread: only that one may set signal
-    handlers."""
+    """Handle a signal within the context, if this is the main thread: others may not."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -43,8 +42,7 @@ def handle_signal(number: int, handler: Callable[[int, FrameType | None], None])
 
 @contextlib.contextmanager
 def stop_on_sigint(print_note: Callable[[str], None]) -> Iterator[Stop]:
-    """Request a stop at the first SIGINT of a run; raise KeyboardInterrupt at the second, or before
-    the first unit."""
+    """Request a stop at the first SIGINT; interrupt at the second, or before the first unit."""
     stop = Stop()
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:

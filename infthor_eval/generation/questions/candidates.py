@@ -60,8 +60,7 @@ class Candidate:
 
     @property
     def is_closed(self) -> bool:
-        """True if the answer is yes, no or a number; answers to a form must be balanced then, or
-        could be guessed."""
+        """True if the answer is yes, no or a number: a form's answers must then be balanced."""
         answer = str(self.answers[0])
         return len(self.answers) == 1 and (answer in {"yes", "no"} or answer.isdecimal())
 
@@ -83,8 +82,7 @@ def with_the(object_type: str) -> str:
 
 
 def in_or_on(object_type: str) -> str:
-    """Return a receptacle type in words with its preposition ("on the coffee table", "in the
-    fridge")."""
+    """Return a receptacle type with its preposition ("on the coffee table", "in the fridge")."""
     return f"{preposition(object_type)} {with_the(object_type)}"
 
 
@@ -94,8 +92,7 @@ def answer_of(object_type: str) -> str:
 
 
 def are_distinguishable(object_types: Sequence[str]) -> bool:
-    """Return True if these types can be the gold answers of one question, so that no scorer
-    confuses two of them."""
+    """Return True if no scorer confuses two of these types as gold answers of one question."""
     words = [answer_of(object_type) for object_type in object_types]
     # The published scorer deletes "and" from lists even inside of words ("candle").
     if len(words) > 1 and any("and" in word for word in words):
@@ -120,19 +117,16 @@ def type_question(
     types: Sequence[str],
     subjects: tuple[str, ...] = (),
 ) -> Iterator[Candidate]:
-    """Yield a question with object types as answers, unless there are none, too many, or two that
-    may be confused."""
+    """Yield a question with object types as answers, unless none, too many, or two alike."""
     if 0 < len(types) <= MANY and are_distinguishable(types):
-        yield Candidate(
-            question_type, form, names, clues, tuple(map(answer_of, types)), (*subjects, *types)
-        )
+        answers = tuple(map(answer_of, types))
+        yield Candidate(question_type, form, names, clues, answers, (*subjects, *types))
 
 
 def listing_question(
     question_type: str, form: str, events: Iterable[tuple[str, int | None]]
 ) -> Iterator[Candidate]:
-    """Yield a question on all object types of some events, with the first frame that shows each
-    type's event.
+    """Yield a question on all types of some events, with the first frame that shows each type's.
 
     Args:
         question_type: type of the question.

@@ -1,7 +1,6 @@
-"""An independent check of questions, which answers their text from the log in another way than the
-rules.
+"""An independent check of questions, which answers their text in another way than the rules.
 
-The answer is computed from the facts of frames (see `solvers`). Facts of the whole log have the
+The answer is computed from the facts of frames (see `facts`). Facts of the whole log have the
 true states of all objects. Facts of clue frames have only what the frame's entry shows: the action
 before it, and the objects that are large enough to be seen. A question is sound if both give its
 gold answer, and no smaller set of clues does.
@@ -12,7 +11,8 @@ from dataclasses import dataclass
 
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.step_log import Step
-from infthor_eval.generation.questions.solvers import FrameFacts, answer, frame_facts
+from infthor_eval.generation.questions.facts import FrameFacts, frame_facts
+from infthor_eval.generation.questions.solvers import answer
 
 __all__ = ["Checker", "Verdict"]
 
@@ -43,7 +43,8 @@ class Checker:
     def __init__(self, steps: Sequence[Step], share: float) -> None:
         """Read the log; objects that fill this share of the frame's pixels count as seen."""
         self._whole = frame_facts(steps, share)
-        self._single = {item.frame: item for item in frame_facts(steps, share, range(len(steps)))}
+        each_frame = frame_facts(steps, share, range(len(steps)))
+        self._single = {frame.number: frame for frame in each_frame}
 
     def verdict(self, question: Question) -> Verdict:
         """Check one question.
@@ -51,7 +52,7 @@ class Checker:
         The clues of an absence question, for which no frame is evidence, count as minimal. For a
         further count, the number of necessary clues must be the answer, and there must be others.
         """
-        gold = sorted(str(item) for item in question.answers)
+        gold = sorted(map(str, question.answers))
         clues = question.clues
 
         def gives_gold(facts: Sequence[FrameFacts]) -> bool:
@@ -59,8 +60,9 @@ class Checker:
             return answers is not None and sorted(answers) == gold
 
         shown = [self._single[clue] for clue in clues]
-        without_one = [[item for item in shown if item.frame != skipped] for skipped in clues]
-        n_necessary = sum(not gives_gold(rest) for rest in without_one)
+        n_necessary = 0
+        for skipped in clues:
+            n_necessary += not gives_gold([frame for frame in shown if frame.number != skipped])
         if question.question_type == "movement_counting_further":
             minimal = [str(n_necessary)] == gold and n_necessary < len(clues)
         else:

@@ -1,5 +1,4 @@
-"""The balanced choice of questions, so that the answers cannot be guessed from the words of the
-questions.
+"""The balanced choice of questions, so that their words do not give the answers away.
 
 No answer to a form is more frequent than the next ones: than the next for yes and no, the next two
 for numbers, the next four for other answers. The same holds for the answers on each object in each
@@ -21,8 +20,7 @@ _NEXT_ANSWERS = 6
 
 
 class Chooser:
-    """Chooses questions so that types, forms, answers, numbers of clues and subjects are balanced
-    over a set."""
+    """Chooses questions with balanced types, forms, answers, numbers of clues and subjects."""
 
     def __init__(self, *, by_subject: bool = True) -> None:
         """Start a set.
@@ -47,12 +45,12 @@ class Chooser:
         chosen: list[Candidate] = []
         # A limit per group: presence questions, which are always possible, must not fill up quiet
         # trajectories.
-        limits = Counter({_group(item): max(2, number // 5) for item in remaining})
+        limits = Counter({_group(candidate): max(2, number // 5) for candidate in remaining})
         while len(chosen) < number:
             eligible = [
-                item
-                for item in remaining
-                if limits[_group(item)] and not self._is_unbalanced(item, rooms)
+                candidate
+                for candidate in remaining
+                if limits[_group(candidate)] and not self._is_unbalanced(candidate, rooms)
             ]
             if not eligible:
                 break
@@ -61,67 +59,68 @@ class Chooser:
             limits[_group(best)] -= 1
             chosen.append(best)
             self._count(best, rooms)
-        return sorted(chosen, key=lambda item: (item.clues, item.text))
+        return sorted(chosen, key=lambda candidate: (candidate.clues, candidate.text))
 
-    def _is_unbalanced(self, item: Candidate, rooms: str) -> bool:
+    def _is_unbalanced(self, candidate: Candidate, rooms: str) -> bool:
         """Return True if the answer already leads the next ones, to the form or on a subject."""
-        if not self._by_subject and not item.is_closed:
+        if not self._by_subject and not candidate.is_closed:
             return False
         return any(
-            self._leads(self._answers.get(key, Counter()), item) for key in self._keys(item, rooms)
+            self._leads(self._answers.get(key, Counter()), candidate)
+            for key in self._keys(candidate, rooms)
         )
 
-    def _leads(self, answers: Counter[str], item: Candidate) -> bool:
+    def _leads(self, answers: Counter[str], candidate: Candidate) -> bool:
         """Return True if the answer is more frequent than the mean of the next ones."""
-        answer = _answer(item)
-        others = sorted(
-            (count for other, count in answers.items() if other != answer), reverse=True
-        )
+        answer = _answer(candidate)
+        counts = (count for other, count in answers.items() if other != answer)
+        others = sorted(counts, reverse=True)
         if not self._by_subject:
             return answers[answer] > sum(others)
-        n_next = 1 if answer in _YES_NO else _NEXT_NUMBERS if item.is_closed else _NEXT_ANSWERS
+        n_next = 1 if answer in _YES_NO else _NEXT_NUMBERS if candidate.is_closed else _NEXT_ANSWERS
         return n_next * answers[answer] > sum(others[:n_next])
 
-    def _keys(self, item: Candidate, rooms: str) -> list[tuple[str, ...]]:
+    def _keys(self, candidate: Candidate, rooms: str) -> list[tuple[str, ...]]:
         """Return what the answer is counted by."""
         if not self._by_subject:
-            return [(item.form,)]
-        answers = {str(answer).replace(" ", "").lower() for answer in item.answers}
-        asked = [subject for subject in item.subjects if subject.lower() not in answers]
-        return [(item.form,), *((item.question_type, rooms, subject) for subject in asked)]
+            return [(candidate.form,)]
+        answers = {str(answer).replace(" ", "").lower() for answer in candidate.answers}
+        subjects = [subject for subject in candidate.subjects if subject.lower() not in answers]
+        return [
+            (candidate.form,),
+            *((candidate.question_type, rooms, subject) for subject in subjects),
+        ]
 
-    def _count(self, item: Candidate, rooms: str) -> None:
-        group = _group(item)
-        self._types[item.question_type] += 1
+    def _count(self, candidate: Candidate, rooms: str) -> None:
+        group = _group(candidate)
+        self._types[candidate.question_type] += 1
         self._groups[group] += 1
-        self._clues[_clue_class(item)] += 1
-        self._subjects.update((group, subject) for subject in item.subjects)
-        for key in self._keys(item, rooms):
-            self._answers.setdefault(key, Counter())[_answer(item)] += 1
+        self._clues[_clue_class(candidate)] += 1
+        self._subjects.update((group, subject) for subject in candidate.subjects)
+        for key in self._keys(candidate, rooms):
+            self._answers.setdefault(key, Counter())[_answer(candidate)] += 1
 
-    def _use(self, item: Candidate) -> tuple[int, int, int, int]:
-        group = _group(item)
-        subjects = sum(self._subjects[group, subject] for subject in item.subjects)
+    def _use(self, candidate: Candidate) -> tuple[int, int, int, int]:
+        group = _group(candidate)
+        subjects = sum(self._subjects[group, subject] for subject in candidate.subjects)
         return (
-            self._types[item.question_type],
+            self._types[candidate.question_type],
             self._groups[group],
-            self._clues[_clue_class(item)],
+            self._clues[_clue_class(candidate)],
             subjects,
         )
 
 
-def _answer(item: Candidate) -> str:
-    return ", ".join(sorted(map(str, item.answers)))
+def _answer(candidate: Candidate) -> str:
+    return ", ".join(sorted(map(str, candidate.answers)))
 
 
-def _group(item: Candidate) -> str:
+def _group(candidate: Candidate) -> str:
     """Return the group that is balanced within a question type: yes, no, or other answers."""
-    return (
-        f"{item.question_type} {item.answers[0]}"
-        if item.answers[0] in _YES_NO
-        else item.question_type
-    )
+    answer = candidate.answers[0]
+    kind = candidate.question_type
+    return f"{kind} {answer}" if answer in _YES_NO else kind
 
 
-def _clue_class(item: Candidate) -> int:
-    return min(len(item.clues), 3)
+def _clue_class(candidate: Candidate) -> int:
+    return min(len(candidate.clues), 3)

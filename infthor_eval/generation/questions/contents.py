@@ -1,5 +1,4 @@
-"""Slicing and container content: what was sliced, and what a receptacle held, at a given step or
-always.
+"""Slicing and container content: what was sliced, and what a receptacle held, and when.
 
 Table 3's forms do not define which objects count as being in or on something, so they are used only
 where every reading gives the same answer (see `readings`). Our forms define it: objects that can be
@@ -16,9 +15,8 @@ from infthor_eval.generation.questions.candidates import (
     type_question,
     with_the,
 )
-from infthor_eval.generation.questions.evidence import minimal_cover
 from infthor_eval.generation.questions.history import Event, TrajectoryHistory, is_same_object
-from infthor_eval.generation.questions.readings import can_be_picked_up, is_plain
+from infthor_eval.generation.questions.readings import can_be_picked_up, is_plain, minimal_cover
 from infthor_eval.household.wording import canonical_type
 
 __all__ = [
@@ -38,13 +36,9 @@ SLICING = "slicing"
 # They take objects of one type alone (AI2-THOR's list of what fits where), so their contents need
 # no look.
 _OF_ONE_TYPE = {
-    "CoffeeMachine",
-    "HandTowelHolder",
-    "PaintingHanger",
-    "Toaster",
-    "ToiletPaperHanger",
+    "CoffeeMachine", "HandTowelHolder", "PaintingHanger", "Toaster", "ToiletPaperHanger",
     "TowelHolder",
-}
+}  # fmt: skip
 FormAndNames = tuple[str, tuple[str, ...]]
 
 
@@ -62,15 +56,15 @@ def at_slicing(history: TrajectoryHistory) -> Iterator[Candidate]:
     events = [event for event in history.events if event.action == "SliceObject"]
     count = Counter(event.object_type for event in events)
     for event in events:
-        place = history.parent(event.frame - 1, event.target)
+        receptacle = history.parent(event.frame - 1, event.target)
         # With two slicings of a type it would be ambiguous which one is meant.
         if (
             count[event.object_type] > 1
-            or place is None
-            or not is_plain(history, event.frame, place)
+            or receptacle is None
+            or not is_plain(history, event.frame, receptacle)
         ):
             continue
-        inside = history.contents(event.frame, place)
+        inside = history.contents(event.frame, receptacle)
         slices = sorted(
             key
             for key in inside
@@ -78,51 +72,53 @@ def at_slicing(history: TrajectoryHistory) -> Iterator[Candidate]:
         )
         others = frozenset(key for key in inside if not key.startswith(f"{event.target}|"))
         if slices and others:
-            place_type = history.states(event.frame)[place].type
-            asked = (
+            receptacle_type = history.states(event.frame)[receptacle].type
+            wording = (
                 "What objects were {} when you slice {}?",
-                (in_or_on(place_type), with_the(event.object_type)),
+                (in_or_on(receptacle_type), with_the(event.object_type)),
             )
-            frames = _unchanged_frames(history, event.frame, place)
+            frames = _unchanged_frames(history, event.frame, receptacle)
             # One slice stands for the sliced object: all of them together would need more clues.
             yield from _contents_question(
-                history, SLICING, asked, frames, place, others | {slices[0]}
+                history, SLICING, wording, frames, receptacle, others | {slices[0]}
             )
 
 
 def contents(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on receptacles whose contents never change and that are the only ones of
-    their types.
+    """Yield the questions on the only receptacles of their types whose contents never change.
 
     A receptacle that takes one type of object alone is left out: its contents can be told without a
     frame.
     """
     last = len(history) - 1
-    places = {
+    receptacles = {
         parent for key in history.states(last) if (parent := history.parent(last, key)) is not None
     }
-    for place in sorted(places):
-        frames = _unchanged_frames(history, 0, place)
-        place_type = history.states(last)[place].type
-        is_constant = len(frames) == len(history) and place_type not in _OF_ONE_TYPE
-        if is_constant and history.is_only_one(last, place) and is_plain(history, last, place):
-            asked = "What objects were {}?", (in_or_on(place_type),)
+    for receptacle in sorted(receptacles):
+        frames = _unchanged_frames(history, 0, receptacle)
+        receptacle_type = history.states(last)[receptacle].type
+        is_constant = len(frames) == len(history) and receptacle_type not in _OF_ONE_TYPE
+        if (
+            is_constant
+            and history.is_only_one(last, receptacle)
+            and is_plain(history, last, receptacle)
+        ):
+            wording = "What objects were {}?", (in_or_on(receptacle_type),)
             yield from _contents_question(
-                history, CONTENT, asked, frames, place, history.contents(last, place)
+                history, CONTENT, wording, frames, receptacle, history.contents(last, receptacle)
             )
 
 
 def at_opening(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on what was in the only receptacle of its type when it was first
-    opened."""
+    """Yield the questions on what was in the only receptacle of its type at its first opening."""
     opened: set[str] = set()
     for event in history.events:
         first = event.action == "OpenObject" and event.target not in opened
         opened |= {event.target} if event.action == "OpenObject" else set()
         if first and history.is_only_one(event.frame, event.target):
             form = "Which things that can be picked up were directly {} when you first opened it?"
-            asked = form, (in_or_on(event.object_type),)
-            yield from _loose_contents_question(history, asked, event, event.target)
+            wording = form, (in_or_on(event.object_type),)
+            yield from _loose_contents_question(history, wording, event, event.target)
 
 
 def at_pickup(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -130,42 +126,41 @@ def at_pickup(history: TrajectoryHistory) -> Iterator[Candidate]:
     events = [event for event in history.events if event.action == "PickupObject"]
     count = Counter(event.object_type for event in events)
     for event in events:
-        place = history.parent(event.frame - 1, event.target)
-        if (
-            count[event.object_type] == 1
-            and place is not None
-            and place in history.states(event.frame)
-        ):
-            place_type = history.states(event.frame)[place].type
+        receptacle = history.parent(event.frame - 1, event.target)
+        is_once = count[event.object_type] == 1
+        if is_once and receptacle is not None and receptacle in history.states(event.frame):
+            receptacle_type = history.states(event.frame)[receptacle].type
             form = (
                 "Which other things that can be picked up were directly {} when you picked up {} "
                 "from it?"
             )
-            asked = form, (in_or_on(place_type), with_the(event.object_type))
-            yield from _loose_contents_question(history, asked, event, place)
+            wording = form, (in_or_on(receptacle_type), with_the(event.object_type))
+            yield from _loose_contents_question(history, wording, event, receptacle)
 
 
 def _loose_contents_question(
-    history: TrajectoryHistory, asked: FormAndNames, event: Event, place: str
+    history: TrajectoryHistory, wording: FormAndNames, event: Event, receptacle: str
 ) -> Iterator[Candidate]:
     """Yield a question on the contents of a receptacle right after an event that can be picked up.
 
     One of the clues shows the event: without it, nobody could tell that the others show what was
     there then.
     """
-    items = can_be_picked_up(history, event.frame, history.contents(event.frame, place))
+    items = can_be_picked_up(history, event.frame, history.contents(event.frame, receptacle))
     if items is not None and history.shows(event.frame, event.target):
-        frames = _unchanged_frames(history, event.frame, place)
+        frames = _unchanged_frames(history, event.frame, receptacle)
         yield from _contents_question(
-            history, FURTHER, asked, frames, place, items, shown_first=True
+            history, FURTHER, wording, frames, receptacle, items, shown_first=True
         )
 
 
-def _unchanged_frames(history: TrajectoryHistory, first: int, place: str) -> range:
+def _unchanged_frames(history: TrajectoryHistory, first: int, receptacle: str) -> range:
     """Return the frames from `first` on during which the contents of a receptacle do not change."""
-    inside = history.contents(first, place)
+    inside = history.contents(first, receptacle)
     changed = (
-        frame for frame in range(first, len(history)) if history.contents(frame, place) != inside
+        frame
+        for frame in range(first, len(history))
+        if history.contents(frame, receptacle) != inside
     )
     return range(first, next(changed, len(history)))
 
@@ -173,9 +168,9 @@ def _unchanged_frames(history: TrajectoryHistory, first: int, place: str) -> ran
 def _contents_question(
     history: TrajectoryHistory,
     question_type: str,
-    asked: FormAndNames,
+    wording: FormAndNames,
     frames: range,
-    place: str,
+    receptacle: str,
     items: frozenset[str],
     *,
     shown_first: bool = False,
@@ -185,32 +180,29 @@ def _contents_question(
     Args:
         history: the trajectory.
         question_type: type of the question.
-        asked: its form, and the names in it.
+        wording: its form, and the names in it.
         frames: frames during which the contents are the same.
-        place: id of the receptacle.
+        receptacle: its id.
         items: ids of the objects.
         shown_first: True if the first of the frames must be among the clues.
     """
-    shown = {
-        frame: frozenset(key for key in items if history.shows_inside(frame, key))
-        for frame in frames
-        if history.shows(frame, place) and not _shows_similar_contents(history, frame, place)
-    }
-    if shown_first and frames[0] not in shown:
+    seen_at = {}
+    for frame in frames:
+        is_ambiguous = _shows_similar_contents(history, frame, receptacle)
+        if history.shows(frame, receptacle) and not is_ambiguous:
+            seen_at[frame] = frozenset(key for key in items if history.shows_inside(frame, key))
+    if shown_first and frames[0] not in seen_at:
         return
     first = {frames[0]} if shown_first else set[int]()
-    missing = items.difference(*(shown[frame] for frame in first))
-    clues = (
-        minimal_cover(missing, shown, lambda frame, keys: history.clarity(frame, *keys))
-        if items
-        else None
-    )
-    if clues is not None:
-        clues = tuple(sorted(first.union(clues)))
+    missing = items.difference(*map(seen_at.__getitem__, first))
+    if not items:
+        return
+    cover = minimal_cover(missing, seen_at, lambda frame, keys: history.clarity(frame, *keys))
+    if cover is not None:
+        clues = tuple(sorted(first.union(cover)))
         types = sorted(_whole_types(history, frames[0], items))
-        yield from type_question(
-            question_type, *asked, clues, types, (history.states(frames[0])[place].type,)
-        )
+        receptacle_type = history.states(frames[0])[receptacle].type
+        yield from type_question(question_type, *wording, clues, types, (receptacle_type,))
 
 
 def _whole_types(history: TrajectoryHistory, frame: int, keys: frozenset[str]) -> list[str]:
@@ -228,14 +220,14 @@ def _whole_types(history: TrajectoryHistory, frame: int, keys: frozenset[str]) -
     ]
 
 
-def _shows_similar_contents(history: TrajectoryHistory, frame: int, place: str) -> bool:
+def _shows_similar_contents(history: TrajectoryHistory, frame: int, receptacle: str) -> bool:
     """Return True if a frame shows contents of another receptacle with the same name."""
     states = history.states(frame)
-    object_type = canonical_type(states[place].type)
-    parents = {
-        history.parent(frame, key) for key in history.objects_in_frame(frame) if key in states
-    } - {None}
-    others = (
-        parent for parent in parents if parent is not None and not is_same_object(parent, place)
-    )
-    return any(canonical_type(states[parent].type) == object_type for parent in others)
+    object_type = canonical_type(states[receptacle].type)
+    for key in history.objects_in_frame(frame):
+        parent = history.parent(frame, key)
+        if parent is None or is_same_object(parent, receptacle):
+            continue
+        if canonical_type(states[parent].type) == object_type:
+            return True
+    return False

@@ -1,12 +1,10 @@
-"""Movement counting: how often something was moved; further forms count openings, puts and
-different objects.
+"""Movement counting: how often something was moved; further: openings, puts, different objects.
 
 The clues of Table 3's form are one frame per counted event, so the number of clue frames alone
 gives the answer away. The further questions therefore have frames without an event among their
 clues: 8 frames in all for answers up to 7, 16 for answers up to 15, and so on.
 """
 
-import itertools
 import random
 from collections import defaultdict
 from collections.abc import Iterator
@@ -24,16 +22,15 @@ _FRAMES = 8  # of a further question whose answer is smaller
 
 
 def counts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on how often an object was moved: picked up more than once, and put down
-    each time.
+    """Yield the questions on how often an object was moved, picked up more than once and put down.
 
     It must be the only object of its type that was picked up, or the name would be ambiguous.
     """
     for object_type, items in sorted(history.picked_up_by_type.items()):
         item = min(items)
         moves = history.moves_of(item)
-        shown = all(history.shows(move.after, move.item, move.target) for move in moves)
-        if len(items) == 1 and shown and len(moves) == history.pickups[item] > 1:
+        is_shown = all(history.shows(move.after, move.item, move.target) for move in moves)
+        if len(items) == 1 and is_shown and len(moves) == history.pickups[item] > 1:
             form = "How many times did you move {}?"
             frames = [move.after for move in moves]
             yield _count(QUESTION_TYPE, form, (with_the(object_type),), frames, object_type)
@@ -51,11 +48,10 @@ def further_counts(history: TrajectoryHistory, rng: random.Random) -> Iterator[C
 
 
 def _number_of_frames(count: int) -> int:
-    return next(
-        number
-        for number in (_FRAMES << doublings for doublings in itertools.count())
-        if number > count
-    )
+    number = _FRAMES
+    while number <= count:
+        number *= 2
+    return number
 
 
 def _openings(history: TrajectoryHistory) -> Iterator[Candidate]:
@@ -78,8 +74,8 @@ def _puts(history: TrajectoryHistory) -> Iterator[Candidate]:
     for move in history.moves:
         by_target[move.target].append(move)
     for target, moves in sorted(by_target.items()):
-        shown = all(history.shows_put(move) for move in moves)
-        if shown and all(history.is_only_one(move.after, target) for move in moves):
+        is_shown = all(history.shows_put(move) for move in moves)
+        if is_shown and all(history.is_only_one(move.after, target) for move in moves):
             place_type = history.target_type(moves[0])
             frames = [move.after for move in moves]
             form = "How many times did you put something {}?"

@@ -1,5 +1,4 @@
-"""Final object state, in Table 3's forms: is an object in a receptacle, what is in it, and how
-many, at the end."""
+"""Final object state, in Table 3's forms: is an object in a receptacle, what is, how many are."""
 
 from collections.abc import Iterator
 
@@ -10,9 +9,8 @@ from infthor_eval.generation.questions.candidates import (
     type_question,
     with_the,
 )
-from infthor_eval.generation.questions.evidence import minimal_cover
 from infthor_eval.generation.questions.history import TrajectoryHistory
-from infthor_eval.generation.questions.readings import is_plain
+from infthor_eval.generation.questions.readings import is_plain, minimal_cover
 
 __all__ = ["QUESTION_TYPE", "final_states"]
 
@@ -20,8 +18,7 @@ QUESTION_TYPE = "final_state"
 
 
 def final_states(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield questions on receptacles that the agent put something into and that are the only ones
-    of their types."""
+    """Yield questions on the only receptacles of their types, if the agent put something there."""
     last = len(history) - 1
     targets = sorted({move.target for move in history.moves})
     singles = [
@@ -33,22 +30,20 @@ def final_states(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def _inside(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
-    """Yield questions on whether an object that was put in or taken out is in the receptacle in the
-    end."""
+    """Yield questions on whether an object that was put in or taken out is there in the end."""
     last = len(history) - 1
     states = history.states(last)
-    for item in sorted(
-        {move.item for move in history.moves if receptacle in {move.target, move.origin}}
-    ):
+    moved = {move.item for move in history.moves if receptacle in {move.target, move.origin}}
+    for item in sorted(moved):
         move = history.moves_of(item)[-1]
         here = history.parent(last, item)
         alone = item in states and history.is_only_one(last, item)
         if not alone or len(history.picked_up_by_type[move.object_type]) > 1:
             continue  # ambiguous
         if here == move.target and history.shows_put(move):  # still where the last clue shows it
-            place_type = states[receptacle].type
-            names = (with_the(states[item].type), in_or_on(place_type))
-            subjects = (states[item].type, place_type)
+            receptacle_type = states[receptacle].type
+            names = (with_the(states[item].type), in_or_on(receptacle_type))
+            subjects = (states[item].type, receptacle_type)
             answer = "yes" if here == receptacle else "no"
             yield Candidate(QUESTION_TYPE, "Is {} {}?", names, (move.after,), (answer,), subjects)
 
@@ -68,23 +63,20 @@ def _what(history: TrajectoryHistory, receptacle: str) -> Iterator[Candidate]:
         is_final = held <= inside and all(frame >= since[key] for key in held)
         if history.shows(frame, receptacle) and is_final:
             shown[frame] = frozenset(key for key in held if history.shows_inside(frame, key))
-    clues = (
-        minimal_cover(inside, shown, lambda frame, keys: history.clarity(frame, *keys))
-        if inside
-        else None
-    )
-    if clues is None or len(inside) > MANY or not is_plain(history, last, receptacle):
+    if not inside or len(inside) > MANY or not is_plain(history, last, receptacle):
         return
-    place_type = states[receptacle].type
+    clues = minimal_cover(inside, shown, lambda frame, keys: history.clarity(frame, *keys))
+    if clues is None:
+        return
+    receptacle_type = states[receptacle].type
     types = sorted(states[key].type for key in inside)
-    where = (in_or_on(place_type),)
+    where = (in_or_on(receptacle_type),)
     count = str(len(inside))
     yield Candidate(
-        QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (place_type, "#")
+        QUESTION_TYPE, "How many objects were {}?", where, clues, (count,), (receptacle_type, "#")
     )
-    yield from type_question(
-        QUESTION_TYPE, "What objects are {}?", where, clues, types, (place_type,)
-    )
+    form = "What objects are {}?"
+    yield from type_question(QUESTION_TYPE, form, where, clues, types, (receptacle_type,))
 
 
 def _arrival(history: TrajectoryHistory, item: str, receptacle: str) -> int:

@@ -1,5 +1,4 @@
-"""Generating questions on a whole set: all rules on all trajectories, then a balanced choice of the
-candidates.
+"""Generating questions on a set: all rules on all trajectories, then a balanced choice.
 
 The rules are those of the paper's Table 3; our further forms are optional and have question types
 of their own.
@@ -59,12 +58,12 @@ class GeneratedQuestions:
 
     def by_type(self) -> dict[str, int]:
         """Return the number of questions by type."""
-        return dict(sorted(Counter(item.question_type or "" for item in self.questions).items()))
+        counts = Counter(question.question_type or "" for question in self.questions)
+        return dict(sorted(counts.items()))
 
     def by_clues(self) -> dict[str, int]:
-        """Return the number of questions by number of clues: 1, 2, >=3, and of absences, which have
-        none."""
-        counts = Counter(item.clue_column for item in self.questions)
+        """Return the number of questions by number of clues (1, 2, >=3), and of absences."""
+        counts = Counter(question.clue_column for question in self.questions)
         return {name: counts[name] for name in ("1", "2", ">=3", ABSENCE)}
 
     def summary_text(self) -> str:
@@ -113,18 +112,11 @@ def generate_questions(
         )
     simulator_of(folder)  # raises for another format version
     result = GeneratedQuestions()
-    types: dict[Path, frozenset[str]] = {}
-    for path in _trajectory_folders(folder):
-        try:
-            types[path] = _read_history(path, share).all_object_types
-        except DataError as error:
-            result.skipped.append(str(error))
-    result.trajectories = len(types)
+    types = _object_types(folder, share, result)
     rooms = {path: rooms_of(names) for path, names in types.items()}
-    vocabularies = {
-        kind: frozenset[str]().union(*(types[path] for path in types if rooms[path] == kind))
-        for kind in set(rooms.values())
-    }
+    vocabularies: dict[str, frozenset[str]] = {}
+    for path, kind in rooms.items():
+        vocabularies[kind] = vocabularies.get(kind, frozenset()) | types[path]
     rule_jobs = [_RuleJob(path, vocabularies[rooms[path]], seed, share, further) for path in types]
     candidates_by_path = _share_out(rule_jobs, worker_settings, say, result)
     chooser = Chooser(by_subject=by_subject)
@@ -134,19 +126,33 @@ def generate_questions(
     for path in [path for path in types if path in candidates_by_path]:
         candidates, rng = candidates_by_path[path]
         chosen = chosen_by_path[path] = chooser.choose(candidates, per_trajectory, rng, rooms[path])
-        check_jobs.append(
-            _CheckJob(path, tuple(item.question(path.name) for item in chosen), share)
-        )
+        questions = tuple(candidate.question(path.name) for candidate in chosen)
+        check_jobs.append(_CheckJob(path, questions, share))
     soundness = _share_out(check_jobs, worker_settings, say, result)
     for job in check_jobs:
+        name = job.path.name
+        chosen = chosen_by_path[job.path]
         # Checked in our words, which the checker reads.
-        for item, is_sound in zip(
-            chosen_by_path[job.path], soundness.get(job.path, ()), strict=False
-        ):
-            name = job.path.name
-            question = in_published_words(item, name) if published_words else item.question(name)
+        for candidate, is_sound in zip(chosen, soundness.get(job.path, ()), strict=False):
+            question = candidate.question(name)
+            if published_words:
+                question = in_published_words(candidate, name)
             (result.questions if is_sound else result.unconfirmed).append(question)
     return result
+
+
+def _object_types(
+    folder: Path, share: float, result: GeneratedQuestions
+) -> dict[Path, frozenset[str]]:
+    """Return the object types of each trajectory; those that cannot be read are skipped."""
+    types: dict[Path, frozenset[str]] = {}
+    for path in _trajectory_folders(folder):
+        try:
+            types[path] = _read_history(path, share).all_object_types
+        except DataError as error:
+            result.skipped.append(str(error))
+    result.trajectories = len(types)
+    return types
 
 
 @dataclass(frozen=True)
@@ -211,8 +217,7 @@ def _share_out(
     say: Callable[[str], None],
     result: GeneratedQuestions,
 ) -> dict[Path, Any]:
-    """Return the results of the jobs by trajectory; a trajectory at which several workers were lost
-    is skipped."""
+    """Return the results by trajectory; one at which several workers were lost is skipped."""
     results: dict[Path, Any] = {}
     for number, outcome in run_jobs(_QuestionWorker, jobs, worker_settings, say):
         if isinstance(outcome, InfthorError):
@@ -236,11 +241,9 @@ def _telling_inconsistency(path: Path) -> AbstractContextManager[None]:
 
 def _trajectory_folders(folder: Path) -> list[Path]:
     metadata = folder / "metadata"
-    folders = (
-        sorted(path for path in metadata.glob("*/") if not path.name.startswith("."))
-        if metadata.is_dir()
-        else []
-    )
+    folders: list[Path] = []
+    if metadata.is_dir():
+        folders = sorted(path for path in metadata.glob("*/") if not path.name.startswith("."))
     if not folders:
         raise DataError(f"{metadata}: has no trajectory; replay some into this set first")
     return folders
@@ -269,8 +272,7 @@ def candidates_of(
 
 
 def further_candidates_of(history: TrajectoryHistory, rng: random.Random) -> list[Candidate]:
-    """Return all questions of our further forms on one trajectory; counting questions get random
-    frames."""
+    """Return all questions of our further forms on one trajectory; counts get random frames."""
     return [
         *open_state.further_open_states(history),
         *location.further_locations(history),

@@ -98,15 +98,14 @@ class TrajectoryHistory:
         return all(key in seen and seen[key].pixels >= self.min_pixels for key in ids)
 
     def clarity(self, frame: int, *ids: str) -> tuple[bool, int]:
-        """Return how well a frame shows some objects, to compare: if all are well inside, then the
-        smallest size."""
+        """Return how well a frame shows objects: whether all are well inside, the least size."""
         seen = [self.objects_in_frame(frame)[key] for key in ids]
-        inside = all(_MARGIN <= edge < _SIDE - _MARGIN for item in seen for edge in item.box)
-        return inside, min((item.pixels for item in seen), default=0)
+        edges = [edge for shown in seen for edge in shown.box]
+        inside = all(_MARGIN <= edge < _SIDE - _MARGIN for edge in edges)
+        return inside, min((shown.pixels for shown in seen), default=0)
 
     def clearest(self, frames: Iterable[int], *ids: str) -> int | None:
-        """Return the frame that shows all these objects best, the earliest of equals, or None if
-        none shows them."""
+        """Return the frame that shows all these objects best, the earliest of equals, or None."""
         shown = [frame for frame in frames if self.shows(frame, *ids)]
         return max(shown, key=lambda frame: self.clarity(frame, *ids), default=None)
 
@@ -126,8 +125,7 @@ class TrajectoryHistory:
         return any(self.shows(frame, key) for key in slices)
 
     def parent(self, frame: int, item: str) -> str | None:
-        """Return the id of what an object is directly in or on, or None if it is held, on the
-        floor, or ambiguous."""
+        """Return what an object is directly in or on; None if held, on the floor, or ambiguous."""
         states = self.states(frame)
         return logged_parent(states[item], states) if item in states else None
 
@@ -155,8 +153,7 @@ class TrajectoryHistory:
 
     @cached_property
     def reported_types(self) -> frozenset[str]:
-        """Types that the log ever reports as visible, so that it also tells whether they can be
-        picked up."""
+        """Types that are ever reported as visible, so it is known if they can be picked up."""
         return frozenset(name for step in self.steps for name in step.object_log.visible)
 
     @cached_property
@@ -254,8 +251,7 @@ class TrajectoryHistory:
         )
 
     def is_inside(self, frame: int, item: str, receptacle: str) -> bool:
-        """Return True if an object is directly in or on a receptacle; a sink and its basin count as
-        one."""
+        """Return True if an object is directly in or on a receptacle (or a basin's sink)."""
         parent = self.parent(frame, item)
         return parent is not None and is_same_object(parent, receptacle)
 
@@ -265,8 +261,7 @@ class TrajectoryHistory:
         return parent is not None and self.shows(frame, item, parent)
 
     def _type_of(self, frame: int, item: str) -> str:
-        """Return the type of an object; one that the action consumed is looked up in the frame
-        before."""
+        """Return the type of an object, by the frame before if the action consumed it."""
         return (self.states(frame).get(item) or self.states(frame - 1)[item]).type
 
 
@@ -276,8 +271,7 @@ def is_same_object(one: str, other: str) -> bool:
 
 
 def _snapshots(steps: list[Step]) -> Iterator[dict[str, ObjectState]]:
-    """Yield the states at each step of a log; successive steps without a change share one dict, to
-    save memory."""
+    """Yield the states at each step; steps without a change share one dict, to save memory."""
     last: dict[str, ObjectState] = {}
     for step, states in zip(steps, iter_object_states(steps), strict=True):
         if step.changes or not last:

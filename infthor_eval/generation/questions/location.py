@@ -48,12 +48,8 @@ def _before_put(
     move = moves[0]
     to = history.target_type(move)
     once = [history.target_type(other) for other in moves].count(to) == 1
-    if (
-        once
-        and _changes(history, move)
-        and _shows_origin(history, move)
-        and history.shows_put(move)
-    ):
+    is_shown = _shows_origin(history, move) and history.shows_put(move)
+    if once and is_shown and _changes(history, move):
         form = "Where was {} before you put it to {}?"
         yield _candidate(
             QUESTION_TYPE, form, (move.before, move.after), [_start(history, move)], object_type, to
@@ -137,8 +133,7 @@ def _start(history: TrajectoryHistory, move: ObjectMove) -> str | None:
 
 
 def _changes(history: TrajectoryHistory, move: ObjectMove) -> bool:
-    """Return True if a move led to another type of receptacle; otherwise the question would contain
-    the answer."""
+    """Return True if a move led to another type; else the question would contain the answer."""
     start = _start(history, move)
     return start is not None and canonical_type(start) != canonical_type(history.target_type(move))
 
@@ -149,8 +144,7 @@ def _is_down(history: TrajectoryHistory, move: ObjectMove) -> bool:
 
 
 def _shows_origin(history: TrajectoryHistory, move: ObjectMove) -> bool:
-    """Return True if the frame before the pick-up shows the object where it was, and no other of
-    its type."""
+    """Return True if the frame before the pick-up shows the object there, alone of its type."""
     shown = move.origin is not None and history.shows(move.before, move.item, move.origin)
     return shown and history.is_alone_in_frame(move.before, move.item)
 

@@ -1,5 +1,4 @@
-"""Open state: "Was the fridge open?" (at any time); further forms: open when, open now, what was
-opened."""
+"""Open state: "Was the fridge open?" (ever); further forms: open when, now, and what was opened."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -44,17 +43,14 @@ def open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
 
 
 def further_open_states(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield questions on when an object that is the only one of its type was open, and on all that
-    was opened."""
+    """Yield questions on when the only object of its type was open, and on all that was opened."""
     phrases = Counter(_phrase(history, event) for event in history.events)
     for key in _singles(history):
         yield from _now(history, key)
         for event in history.events:
             phrase = _phrase(history, event)
-            involved = key in {
-                event.target,
-                event.receptacle,
-            }  # then the action itself tells whether it was open
+            # Then the action itself tells whether it was open.
+            involved = key in {event.target, event.receptacle}
             if event.action in _ASKED_AT and phrases[phrase] == 1 and not involved:
                 yield from _then(history, key, event, phrase)
     opened = (event for event in history.events if event.action == "OpenObject")
@@ -80,8 +76,8 @@ def _singles(history: TrajectoryHistory) -> list[str]:
 def _phrase(history: TrajectoryHistory, event: Event) -> str:
     """Return an action as the end of a clause "when you ..."."""
     if event.action == "PutObject" and event.receptacle is not None:
-        place_type = history.states(event.frame)[event.receptacle].type
-        return f"put {with_the(event.object_type)} {in_or_on(place_type)}"
+        receptacle_type = history.states(event.frame)[event.receptacle].type
+        return f"put {with_the(event.object_type)} {in_or_on(receptacle_type)}"
     verbs = {"PickupObject": "picked up", "SliceObject": "sliced", "ToggleObjectOn": "turned on"}
     return f"{verbs.get(event.action, event.action)} {with_the(event.object_type)}"
 

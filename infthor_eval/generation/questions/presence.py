@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator
 
 from infthor_eval.generation.questions.candidates import Candidate
 from infthor_eval.generation.questions.history import TrajectoryHistory
-from infthor_eval.generation.questions.rooms import rooms_of
+from infthor_eval.generation.questions.rooms import COMMON_TYPES, rooms_of
 from infthor_eval.household.wording import noun, with_article
 
 __all__ = ["QUESTION_TYPE", "no_questions", "yes_questions"]
@@ -28,214 +28,12 @@ _FEW = 8  # with fewer types of other rooms, AI2-THOR's are added
 _BUSY = 3  # minimum number of objects in a sampled frame, if the trajectory has such frames
 
 # Never in questions: structures, parts, and types that people would not call by these names.
-_UNASKED = frozenset(
-    {
-        "Floor",
-        "Wall",
-        "Ceiling",
-        "Window",
-        "Door",
-        "Doorway",
-        "DoorFrame",
-        "StoveBurner",
-        "StoveKnob",
-        "LightSwitch",
-    }
-    | {
-        "Faucet",
-        "ShowerHead",
-        "ShowerGlass",
-        "ShowerDoor",
-        "Undefined",
-        "Shelf",
-        "ShelvingUnit",
-        "Stool",
-        "Curtains",
-    }
-    | {
-        "Blinds",
-        "ToiletPaperHanger",
-        "TowelHolder",
-        "HandTowelHolder",
-        "TargetCircle",
-        "Cart",
-        "Desktop",
-        "RoomDecor",
-    }
-)
-# Types in the rooms of each kind in AI2-THOR.
-_COMMON = {
-    "Kitchen": frozenset(
-        {
-            "Apple",
-            "Book",
-            "Bottle",
-            "Bowl",
-            "Bread",
-            "Cabinet",
-            "CellPhone",
-            "Chair",
-            "CoffeeMachine",
-            "CounterTop",
-        }
-        | {
-            "CreditCard",
-            "Cup",
-            "DiningTable",
-            "DishSponge",
-            "Drawer",
-            "Egg",
-            "Fork",
-            "Fridge",
-            "GarbageCan",
-        }
-        | {
-            "HousePlant",
-            "Kettle",
-            "Knife",
-            "Ladle",
-            "Lettuce",
-            "Microwave",
-            "Mug",
-            "Pan",
-            "Pencil",
-            "PepperShaker",
-        }
-        | {
-            "Plate",
-            "Pot",
-            "Potato",
-            "SaltShaker",
-            "SideTable",
-            "Sink",
-            "SoapBottle",
-            "Spatula",
-            "Statue",
-            "Toaster",
-        }
-        | {"Tomato", "Vase", "WineBottle"}
-    ),
-    "LivingRoom": frozenset(
-        {
-            "ArmChair",
-            "Book",
-            "Boots",
-            "Bowl",
-            "Box",
-            "Candle",
-            "CellPhone",
-            "Chair",
-            "CoffeeTable",
-            "CreditCard",
-        }
-        | {
-            "Desk",
-            "DeskLamp",
-            "DiningTable",
-            "DogBed",
-            "Drawer",
-            "Dresser",
-            "FloorLamp",
-            "GarbageCan",
-            "HousePlant",
-        }
-        | {
-            "KeyChain",
-            "Laptop",
-            "Newspaper",
-            "Ottoman",
-            "Painting",
-            "Pencil",
-            "Pillow",
-            "Plate",
-            "RemoteControl",
-        }
-        | {
-            "Safe",
-            "SideTable",
-            "Sofa",
-            "Statue",
-            "Television",
-            "TissueBox",
-            "TVStand",
-            "Vase",
-            "Watch",
-            "WateringCan",
-        }
-    ),
-    "Bedroom": frozenset(
-        {
-            "AlarmClock",
-            "ArmChair",
-            "BaseballBat",
-            "BasketBall",
-            "Bed",
-            "Book",
-            "Boots",
-            "Bowl",
-            "Box",
-            "CD",
-        }
-        | {
-            "CellPhone",
-            "Chair",
-            "Cloth",
-            "CreditCard",
-            "Desk",
-            "DeskLamp",
-            "Drawer",
-            "Dresser",
-            "Dumbbell",
-        }
-        | {
-            "FloorLamp",
-            "GarbageCan",
-            "HousePlant",
-            "KeyChain",
-            "Laptop",
-            "Mirror",
-            "Mug",
-            "Painting",
-            "Pencil",
-        }
-        | {
-            "Pillow",
-            "RemoteControl",
-            "Safe",
-            "SideTable",
-            "Sofa",
-            "Statue",
-            "TeddyBear",
-            "Television",
-        }
-        | {"TennisRacket", "TissueBox", "VacuumCleaner", "Vase", "Watch"}
-    ),
-    "Bathroom": frozenset(
-        {
-            "Cabinet",
-            "Candle",
-            "Cloth",
-            "CounterTop",
-            "DishSponge",
-            "Drawer",
-            "GarbageCan",
-            "HousePlant",
-            "Mirror",
-        }
-        | {
-            "Painting",
-            "Plunger",
-            "SideTable",
-            "Sink",
-            "SoapBar",
-            "SoapBottle",
-            "SprayBottle",
-            "TissueBox",
-            "Toilet",
-        }
-        | {"ToiletPaper", "Towel"}
-    ),
-}
+_UNASKED = frozenset({
+    "Floor", "Wall", "Ceiling", "Window", "Door", "Doorway", "DoorFrame", "StoveBurner",
+    "StoveKnob", "LightSwitch", "Faucet", "ShowerHead", "ShowerGlass", "ShowerDoor", "Undefined",
+    "Shelf", "ShelvingUnit", "Stool", "Curtains", "Blinds", "ToiletPaperHanger", "TowelHolder",
+    "HandTowelHolder", "TargetCircle", "Cart", "Desktop", "RoomDecor",
+})  # fmt: skip
 _SIMILAR_TYPES = (
     {"Cup", "Mug", "Vase"},
     {"Cup", "Bowl"},
@@ -286,8 +84,7 @@ def yes_questions(history: TrajectoryHistory) -> Iterator[Candidate]:
 def no_questions(
     history: TrajectoryHistory, vocabulary: frozenset[str], rng: random.Random
 ) -> Iterator[Candidate]:
-    """Yield no-questions with random frames on types of `vocabulary` that the scene does not
-    have."""
+    """Yield no-questions, with random frames, on types of `vocabulary` that the scene lacks."""
     frames = [frame for frame in range(len(history)) if _is_busy(history, frame)] or [0]
     absent = _other_types(history, vocabulary, history.all_object_types)
     for object_type in sorted(absent | _other_types(history, vocabulary, history.types_in_frames)):
@@ -320,15 +117,15 @@ def _questions(
 def _other_types(
     history: TrajectoryHistory, vocabulary: frozenset[str], there: frozenset[str]
 ) -> set[str]:
-    """Return the types of the vocabulary that are not there, nor like one that is; more if these
-    are few."""
+    """Return the vocabulary's types that are not there, nor like one that is; more if few."""
     similar = {name for group in _SIMILAR_TYPES if group & there for name in group}
     rooms = rooms_of(history.all_object_types).split(", ")
-    common = frozenset[str]().union(*(_COMMON[room] for room in rooms)) - history.all_object_types
-    own, others = (
-        {object_type for object_type in types - there - similar if _is_nameable(object_type)}
-        for types in (vocabulary, common)
+    common = (
+        frozenset[str]().union(*map(COMMON_TYPES.__getitem__, rooms)) - history.all_object_types
     )
+    excluded = there | similar
+    own = set(filter(_is_nameable, vocabulary - excluded))
+    others = set(filter(_is_nameable, common - excluded))
     return own if len(own) >= _FEW else own | others
 
 

@@ -1,5 +1,4 @@
-"""Questions in the words of the published files: type names, mostly without an article ("Where is
-Statue now?").
+"""Questions in the published files' words: type names, mostly bare ("Where is Statue now?").
 
 The words are those of the two published question files, counted there: containers of contents, puts
 and counts have one preposition each, whatever the container; "Is X in the Y?" has that of the
@@ -38,8 +37,7 @@ _BEFORE_NOUN = re.compile(r"^(?:(?:in|on) )?(?:(?:the|an|a) )?")
 
 
 def in_published_words(candidate: Candidate, traj_id: str) -> Question:
-    """Return a candidate of Table 3's forms as a question in the published words, with the same
-    clues and type.
+    """Return a candidate of Table 3's forms as a question in the published words.
 
     Raises:
         ValueError: the form is one of ours, which has no published words.

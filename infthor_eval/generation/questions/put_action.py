@@ -17,26 +17,24 @@ FURTHER = candidates.further_type(QUESTION_TYPE)
 
 
 def puts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield the questions on what was put into a container, if there was only one put into any of
-    its type."""
-    for place_type, moves in sorted(_by_type(history).items()):
-        (move, *others) = moves
+    """Yield the questions on what was put into a container, if one put was into its type."""
+    for receptacle_type, moves in sorted(_by_type(history).items()):
+        move, *others = moves
         before = move.after - 1
         if not others and history.shows(before, move.item) and history.shows_put(move):
             form = "What object did you put {}?"
-            names = (in_or_on(place_type),)
+            names = (in_or_on(receptacle_type),)
             clues = (before, move.after)
             yield from type_question(
-                QUESTION_TYPE, form, names, clues, [move.object_type], (place_type,)
+                QUESTION_TYPE, form, names, clues, [move.object_type], (receptacle_type,)
             )
 
 
 def further_puts(history: TrajectoryHistory) -> Iterator[Candidate]:
-    """Yield questions on all objects put into one receptacle, if they are several, and on all
-    puts."""
-    for place_type, moves in sorted(_by_type(history).items()):
+    """Yield questions on the objects put into one receptacle, if several, and on all puts."""
+    for receptacle_type, moves in sorted(_by_type(history).items()):
         if len(moves) > 1 and len({move.target for move in moves}) == 1:
-            yield from _what(history, "What did you put {}?", (place_type,), moves)
+            yield from _what(history, "What did you put {}?", (receptacle_type,), moves)
     yield from _what(history, "What did you put down?", (), history.moves)
     shown = (
         (history.target_type(move), move.after if history.shows_put(move) else None)
@@ -54,11 +52,13 @@ def _by_type(history: TrajectoryHistory) -> dict[str, list[ObjectMove]]:
 
 
 def _what(
-    history: TrajectoryHistory, form: str, places: tuple[str, ...], moves: Sequence[ObjectMove]
+    history: TrajectoryHistory, form: str, receptacles: tuple[str, ...], moves: Sequence[ObjectMove]
 ) -> Iterator[Candidate]:
     """Yield a question on the moved objects, with the frame after the first put of each."""
     first_puts = list({move.item: move for move in reversed(moves)}.values())[::-1]
     if all(history.shows_put(move) for move in first_puts):
         clues = tuple(move.after for move in first_puts)
         types = [move.object_type for move in first_puts]
-        yield from type_question(FURTHER, form, tuple(map(in_or_on, places)), clues, types, places)
+        yield from type_question(
+            FURTHER, form, tuple(map(in_or_on, receptacles)), clues, types, receptacles
+        )

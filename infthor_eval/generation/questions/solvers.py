@@ -5,72 +5,25 @@ not share their errors.
 """
 
 import re
-from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from infthor_eval.formats.step_log import ObjectState, Step, iter_object_states
+from infthor_eval.generation.questions.facts import (
+    FrameFacts,
+    events_of,
+    holder_of,
+    ids_inside,
+    is_of_type,
+    named_type,
+    only_loose,
+    place_of,
+    plain_name,
+    target_is,
+    target_name,
+    whole_id,
+)
 
-__all__ = ["FrameFacts", "answer", "frame_facts"]
-
-_FRAME_PIXELS = 300 * 300
-
-
-@dataclass(frozen=True)
-class FrameFacts:
-    """What is known at one frame.
-
-    Attributes:
-        frame: number of the frame.
-        action: name of the successful action before it, or empty.
-        target: id of the object acted on.
-        objects: states of the known objects by id.
-        in_frame: ids of all objects in the frame, however small.
-        everything: True if `objects` has all objects, False if only those in the frame.
-        loose: types that can be picked up, which is general knowledge and not restricted to the
-            frame.
-    """
-
-    frame: int
-    action: str
-    target: str | None
-    objects: dict[str, ObjectState]
-    in_frame: frozenset[str]
-    everything: bool
-    loose: frozenset[str]
-
-
-def frame_facts(
-    steps: Sequence[Step], share: float, frames: Container[int] | None = None
-) -> list[FrameFacts]:
-    """Return the facts of the whole log, or what clue frames show: objects that fill a share of the
-    frame's pixels."""
-    facts = []
-    loose = frozenset(name for step in steps for name in step.object_log.pickupable)
-    for step, states in zip(steps, iter_object_states(steps), strict=True):
-        objects = {key: state for key, state in states.items() if state.exists}
-        if frames is not None:
-            if step.img_idx not in frames:
-                continue
-            large = {
-                key
-                for key, seen in (step.seen or {}).items()
-                if seen.pixels >= share * _FRAME_PIXELS
-            }
-            objects = {key: state for key, state in objects.items() if key in large}
-        action = (step.action or "").split(" ")[0] if step.success else ""
-        facts.append(
-            FrameFacts(
-                step.img_idx,
-                action,
-                step.target,
-                objects,
-                frozenset(step.seen or {}),
-                frames is None,
-                loose,
-            )
-        )
-    return facts
+__all__ = ["answer"]
 
 
 def answer(text: str, facts: Sequence[FrameFacts]) -> list[str] | None:
@@ -82,85 +35,16 @@ def answer(text: str, facts: Sequence[FrameFacts]) -> list[str] | None:
     return None
 
 
-def _name(object_type: str) -> str:
-    return object_type.lower().replace(" ", "").removesuffix("basin")
-
-
-def _type_name(words: str) -> str:
-    """Return the type for some words: "sliced apple" is AppleSliced."""
-    words = words.lower()
-    if words.startswith("sliced "):
-        words = f"{words.removeprefix('sliced ')}sliced"
-    return _name(words)
-
-
-def _is(state: ObjectState, words: str) -> bool:
-    return _name(state.type) == _type_name(words)
-
-
-def _holder(glimpse: FrameFacts, key: str) -> str | None:
-    """Return what an object is directly in or on: the one of its parents that is in most of the
-    others."""
-    # Not by `household.containment`, which the rules use: an independent check must not share its
-    # errors.
-    state = glimpse.objects[key]
-    parents = [parent for parent in state.parents if parent in glimpse.objects]
-    parents = [parent for parent in parents if glimpse.objects[parent].type != "Floor"]
-    if state.held or not parents:
-        return None
-
-    def depth(parent: str) -> tuple[int, int]:
-        item = glimpse.objects[parent]
-        return sum(other in item.parents for other in parents), item.type.endswith("Basin")
-
-    return max(parents, key=depth)
-
-
-def _whole(key: str | None) -> str | None:
-    """Return the id of the whole for that of a part ("Sink|x|y|z|SinkBasin")."""
-    return None if key is None else "|".join(key.split("|")[:4])
-
-
-def _place(glimpse: FrameFacts, key: str) -> str | None:
-    holder = _holder(glimpse, key)
-    return None if holder is None else _name(glimpse.objects[holder].type)
-
-
-def _inside(glimpse: FrameFacts, words: str) -> set[str]:
-    """Return the ids of what is in or on a receptacle of a type."""
-    return {key for key in glimpse.objects if _place(glimpse, key) == _type_name(words)}
-
-
-def _events(facts: Sequence[FrameFacts], action: str, words: str | None = None) -> list[FrameFacts]:
-    """Return the facts right after an action on an object of a type, if they include the object."""
-    events = [item for item in facts if item.action == action and _is_target_known(item)]
-    return [item for item in events if words is None or _target_is(item, words)]
-
-
-def _is_target_known(item: FrameFacts) -> bool:
-    """Return True if the object acted on, or a slice of it, is among the known objects."""
-    target = item.target or ""
-    return target in item.objects or any(key.startswith(f"{target}|") for key in item.objects)
-
-
-def _target_name(item: FrameFacts) -> str:
-    """Return the type of the object acted on, from its id: its last part for slices and basins."""
-    parts = (item.target or "").split("|")
-    return _name(re.sub(r"_\d+$", "", parts[-1]) if len(parts) > 4 else parts[0])
-
-
-def _target_is(item: FrameFacts, words: str) -> bool:
-    return _target_name(item) == _type_name(words)
-
-
 def _handled_object(facts: Sequence[FrameFacts], words: str) -> str | None:
     """Return the object of a type that is acted on, or else the only known one."""
     acted = {
-        item.target
-        for item in facts
-        if item.target in item.objects and _is(item.objects[item.target], words)
+        frame.target
+        for frame in facts
+        if frame.target in frame.objects and is_of_type(frame.objects[frame.target], words)
     }
-    known = {key for item in facts for key, state in item.objects.items() if _is(state, words)}
+    known = {
+        key for frame in facts for key, state in frame.objects.items() if is_of_type(state, words)
+    }
     candidates = acted or known
     return next(iter(candidates)) if len(candidates) == 1 else None
 
@@ -170,54 +54,52 @@ def _track(facts: Sequence[FrameFacts], words: str) -> list[tuple[FrameFacts, st
     key = _handled_object(facts, words)
     if key is None:
         return []
-    known = [(item, _place(item, key)) for item in facts if key in item.objects]
-    return [(item, place) for item, place in known if place is not None]
+    known = [(frame, place_of(frame, key)) for frame in facts if key in frame.objects]
+    return [(frame, place) for frame, place in known if place is not None]
 
 
 def _presence(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    return [
-        "yes"
-        if any(_is(state, words) for item in facts for state in item.objects.values())
-        else "no"
-    ]
+    states = [state for frame in facts for state in frame.objects.values()]
+    return ["yes" if any(is_of_type(state, words) for state in states) else "no"]
 
 
 def _seen(facts: Sequence[FrameFacts], words: str) -> list[str]:
     words = re.sub(r"^an? ", "", words)
-    shown = (item.objects[key] for item in facts for key in item.in_frame & item.objects.keys())
-    return ["yes" if any(_is(state, words) for state in shown) else "no"]
+    shown = (frame.objects[key] for frame in facts for key in frame.in_frame & frame.objects.keys())
+    return ["yes" if any(is_of_type(state, words) for state in shown) else "no"]
 
 
 def _before(facts: Sequence[FrameFacts], words: str, first: str | None) -> list[str]:
-    picked = [item.frame for item in _events(facts, "PickupObject", words)]
+    picked = [frame.number for frame in events_of(facts, "PickupObject", words)]
     if len(picked) > 1 and not first:
         return []  # ambiguous
-    places = [place for item, place in _track(facts, words) if not picked or item.frame < picked[0]]
+    places = [
+        place for frame, place in _track(facts, words) if not picked or frame.number < picked[0]
+    ]
     return places[-1:]
 
 
 def _before_put(facts: Sequence[FrameFacts], words: str, place: str) -> list[str]:
     """Return where it was before the only put into a place, if that was only one place."""
     track = _track(facts, words)
-    puts = {item.frame for item in _events(facts, "PutObject", words)}
-    there = [item.frame for item, name in track if item.frame in puts and name == _type_name(place)]
-    before = {name for item, name in track if there and item.frame < there[0]}
+    puts = {frame.number for frame in events_of(facts, "PutObject", words)}
+    there = [
+        frame.number for frame, name in track if frame.number in puts and name == named_type(place)
+    ]
+    before = {name for frame, name in track if there and frame.number < there[0]}
     return list(before) if len(there) == len(before) == 1 else []
 
 
 def _moved_from(facts: Sequence[FrameFacts], words: str, place: str) -> list[str]:
     """Return where it went from a place, if it left that place once and then stayed."""
     places = _journey(facts, words)
-    return (
-        places[-1:]
-        if places[-2:-1] == [_type_name(place)] and places.count(_type_name(place)) == 1
-        else []
-    )
+    start = named_type(place)
+    return places[-1:] if places[-2:-1] == [start] and places.count(start) == 1 else []
 
 
 def _moved_to(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    puts = {item.frame for item in _events(facts, "PutObject", words)}
-    return [place for item, place in _track(facts, words) if item.frame in puts][-1:]
+    puts = {frame.number for frame in events_of(facts, "PutObject", words)}
+    return [place for frame, place in _track(facts, words) if frame.number in puts][-1:]
 
 
 def _now(facts: Sequence[FrameFacts], words: str) -> list[str]:
@@ -230,68 +112,64 @@ def _journey(facts: Sequence[FrameFacts], words: str) -> list[str]:
 
 
 def _puts_at(facts: Sequence[FrameFacts], place: str, words: str | None = None) -> list[FrameFacts]:
-    """Return the facts right after puts (of an object of a type) into or onto a receptacle of a
-    type."""
-    events = [item for item in _events(facts, "PutObject", words) if item.target in item.objects]
-    return [item for item in events if _place(item, item.target or "") == _type_name(place)]
+    """Return the facts right after puts (of a type of object) into a type of receptacle."""
+    events = [
+        frame for frame in events_of(facts, "PutObject", words) if frame.target in frame.objects
+    ]
+    return [frame for frame in events if place_of(frame, frame.target or "") == named_type(place)]
 
 
 def _put_into(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    return list({item.target: _target_name(item) for item in _puts_at(facts, place)}.values())
+    return list({frame.target: target_name(frame) for frame in _puts_at(facts, place)}.values())
 
 
 def _put_object(facts: Sequence[FrameFacts], _preposition: str, words: str) -> list[str]:
     """Return what is in the hand at one frame and in or on a receptacle at the next."""
     names = []
-    for previous, item in pairwise(facts):
-        target = item.target or ""
-        held = target in previous.objects and previous.objects[target].held
-        if (
-            item.action == "PutObject"
-            and held
-            and target in item.objects
-            and _place(item, target) == _type_name(words)
-        ):
-            names.append(_target_name(item))
+    for previous, frame in pairwise(facts):
+        target = frame.target or ""
+        if frame.action != "PutObject" or target not in frame.objects:
+            continue
+        was_held = target in previous.objects and previous.objects[target].held
+        if was_held and place_of(frame, target) == named_type(words):
+            names.append(target_name(frame))
     return names
 
 
 def _put_down(facts: Sequence[FrameFacts]) -> list[str]:
-    puts = [
-        item for item in _events(facts, "PutObject") if _place(item, item.target or "") is not None
-    ]
-    return list({item.target: _target_name(item) for item in puts}.values())
+    puts = events_of(facts, "PutObject")
+    known = [frame for frame in puts if place_of(frame, frame.target or "") is not None]
+    return list({frame.target: target_name(frame) for frame in known}.values())
 
 
 def _put_places(facts: Sequence[FrameFacts]) -> list[str]:
-    places = (_place(item, item.target or "") for item in _events(facts, "PutObject"))
+    places = (place_of(frame, frame.target or "") for frame in events_of(facts, "PutObject"))
     return list(dict.fromkeys(place for place in places if place is not None))
 
 
 def _opened_types(facts: Sequence[FrameFacts]) -> list[str]:
-    return list(dict.fromkeys(_target_name(item) for item in _events(facts, "OpenObject")))
+    return list(dict.fromkeys(target_name(frame) for frame in events_of(facts, "OpenObject")))
 
 
-def _open(item: FrameFacts, words: str) -> list[str]:
-    states = [
-        state for state in item.objects.values() if _is(state, words) and state.is_open is not None
-    ]
+def _open(frame: FrameFacts, words: str) -> list[str]:
+    named = [state for state in frame.objects.values() if is_of_type(state, words)]
+    states = [state for state in named if state.is_open is not None]
     return ["yes" if states[0].is_open else "no"] if len(states) == 1 else []
 
 
 def _ever_open(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    known = {answer for item in facts for answer in _open(item, words)}
+    known = {answer for frame in facts for answer in _open(frame, words)}
     return [max(known)] if known else []  # "yes" is the later word
 
 
 def _open_now(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    known = [answers for item in facts if (answers := _open(item, words))]
+    known = [answers for frame in facts if (answers := _open(frame, words))]
     return known[-1] if known else []
 
 
 def _open_then(facts: Sequence[FrameFacts], words: str, verb: str, item: str) -> list[str]:
     actions = {"picked up": "PickupObject", "sliced": "SliceObject", "turned on": "ToggleObjectOn"}
-    events = _events(facts, actions[verb], item)
+    events = events_of(facts, actions[verb], item)
     return _open(events[0], words) if len(events) == 1 else []
 
 
@@ -303,38 +181,33 @@ def _open_at_put(
 
 
 def _sliced_types(facts: Sequence[FrameFacts]) -> list[str]:
-    return [_target_name(item) for item in _events(facts, "SliceObject")]
+    return [target_name(frame) for frame in events_of(facts, "SliceObject")]
 
 
 def _at_slicing(facts: Sequence[FrameFacts], _preposition: str, place: str, item: str) -> list[str]:
     names = _left_at(facts, "SliceObject", place, item)
-    return sorted(
-        {_type_name(item) if name == f"{_type_name(item)}sliced" else name for name in names}
-    )
+    whole = named_type(item)
+    return sorted({whole if name == f"{whole}sliced" else name for name in names})
 
 
 def _at_opening(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
-    events = _events(facts, "OpenObject", place)
+    events = events_of(facts, "OpenObject", place)
     if not events:
         return []  # nothing shows when that was
-    since = (
-        events[:1]
-        if facts[0].everything
-        else [item for item in facts if item.frame >= events[0].frame]
-    )
-    return _all_contents([_only_loose(item) for item in since], "", place)
+    since = events[:1]
+    if not facts[0].everything:
+        since = [frame for frame in facts if frame.number >= events[0].number]
+    return _all_contents([only_loose(frame) for frame in since], "", place)
 
 
 def _left_at_pickup(
     facts: Sequence[FrameFacts], _preposition: str, place: str, item: str
 ) -> list[str]:
-    events = _events(facts, "PickupObject", item)
+    events = events_of(facts, "PickupObject", item)
     if len(events) != 1:
         return []  # nothing shows when that was, or it was not once
-    since = [
-        glimpse for glimpse in facts if facts[0].everything or glimpse.frame >= events[0].frame
-    ]
-    return _left_at([_only_loose(glimpse) for glimpse in since], "PickupObject", place, item)
+    since = [frame for frame in facts if facts[0].everything or frame.number >= events[0].number]
+    return _left_at([only_loose(frame) for frame in since], "PickupObject", place, item)
 
 
 def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) -> list[str]:
@@ -342,54 +215,42 @@ def _left_at(facts: Sequence[FrameFacts], action: str, place: str, item: str) ->
     if not facts[0].everything:
         return _all_contents(facts, "", place)
     for previous, event in pairwise(facts):
-        if event.action == action and event.target is not None and _target_is(event, item):
-            holder = _whole(_holder(previous, event.target))
-            inside = [
-                state.type
-                for key, state in event.objects.items()
-                if _whole(_holder(event, key)) == holder
-            ]
-            return sorted(map(_name, inside))
+        if event.action == action and event.target is not None and target_is(event, item):
+            holder = whole_id(holder_of(previous, event.target))
+            objects = event.objects
+            inside = [key for key in objects if whole_id(holder_of(event, key)) == holder]
+            return sorted(plain_name(objects[key].type) for key in inside)
     return []
-
-
-def _only_loose(item: FrameFacts) -> FrameFacts:
-    """Return the facts without the fixtures in or on others; objects without a parent remain, as
-    possible holders."""
-    remaining = {
-        key: state
-        for key, state in item.objects.items()
-        if state.type in item.loose or not state.parents
-    }
-    return replace(item, objects=remaining)
 
 
 def _all_contents(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[str]:
     """Return what is in a receptacle in any of the frames."""
-    return sorted(
-        {
-            key: _name(item.objects[key].type) for item in facts for key in _inside(item, place)
-        }.values()
-    )
+    names: dict[str, str] = {}
+    for frame in facts:
+        names |= _names_inside(frame, place)
+    return sorted(names.values())
+
+
+def _names_inside(frame: FrameFacts, place: str) -> dict[str, str]:
+    return {key: plain_name(frame.objects[key].type) for key in ids_inside(frame, place)}
 
 
 def _is_in(facts: Sequence[FrameFacts], item: str, _preposition: str, place: str) -> list[str]:
     places = _now(facts, item)
-    return ["yes" if places[0] == _type_name(place) else "no"] if places else []
+    return ["yes" if places[0] == named_type(place) else "no"] if places else []
 
 
 def _last_inside(facts: Sequence[FrameFacts], place: str) -> dict[str, str]:
-    """Return what is in a receptacle in the end, by id: where each object is at the last frame that
-    shows it."""
+    """Return what is in a receptacle in the end, by id, each at the last frame that shows it."""
     if facts[-1].everything:
-        return {key: _name(facts[-1].objects[key].type) for key in _inside(facts[-1], place)}
+        return _names_inside(facts[-1], place)
     names: dict[str, str] = {}
-    for item in facts:
-        inside = _inside(item, place)
-        for key, state in item.objects.items():
+    for frame in facts:
+        inside = ids_inside(frame, place)
+        for key, state in frame.objects.items():
             if key in inside:
-                names[key] = _name(state.type)
-            elif _place(item, key) is not None:
+                names[key] = plain_name(state.type)
+            elif place_of(frame, key) is not None:
                 names.pop(key, None)
     return names
 
@@ -404,15 +265,14 @@ def _how_many(facts: Sequence[FrameFacts], _preposition: str, place: str) -> lis
 
 
 def _moves(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    """Return how often it was put down; with full knowledge, it must have been picked up as
-    often."""
-    count = len(_events(facts, "PutObject", words))
-    paired = not facts[0].everything or count == len(_events(facts, "PickupObject", words)) > 1
+    """Return how often it was put down; the whole log must have as many pick-ups."""
+    count = len(events_of(facts, "PutObject", words))
+    paired = not facts[0].everything or count == len(events_of(facts, "PickupObject", words)) > 1
     return [str(count)] if count and paired else []
 
 
 def _openings(facts: Sequence[FrameFacts], words: str) -> list[str]:
-    count = len(_events(facts, "OpenObject", words))
+    count = len(events_of(facts, "OpenObject", words))
     return [str(count)] if count else []
 
 
@@ -422,7 +282,7 @@ def _puts(facts: Sequence[FrameFacts], _preposition: str, place: str) -> list[st
 
 
 def _n_picked_up(facts: Sequence[FrameFacts]) -> list[str]:
-    count = len({item.target for item in _events(facts, "PickupObject")})
+    count = len({frame.target for frame in events_of(facts, "PickupObject")})
     return [str(count)] if count else []
 
 

@@ -1,2 +1,1 @@
-"""A planner of arms: `reaching.plan_steps` finds collision-free paths to pick up and to put
-down."""
+"""A planner of arms: `reaching.plan_steps` finds collision-free paths to pick up and to put."""

@@ -1,5 +1,4 @@
-"""Candidate poses of a put, drawn at random: those in which to release the object, and those to
-pass on the way."""
+"""Candidate poses of a put, drawn at random: to release the object in, and to pass on the way."""
 
 import itertools
 import math
@@ -10,10 +9,9 @@ import numpy as np
 from numpy.random import Generator
 
 from infthor_eval.manipulation.geometry import Corners
-from infthor_eval.manipulation.planner.linkage import Array, Linkage, Poses, heading
+from infthor_eval.manipulation.planner.linkage import ArmStand, Array, Linkage, Poses, heading
 from infthor_eval.manipulation.planner.places import Entry, Places, firmness, occupancy, support
 from infthor_eval.manipulation.planner.roadmap import Contact, Terrain
-from infthor_eval.manipulation.planner.stand import ArmStand
 
 __all__ = ["PutGoal", "ReleasePoses", "passing_poses", "release_poses"]
 
@@ -23,14 +21,8 @@ _DRAWN = 8000
 _RATED = 1000
 _TESTED = 400
 _KEPT = 24
-_ABOVE = (
-    0.02,
-    0.02,
-    0.06,
-    0.12,
-    0.25,
-    0.4,
-)  # metres between a place, or a rim, and the object released above it
+# Metres between a place, or a rim, and the object released above it.
+_ABOVE = (0.02, 0.02, 0.06, 0.12, 0.25, 0.4)
 # In units of the places' spacing: a receptacle narrower than the first has few places, and one may
 # go beyond its outermost ones by the second.
 _FEW = 1.5
@@ -50,17 +42,13 @@ _BELOW_RIM = 0.3
 _PITCHED = 0.2
 _TURNED = 0.05
 _DROP = 0.5
-# cost of each collision with the receptacle within so many metres of the place
+# Cost of each collision with the receptacle within so many metres of the place
 _COLLIDED = 0.2
 _NEAR = 0.06
 _OUT = (0.12, 0.24, 0.36, 0.5, 0.65)  # metres before a place
 _CLEAR = 0.02  # metres by which the object is raised on the way there
 _UP = (0.08, 0.2, 0.4)  # metres above a place
-_FOLDED_REACHES = (
-    -0.2,
-    0.05,
-    0.2,
-)  # metres of the wrist ahead of the shoulder, with the arm drawn in
+_FOLDED_REACHES = (-0.2, 0.05, 0.2)  # metres of the wrist ahead, with the arm drawn in
 _FOLDED_YAWS = np.radians((0.0, 60.0, -60.0, 120.0, -120.0))
 _N_HEIGHTS = 4
 _WASTE = 6  # poses that are drawn for each that is kept, as most collide
@@ -94,8 +82,7 @@ class ReleasePoses:
 def release_poses(
     goal: PutGoal, terrain: Terrain, stand: ArmStand, draw: Generator
 ) -> ReleasePoses:
-    """Return the best of many poses in which the held object would come to rest in or on a
-    receptacle."""
+    """Return the best of many poses to release the held object in, in or on a receptacle."""
     poses, costs = _draw_above(goal, terrain.linkage, stand, draw)
     reached = np.flatnonzero(terrain.linkage.can_reach(poses))[:_RATED]
     poses = poses[reached]
@@ -112,49 +99,44 @@ def release_poses(
 
 
 def _count_contacts(goal: PutGoal, middles: Array, contacts: Sequence[Contact]) -> Array:
-    """Count the collisions (n,) with the receptacle near the held object's middle; in an opening,
-    on its way in."""
+    """Count collisions (n,) with the receptacle near the held object; in an opening, on the way."""
     counts = np.zeros(len(middles))
     for contact in contacts:
         if contact.on_goal:
             apart = np.abs(middles - contact.held)
-            counts += (
-                apart[:, 2 - goal.entry.axis] if goal.entry else np.hypot(apart[:, 0], apart[:, 2])
-            ) < _NEAR
+            across = np.hypot(apart[:, 0], apart[:, 2])
+            counts += (apart[:, 2 - goal.entry.axis] if goal.entry else across) < _NEAR
     return counts
 
 
 def _draw_above(
     goal: PutGoal, linkage: Linkage, stand: ArmStand, draw: Generator
 ) -> tuple[Poses, Array]:
-    """Draw poses (n) with the held object above places, with their costs (n,) except those of how
-    it would rest."""
+    """Draw poses (n) above places, with their costs (n,) but for how the object would rest."""
     points = _within_reach(goal.places.points, linkage)
     spots = _jitter(points[draw.integers(len(points), size=_DRAWN)], goal.places, draw)
     yaws = draw.choice(_YAWS, size=_DRAWN)
     pitches = draw.choice(_PITCHES, size=_DRAWN)
-    yaws = np.where(
-        draw.random(_DRAWN) < 1 / 2, yaws, draw.uniform(_YAWS[0], _YAWS[-1], size=_DRAWN)
-    )
+    is_straight = draw.random(_DRAWN) < 1 / 2
+    yaws = np.where(is_straight, yaws, draw.uniform(_YAWS[0], _YAWS[-1], size=_DRAWN))
     turns = heading(stand.heading + yaws, pitches)
     aloft = draw.choice(_ABOVE, size=_DRAWN)
     grounds, more = _grounds(goal, spots, draw)
     costs = _PITCHED * np.abs(pitches) + _TURNED * np.abs(yaws) + _DROP * aloft + more
     held = linkage.held_box(Poses(np.zeros((_DRAWN, 3)), np.zeros(_DRAWN), turns))
     lower = (np.abs(held.axes[:, 0, :, 1]) * held.half[:, 0]).sum(axis=1)
-    wrists = (
-        np.stack([spots[:, 0], grounds + aloft + lower, spots[:, 2]], axis=1) - held.center[:, 0]
-    )
+    middles = np.stack([spots[:, 0], grounds + aloft + lower, spots[:, 2]], axis=1)
+    wrists = middles - held.center[:, 0]
     bases = np.clip(wrists[:, 1] + draw.choice(_BASES, size=_DRAWN), stand.low, stand.high)
     wrists[:, 1] -= bases
     return Poses(wrists, bases, turns), costs
 
 
 def _jitter(spots: Array, places: Places, draw: Generator) -> Array:
-    """Move places (n, 3) by up to half their spacing, not beyond the outermost ones unless there
-    are few."""
+    """Move places (n, 3) by up to half their spacing, not beyond the outermost ones of many."""
     spacing = places.spacing
-    low, high = places.points.min(axis=0), places.points.max(axis=0)
+    low = places.points.min(axis=0)
+    high = places.points.max(axis=0)
     margin = np.where(high - low < _FEW * spacing, _BEYOND * spacing, 0.0)
     moved = spots + spacing * draw.uniform(-1 / 2, 1 / 2, size=spots.shape) * (1.0, 0.0, 1.0)
     clipped: Array = np.clip(moved, low - margin, high + margin)
@@ -162,8 +144,7 @@ def _jitter(spots: Array, places: Places, draw: Generator) -> Array:
 
 
 def _grounds(goal: PutGoal, spots: Array, draw: Generator) -> tuple[Array, Array]:
-    """Return the heights (n,) above which to release the object over some places (n, 3), and their
-    costs (n,)."""
+    """Return heights (n,) to release the object above, over places (n, 3), and costs (n,)."""
     rim = goal.places.top
     if goal.entry is not None or rim < spots[:, 1].max() + _RIM:
         return spots[:, 1], np.zeros(len(spots))
@@ -181,18 +162,16 @@ def _within_reach(points: Array, linkage: Linkage) -> Array:
 def passing_poses(
     goal: PutGoal, terrain: Terrain, stand: ArmStand, ends: Poses, count: int, draw: Generator
 ) -> Poses:
-    """Return free poses to pass: before and above release poses, with a folded arm, near the
-    present one, anywhere."""
-    known = Poses.join(
-        [*_approaches(ends, goal.entry, stand), _folded_poses(terrain.linkage, stand)]
-    )
-    drawn = [
-        _random_poses(terrain.linkage, stand, _WASTE * count, draw),
-        _nearby_poses(terrain.linkage, stand, count, draw),
-    ]
-    return Poses.join(
-        [known[terrain.free(known)], *(poses[terrain.free(poses)][:count] for poses in drawn)]
-    )
+    """Return free poses to pass: before and above releases, folded, near the present, any."""
+    linkage = terrain.linkage
+    known = Poses.join([*_approaches(ends, goal.entry, stand), _folded_poses(linkage, stand)])
+    anywhere = _random_poses(linkage, stand, _WASTE * count, draw)
+    nearby = _nearby_poses(linkage, stand, count, draw)
+    return Poses.join([
+        known[terrain.free(known)],
+        anywhere[terrain.free(anywhere)][:count],
+        nearby[terrain.free(nearby)][:count],
+    ])  # fmt: skip
 
 
 def _approaches(ends: Poses, entry: Entry | None, stand: ArmStand) -> Iterator[Poses]:
@@ -201,11 +180,8 @@ def _approaches(ends: Poses, entry: Entry | None, stand: ArmStand) -> Iterator[P
         yield Poses(ends.wrists + np.array([0.0, up, 0.0]), ends.bases, ends.turns)
     if entry is not None:
         for out in _OUT:
-            yield Poses(
-                ends.wrists + entry.vector_out(out) + np.array([0.0, _CLEAR, 0.0]),
-                ends.bases,
-                ends.turns,
-            )
+            wrists = ends.wrists + entry.vector_out(out) + np.array([0.0, _CLEAR, 0.0])
+            yield Poses(wrists, ends.bases, ends.turns)
 
 
 def _folded_poses(linkage: Linkage, stand: ArmStand) -> Poses:
@@ -235,12 +211,10 @@ def _random_poses(linkage: Linkage, stand: ArmStand, count: int, draw: Generator
 
 
 def _nearby_poses(linkage: Linkage, stand: ArmStand, count: int, draw: Generator) -> Poses:
-    """Draw poses near the present one: where it is narrow, the path out begins with small
-    movements."""
+    """Draw poses near the present one: a path out of a narrow space begins with small movements."""
     now = linkage.now
     wrists = now.wrists + draw.normal(scale=_AROUND, size=(count, 3))
     bases = np.clip(now.bases + draw.normal(scale=2 * _AROUND, size=count), stand.low, stand.high)
     turns = heading(draw.normal(scale=1.0, size=count), np.zeros(count)) @ now.turns
-    return Poses(
-        wrists, bases, np.where((draw.random(count) < 1 / 2)[:, None, None], turns, now.turns)
-    )
+    is_turned = (draw.random(count) < 1 / 2)[:, None, None]
+    return Poses(wrists, bases, np.where(is_turned, turns, now.turns))

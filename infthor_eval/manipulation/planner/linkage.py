@@ -11,9 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from infthor_eval.manipulation.geometry import middle_of, point_of, size_of
-from infthor_eval.thor.view import ArmState, AxisAngle, ThorObject
+from infthor_eval.thor.view import AgentPose, ArmState, AxisAngle, ThorObject
 
-__all__ = ["Array", "Linkage", "Parts", "Poses", "angles_of", "heading", "rotations_about"]
+__all__ = [
+    "ArmStand",
+    "Array",
+    "Linkage",
+    "Parts",
+    "Poses",
+    "angles_of",
+    "heading",
+    "rotations_about",
+]
 
 Array = NDArray[np.float64]
 _UP: Array = np.array([0.0, 1.0, 0.0])
@@ -21,6 +30,32 @@ _THICK = 0.045  # metres: half the thickness of links and palm, a little more th
 # share of the arm's length that is used: the elbow of a fully stretched arm has no defined side
 _STRETCHED = 0.995
 _TINY = 1e-6
+_FLOOR = 0.9  # metres from the agent's position down to the floor
+_RANGE = 0.451, 1.801  # metres: heights of the arm's base above the floor
+
+
+@dataclass(frozen=True)
+class ArmStand:
+    """Where an agent stands: heights of its arm's base (metres) and its direction (radians)."""
+
+    low: float
+    high: float
+    heading: float
+
+    @classmethod
+    def of(cls, agent: AgentPose) -> "ArmStand":
+        """Return the stand of an agent; AI2-THOR's agents with an arm all have one height."""
+        floor = agent.position.y - _FLOOR
+        return cls(floor + _RANGE[0], floor + _RANGE[1], math.radians(agent.rotation))
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor, metres."""
+        return self.low - _RANGE[0]
+
+    def share(self, base: float) -> float:
+        """Return a height of the base as `MoveArmBase` takes it, from 0 to 1."""
+        return min(1.0, max(0.0, (base - self.low) / (self.high - self.low)))
 
 
 @dataclass(frozen=True)
@@ -54,10 +89,11 @@ class Poses:
     @staticmethod
     def join(several: "list[Poses]") -> "Poses":
         """Concatenate poses."""
-        wrists, bases, turns = (
-            [getattr(s, name) for s in several] for name in ("wrists", "bases", "turns")
+        return Poses(
+            np.concatenate([poses.wrists for poses in several]),
+            np.concatenate([poses.bases for poses in several]),
+            np.concatenate([poses.turns for poses in several]),
         )
-        return Poses(np.concatenate(wrists), np.concatenate(bases), np.concatenate(turns))
 
 
 @dataclass(frozen=True)
@@ -73,6 +109,15 @@ class Parts:
     center: Array
     axes: Array
     half: Array
+
+    @staticmethod
+    def join(several: "list[Parts]") -> "Parts":
+        """Concatenate boxes (n, *) of the same poses."""
+        return Parts(
+            np.concatenate([parts.center for parts in several], axis=1),
+            np.concatenate([parts.axes for parts in several], axis=1),
+            np.concatenate([parts.half for parts in several], axis=1),
+        )
 
 
 class Linkage:
@@ -103,7 +148,8 @@ class Linkage:
                 pose are the best: the arm is bent, which tells the side of the elbow, and the hand
                 is level, so the object's box is tight.
         """
-        base, shoulder, elbow, wrist = (np.array(point_of(joint.position)) for joint in arm.joints)
+        joints = [np.array(point_of(joint.position)) for joint in arm.joints]
+        base, shoulder, elbow, wrist = joints
         self.shoulder: Array = shoulder - base[1] * _UP
         self._foot: Array = base - base[1] * _UP
         turn = _matrix(arm.joints[-1].rotation)
@@ -145,9 +191,8 @@ class Linkage:
     def parts(self, poses: Poses) -> Parts:
         """Return all boxes (n, 5): base, upper arm, forearm, palm, and the held object."""
         elbows = self._elbows(poses.wrists)
-        foot, shoulder = (
-            np.broadcast_to(point, elbows.shape) for point in (self._foot, self.shoulder)
-        )
+        foot = np.broadcast_to(self._foot, elbows.shape)
+        shoulder = np.broadcast_to(self.shoulder, elbows.shape)
         rods = [_rod(foot, shoulder), _rod(shoulder, elbows), _rod(elbows, poses.wrists)]
         palm_axes = poses.turns.transpose(0, 2, 1)[:, None]
         palm = Parts(poses.wrists[:, None], palm_axes, np.full((len(poses), 1, 3), _THICK))
@@ -155,16 +200,10 @@ class Linkage:
             Parts(p.center + (poses.bases[:, None] * _UP)[:, None], p.axes, p.half)
             for p in (*rods, palm)
         ]
-        parts = [*lifted, self.held_box(poses)]
-        joined = (
-            np.concatenate([getattr(p, name) for p in parts], axis=1)
-            for name in ("center", "axes", "half")
-        )
-        return Parts(*joined)
+        return Parts.join([*lifted, self.held_box(poses)])
 
     def _elbows(self, wrists: Array) -> Array:
-        """Return the elbows (n, 3) of wrists (n, 3): the circle on which both links meet, on the
-        measured side."""
+        """Return elbows (n, 3) of wrists (n, 3): where both links meet, on the measured side."""
         line = wrists - self.shoulder
         far = np.clip(np.linalg.norm(line, axis=1), _TINY, sum(self._lengths))
         upper, fore = self._lengths
@@ -183,14 +222,14 @@ def _normals(lines: Array) -> tuple[Array, Array]:
     """Return unit vectors (n, 3) at right angles to some lines (n, 3): upwards and to the side."""
     x, y, z = (lines / np.maximum(np.linalg.norm(lines, axis=1, keepdims=True), _TINY)).T
     level = np.maximum(np.hypot(x, z), _TINY)
-    x, z = x / level, z / level
+    x /= level
+    z /= level
     nothing = np.zeros_like(x)
     return np.stack([-x * y, level, -z * y], axis=1), np.stack([z, nothing, -x], axis=1)
 
 
 def _elbow_side(upper: Array, line: Array) -> tuple[float, float]:
-    """Return the direction of an elbow from the line between shoulder and wrist: its share upwards
-    and to the side."""
+    """Return an elbow's direction from the line of shoulder and wrist: shares upwards, aside."""
     over, aside = _normals(line[None])
     out = float(over[0] @ upper), float(aside[0] @ upper)
     length = math.hypot(*out)
@@ -213,8 +252,7 @@ def _matrix(rotation: AxisAngle) -> Array:
 
 
 def rotations_about(axis: Array, angles: Array) -> Array:
-    """Return rotations (n, 3, 3) about a unit axis by angles (n,) in radians, by Rodrigues'
-    formula."""
+    """Return rotations (n, 3, 3) about a unit axis by angles (n,), radians: Rodrigues' formula."""
     skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
     rotations: Array = (
         np.eye(3)
@@ -225,14 +263,12 @@ def rotations_about(axis: Array, angles: Array) -> Array:
 
 
 def heading(yaws: Array, pitches: Array) -> Array:
-    """Return rotations (n, 3, 3) of hands that point to a yaw (n,) and down by a pitch (n,),
-    radians."""
+    """Return rotations (n, 3, 3) of hands to a yaw (n,) and down by a pitch (n,), radians."""
     return rotations_about(_UP, yaws) @ rotations_about(np.array([1.0, 0.0, 0.0]), pitches)
 
 
 def angles_of(turn: Array) -> tuple[float, float, float]:
-    """Return pitch, yaw and roll in degrees, as `RotateWristRelative` takes them, of a rotation (3,
-    3)."""
+    """Return a rotation's (3, 3) pitch, yaw and roll, degrees, as `RotateWristRelative` takes."""
     pitch = math.asin(float(np.clip(-turn[1, 2], -1.0, 1.0)))
     yaw = math.atan2(turn[0, 2], turn[2, 2])
     roll = math.atan2(turn[1, 0], turn[1, 1])

@@ -21,9 +21,7 @@ _LEAN = 0.1  # share of its width by which the free edge of an open door leans o
 _FAR = 0.05  # metres from the arm beyond which the exact distance of a box does not matter
 _LATTICE = 1.05  # maximum distance of neighbours in a row, in units of the places' spacing
 _TURNED = 4.0  # ratio of squared rows to points above which a lattice is not along the axes
-_THIN = (
-    0.1  # metres between places and the top of their box within which the box is filled to its top
-)
+_THIN = 0.1  # metres from places to their box's top within which the box is filled to its top
 
 
 @dataclass(frozen=True)
@@ -57,23 +55,21 @@ def obstacles_of(boxes: Iterable[tuple[str, Corners]]) -> Obstacles:
 
 
 def clearances(parts: Parts, obstacles: Obstacles) -> Array:
-    """Return how far (n, m, things) parts (n, m) are from things, metres; negative values are
-    depths of overlap.
+    """Return how far (n, m, things) parts (n, m) are from things, metres; overlaps are negative.
 
     Things that are far from all parts are at infinity. This is the separating axis test without the
     directions at right angles to two edges: that saves nine of fifteen axes, and edges that pass
     each other closely count as a collision.
     """
     things = obstacles.things()
-    clearance = np.full(
-        (*parts.center.shape[:2], int(things[-1]) + 1 if len(things) else 0), np.inf
-    )
+    n_things = int(things[-1]) + 1 if len(things) else 0
+    clearance = np.full((*parts.center.shape[:2], n_things), np.inf)
     extent = (np.abs(parts.axes) * parts.half[..., None]).sum(axis=-2)
-    low, high = (parts.center - extent).min(axis=(0, 1)), (parts.center + extent).max(axis=(0, 1))
-    near = (obstacles.center - obstacles.half < high + _FAR) & (
-        obstacles.center + obstacles.half > low - _FAR
-    )
-    near = near.all(axis=1)
+    low = (parts.center - extent).min(axis=(0, 1))
+    high = (parts.center + extent).max(axis=(0, 1))
+    is_below = obstacles.center - obstacles.half < high + _FAR
+    is_above = obstacles.center + obstacles.half > low - _FAR
+    near = (is_below & is_above).all(axis=1)
     if near.any():
         owners, firsts = np.unique(things[near], return_index=True)
         to_boxes = _separations(parts, extent, obstacles.center[near], obstacles.half[near])
@@ -82,8 +78,7 @@ def clearances(parts: Parts, obstacles: Obstacles) -> Array:
 
 
 def _separations(parts: Parts, extent: Array, center: Array, half: Array) -> Array:
-    """Return separations (n, m, k) of oriented boxes (n, m), with extents (n, m, 3), from boxes
-    along the axes (k)."""
+    """Return separations (n, m, k) of oriented boxes (n, m), extents (n, m, 3), from boxes (k)."""
     between = center - parts.center[:, :, None]
     along_world = (np.abs(between) - half - extent[:, :, None]).max(axis=-1)
     turned = parts.axes.transpose(0, 1, 3, 2)
@@ -92,10 +87,9 @@ def _separations(parts: Parts, extent: Array, center: Array, half: Array) -> Arr
     return separations
 
 
-def columns(item: ThorObject, places: Places) -> list[Corners]:
-    """Return boxes below the places of a piece of furniture; its own box may be partly empty, as a
-    corner counter's."""
-    box = corners_of(item)
+def columns(furniture: ThorObject, places: Places) -> list[Corners]:
+    """Return boxes below furniture's places; its own box may be partly empty (a corner counter)."""
+    box = corners_of(furniture)
     boxes = []
     for height in places.heights:
         bottom, top = min(box.low[1], height - _BOARD), height
@@ -119,16 +113,12 @@ def _rectangles(points: Array, spacing: float) -> list[tuple[_Span, _Span]]:
     for x, _, z in np.round(points, 3).tolist():
         rows.setdefault(x, []).append(z)
     if len(rows) ** 2 > _TURNED * len(points) * _ratio(points):
-        low, high = points.min(axis=0), points.max(axis=0)
-        return [
-            _rectangle_around(
-                (float(low[0]), float(high[0])), (float(low[2]), float(high[2])), spacing
-            )
-        ]
+        xs = float(points[:, 0].min()), float(points[:, 0].max())
+        zs = float(points[:, 2].min()), float(points[:, 2].max())
+        return [_rectangle_around(xs, zs, spacing)]
     closed: list[tuple[_Span, _Span]] = []
-    growing: dict[
-        _Span, _Span
-    ] = {}  # the first and last x of rows that reach from one z to another
+    # The first and last x of rows that reach from one z to another.
+    growing: dict[_Span, _Span] = {}
     for x in sorted(rows):
         for run in _runs(sorted(rows[x]), spacing):
             first, last = growing.get(run, (x, x))
@@ -163,26 +153,25 @@ def _runs(values: Sequence[float], spacing: float) -> list[_Span]:
     return [*runs, (first, last)]
 
 
-def cavity(item: ThorObject, places: Places, entry: Entry, hinge: int) -> list[Corners]:
-    """Return boxes of a receptacle that is entered from the front: sides, back, top, boards, and
-    its open door.
+def cavity(receptacle: ThorObject, places: Places, entry: Entry, hinge: int) -> list[Corners]:
+    """Return boxes of a receptacle entered from the front: sides, back, top, boards, open door.
 
     Args:
         hinge: edge of the opening that the door hangs on: -1 for the one of lower coordinate, 1 for
             the other, 0 for no door.
     """
-    box = corners_of(item)
+    box = corners_of(receptacle)
     half = places.spacing / 2
     axis = entry.axis
     across = 2 - entry.axis
-    low, high = places.points.min(axis=0) - half, places.points.max(axis=0) + half
+    low = places.points.min(axis=0) - half
+    high = places.points.max(axis=0) + half
     inner = Corners((low[0], box.low[1], low[2]), (high[0], box.high[1], high[2]))
     boxes = [_slab(inner, across, side, 2 * _BOARD) for side in (-1, 1)]
     boxes.append(_slab(inner, axis, -entry.sign, 2 * _BOARD))
     if places.is_roofed(places.heights[-1]):
-        boxes.append(
-            Corners((low[0], box.high[1] - _BOARD, low[2]), (high[0], box.high[1], high[2]))
-        )
+        roof = box.high[1]
+        boxes.append(Corners((low[0], roof - _BOARD, low[2]), (high[0], roof, high[2])))
     for height in places.heights:
         boxes.append(Corners((low[0], height - 2 * _BOARD, low[2]), (high[0], height, high[2])))
     leaf = (box.high if entry.sign > 0 else box.low)[axis], entry.position
@@ -200,8 +189,7 @@ def _slab(inner: Corners, axis: int, side: int, thick: float) -> Corners:
 
 
 def _leaf(inner: Corners, entry: Entry, hinge: int, end: float) -> list[Corners]:
-    """Return an open door in pieces, the outer ones more over the opening: doors stop short of a
-    right angle."""
+    """Return an open door in pieces, outer ones more over the opening: it stops short of 90°."""
     across = 2 - entry.axis
     width = inner.high[across] - inner.low[across]
     edge = (inner.high if hinge > 0 else inner.low)[across]

@@ -1,5 +1,4 @@
-"""Places in or on a receptacle, and whether a held object would come to rest there if it was
-released."""
+"""Places in or on a receptacle, and whether a released object would come to rest there."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,19 +23,10 @@ __all__ = [
     "support",
 ]
 
-ENTERED = {
-    "Fridge",
-    "Microwave",
-    "Cabinet",
-    "Safe",
-    "CoffeeMachine",
-    "Shelf",
-    "ShelvingUnit",
-}  # from the front
+# Types of receptacles that are entered from the front.
+ENTERED = {"Fridge", "Microwave", "Cabinet", "Safe", "CoffeeMachine", "Shelf", "ShelvingUnit"}
 _SPACING = 0.05  # metres between places if there is only one
-_SUNK = (
-    0.05  # metres that an object may be below the places that it stands on, as boxes are inexact
-)
+_SUNK = 0.05  # metres that an object may be below its places, as boxes are inexact
 _LEVEL = 0.01  # metres within which places are on one board
 _BREADTH = 0.05  # metres from the foremost places to the opening
 _THIN = 0.05  # metres above its topmost places from which a receptacle has a roof
@@ -79,8 +69,7 @@ class Places:
         return height < self.heights[-1] - _LEVEL or (self.entered and self.top > height + _THIN)
 
     def ceiling(self, height: float) -> float:
-        """Return the height of the ceiling over a board: the next board, or the receptacle's
-        top."""
+        """Return the height of the ceiling over a board: the next board, or the top."""
         above = [other for other in self.heights if other > height + _LEVEL]
         return above[0] if above else self.top
 
@@ -106,16 +95,16 @@ class Entry:
         return vector
 
 
-def places_of(environment: ArmEnvironment, item: ThorObject) -> Places | None:
+def places_of(environment: ArmEnvironment, receptacle: ThorObject) -> Places | None:
     """Return a receptacle's places, as the simulator reports them; None if it has none."""
     answer = environment.query(
-        "GetSpawnCoordinatesAboveReceptacle", objectId=item.object_id, anywhere=True
+        "GetSpawnCoordinatesAboveReceptacle", objectId=receptacle.object_id, anywhere=True
     )
     if not answer:
         return None
     points = np.array([(place["x"], place["y"], place["z"]) for place in answer], dtype=float)
-    top = middle_of(item)[1] + size_of(item)[1] / 2
-    return Places(points, _spacing(points), top, is_entered(item))
+    top = middle_of(receptacle)[1] + size_of(receptacle)[1] / 2
+    return Places(points, _spacing(points), top, is_entered(receptacle))
 
 
 def _spacing(points: Array) -> float:
@@ -126,43 +115,42 @@ def _spacing(points: Array) -> float:
     return float(apart.min()) if len(apart) else _SPACING
 
 
-def is_entered(item: ThorObject) -> bool:
+def is_entered(receptacle: ThorObject) -> bool:
     """Return whether objects are brought into a receptacle from its front."""
-    return item.object_type in ENTERED
+    return receptacle.object_type in ENTERED
 
 
-def entry_of(view: SimulatorView, item: ThorObject, places: Places) -> Entry | None:
+def entry_of(view: SimulatorView, receptacle: ThorObject, places: Places) -> Entry | None:
     """Return the opening of a receptacle that is entered from the front; None for others.
 
     The metadata have no direction of it. An open door extends the box on that side, so the box's
     middle is off the places' middle towards the opening. A receptacle without a door is open
     towards the agent.
     """
-    if not is_entered(item):
+    if not is_entered(receptacle):
         return None
-    low, high = places.points.min(axis=0), places.points.max(axis=0)
-    towards = middle_of(item) if item.openable else point_of(view.agent.position)
+    low = places.points.min(axis=0)
+    high = places.points.max(axis=0)
+    towards = middle_of(receptacle) if receptacle.openable else point_of(view.agent.position)
     way = np.array(towards) - (low + high) / 2
     axis = 0 if abs(way[0]) > abs(way[2]) else 2
     sign = 1 if way[axis] > 0 else -1
     return Entry(axis, sign, float((high if sign > 0 else low)[axis]) + sign * _BREADTH)
 
 
-def others_on(view: SimulatorView, item: ThorObject, held: str) -> list[ThorObject]:
-    """Return loose objects that may stand in or on a receptacle, except the held one and what the
-    receptacle is in."""
+def others_on(view: SimulatorView, receptacle: ThorObject, held: str) -> list[ThorObject]:
+    """Return loose objects that may be in or on a receptacle, not the held one or its holders."""
     around = {
         name
         for name, other in view.objects.items()
-        if item.object_id in (other.receptacle_object_ids or ())
+        if receptacle.object_id in (other.receptacle_object_ids or ())
     }
-    apart = {held, item.object_id, *around, *(item.parent_receptacles or ())}
+    apart = {held, receptacle.object_id, *around, *(receptacle.parent_receptacles or ())}
     return [other for name, other in view.objects.items() if name not in apart and other.pickupable]
 
 
 def support(held: Parts, places: Places) -> Array:
-    """Return the share (n,) of held boxes (n, 1) that would be over a board below; 0 if the middle
-    would not."""
+    """Return the share (n,) of held boxes (n, 1) over a board below; 0 if the middle is not."""
     corners = held.axes[:, 0].transpose(0, 2, 1)[:, None] @ (_CORNERS * held.half)[..., None]
     spots = (held.center + _SHRUNK * corners[..., 0])[:, :, [0, 2]]
     bottom = held.center[:, 0, 1] - (np.abs(held.axes[:, 0, :, 1]) * held.half[:, 0]).sum(axis=1)
@@ -185,8 +173,7 @@ _CORNERS: Array = np.array(
 
 
 def occupancy(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
-    """Return how much (n,) a place is occupied: 1 if the object's middle would fall on another,
-    half if it would touch.
+    """Return how much (n,) a place is occupied: 1 if the middle falls on an object, 1/2 beside it.
 
     Args:
         held: box of the held object in some poses (n, 1).
@@ -195,10 +182,12 @@ def occupancy(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
     """
     if not others:
         return np.zeros(len(held.center))
-    low, high = np.array([box.low for box in others]), np.array([box.high for box in others])
+    low = np.array([box.low for box in others])
+    high = np.array([box.high for box in others])
     extent = (np.abs(held.axes[:, 0]) * held.half[:, 0, :, None]).sum(axis=-2)
     middle = held.center[:, 0]
-    bottom, top = middle[:, 1] - extent[:, 1], middle[:, 1] + extent[:, 1]
+    bottom = middle[:, 1] - extent[:, 1]
+    top = middle[:, 1] + extent[:, 1]
     grounds = np.array(places.heights)
     ground = np.where(grounds <= bottom[:, None], grounds, -np.inf).max(axis=1)[:, None]
     level = (
@@ -212,12 +201,10 @@ def occupancy(held: Parts, places: Places, others: Sequence[Corners]) -> Array:
 
 
 def firmness(held: Parts, places: Places) -> Array:
-    """Return how far (n,) the middle of the held object is from the edge of the boards: from 0, at
-    the edge, to 1."""
+    """Return how far (n,) the held object's middle is from the boards' edge, from 0 to 1."""
     middles = held.center[:, 0]
     apart = np.abs(middles[:, None, [0, 2]] - places.points[None, :, [0, 2]])
-    around = (np.linalg.norm(apart, axis=-1) <= _FIRM * places.spacing).sum(axis=1) / len(
-        places.heights
-    )
+    near = np.linalg.norm(apart, axis=-1) <= _FIRM * places.spacing
+    around = near.sum(axis=1) / len(places.heights)
     firm: Array = np.minimum(around, _WHOLE) / _WHOLE
     return firm

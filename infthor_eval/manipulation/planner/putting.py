@@ -1,5 +1,4 @@
-"""Putting down a held object: paths to a place, and what collisions on them tell about the
-surroundings."""
+"""Putting down a held object: paths to a place, and what collisions tell of the surroundings."""
 
 from collections.abc import Iterator, Sequence
 
@@ -9,7 +8,7 @@ from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment, arm_of
 from infthor_eval.manipulation.geometry import xyz
 from infthor_eval.manipulation.planner.candidates import PutGoal, passing_poses, release_poses
-from infthor_eval.manipulation.planner.linkage import Linkage, angles_of
+from infthor_eval.manipulation.planner.linkage import ArmStand, Linkage, angles_of
 from infthor_eval.manipulation.planner.roadmap import (
     ArmMove,
     Contact,
@@ -18,7 +17,6 @@ from infthor_eval.manipulation.planner.roadmap import (
     Terrain,
     first_pose_of,
 )
-from infthor_eval.manipulation.planner.stand import ArmStand
 from infthor_eval.manipulation.planner.surroundings import Belief, Surroundings
 
 __all__ = ["put_steps"]
@@ -39,8 +37,7 @@ Steps = Iterator[Sequence[Call]]
 
 
 def put_steps(environment: ArmEnvironment) -> Steps:
-    """Yield steps that bring the held object over a place and release it there; after a collision,
-    by another path."""
+    """Yield steps that bring the object over a place and release it; anew after collisions."""
     task = _PutTask(environment)
     for _ in range(_MAX_PATHS):
         moves = task.moves()
@@ -136,9 +133,9 @@ class _PutTask:
     def _goal(self) -> PutGoal | None:
         """Return where to put the object; None if the receptacle has no places."""
         around = self._surroundings
-        return (
-            None if around.places is None else PutGoal(around.places, around.entry, around.others())
-        )
+        if around.places is None:
+            return None
+        return PutGoal(around.places, around.entry, around.others())
 
     def _measure(self) -> Linkage:
         view = self._environment.view

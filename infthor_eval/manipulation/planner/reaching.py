@@ -1,5 +1,4 @@
-"""How an arm that knows where everything is moves its hand to an object, to pick it up or to put it
-down."""
+"""How an arm that knows where everything is moves its hand to pick an object up or put it down."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -8,31 +7,21 @@ from infthor_eval.manipulation.conversion import Call
 from infthor_eval.manipulation.environment import ArmEnvironment, arm_of
 from infthor_eval.manipulation.geometry import Point, interpolate, middle_of, offset, point_of, xyz
 from infthor_eval.manipulation.kinds import ManipulationKind
+from infthor_eval.manipulation.planner.linkage import ArmStand
 from infthor_eval.manipulation.planner.putting import put_steps
-from infthor_eval.manipulation.planner.stand import ArmStand
 from infthor_eval.thor.view import SimulatorView
 
 __all__ = ["plan_steps"]
 
-_SHIFTS = (
-    0.0,
-    0.25,
-    -0.25,
-    0.5,
-    -0.5,
-)  # metres of the base above a target's height, tried one after the other
+_SHIFTS = (0.0, 0.25, -0.25, 0.5, -0.5)  # metres of the base above a target, tried in order
 
 Steps = Iterator[Sequence[Call]]
 
 
 def plan_steps(environment: ArmEnvironment) -> Steps:
-    """Yield steps up to the end of the present episode; each is planned after the one before was
-    executed."""
-    return (
-        _pick_up(environment)
-        if environment.episode.kind == ManipulationKind.PICKUP
-        else put_steps(environment)
-    )
+    """Yield steps up to the end of the episode, each planned after the one before it ran."""
+    is_pickup = environment.episode.kind == ManipulationKind.PICKUP
+    return _pick_up(environment) if is_pickup else put_steps(environment)
 
 
 def _pick_up(environment: ArmEnvironment) -> Steps:
@@ -55,10 +44,9 @@ def _approach(environment: ArmEnvironment, target: str) -> Iterator[Call]:
         yield {"action": "MoveArmBase", "y": share, "returnToStart": False}
         for _ in range(2):
             yield _aim(environment.view, goal)
-            place = xyz(_wrist_before(environment.view, goal))
             yield {
                 "action": "MoveArm",
-                "position": place,
+                "position": xyz(_wrist_before(environment.view, goal)),
                 "coordinateSpace": "world",
                 "returnToStart": False,
             }
@@ -87,8 +75,7 @@ def _elevation(direction: Point) -> float:
 
 
 def _wrist_before(view: SimulatorView, goal: Point) -> Point:
-    """Return the position of the wrist for which the sphere's centre is at a goal, coming from
-    where the wrist is."""
+    """Return the wrist's position with the sphere's centre at a goal, on the straight way there."""
     arm = arm_of(view)
     wrist = point_of(arm.wrist)
     length = math.dist(wrist, point_of(arm.sphere_center))

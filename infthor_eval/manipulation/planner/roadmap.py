@@ -25,12 +25,8 @@ __all__ = ["ArmMove", "Contact", "MoveKind", "Roadmap", "Terrain", "first_pose_o
 _STEP = 0.03
 _ANGLE = math.radians(5.0)
 _MARGIN = 0.01  # metres that are kept from obstacles
-_STUCK = (
-    0.02  # metres of overlap from which a thing cannot be where its box says, as the arm is there
-)
-_NEAR = (
-    0.05  # metres around a contact of the hand, and of the held object, that are not tried again
-)
+_STUCK = 0.02  # metres of overlap with the arm from which a thing's box cannot be right
+_NEAR = 0.05  # metres around a contact of the hand and the held object that are not tried again
 _NEIGHBOURS = 14  # of a pose in the roadmap
 _GLANCE = 3  # every third pose of a movement is tested first: most collisions show there
 # cost in metres that is added to edges within so many metres of a collision
@@ -63,8 +59,7 @@ class Contact:
 
 
 class MoveKind(IntEnum):
-    """Kinds of movement: of the base up or down, of the wrist in a straight line, of the hand about
-    the wrist."""
+    """Kinds of movement: base up or down, wrist in a straight line, hand about the wrist."""
 
     LIFT = 0
     REACH = 1
@@ -83,8 +78,7 @@ _Stretch = tuple[MoveKind, Poses]  # the kind of a movement and the poses (n) on
 
 
 class Terrain:
-    """Which movements are free for an arm (`linkage`, in its present pose), given its collisions so
-    far."""
+    """Which movements are free for an arm (`linkage`, as it is now), given its collisions."""
 
     def __init__(
         self,
@@ -108,8 +102,7 @@ class Terrain:
         self._start = self._from_contacts(linkage.now)
 
     def free(self, poses: Poses) -> NDArray[np.bool_]:
-        """Return whether poses (n,) are free of collisions; the arm may be as deep in a thing as it
-        is now.
+        """Return whether poses (n,) are free; the arm may be as deep in a thing as it is now.
 
         Boxes are larger than the things that they stand for, so the present pose may be in one.
         """
@@ -119,8 +112,7 @@ class Terrain:
         return clear & (self._from_contacts(poses) >= _NEAR).all(axis=1)
 
     def movements(self, start: Poses, end: Poses) -> tuple[list[ArmMove] | None, Poses]:
-        """Find movements from one pose (1) to another, at most one of each kind, in an order in
-        which they are free.
+        """Find free movements from one pose (1) to another, at most one of each kind, in any order.
 
         Returns:
             The movements, None if there are none; then also the first colliding poses (n) of each
@@ -137,9 +129,8 @@ class Terrain:
         leaving = start is self.linkage.now
         promising, collisions = self._promising_orders(orders, leaving=leaving)
         for moves in promising:
-            blocked = self._first_collision(
-                start, [stances for _, stances in moves], leaving=leaving
-            )
+            path = [stances for _, stances in moves]
+            blocked = self._first_collision(start, path, leaving=leaving)
             if blocked is None:
                 return [ArmMove(kind, stances[-1:]) for kind, stances in moves], end[:0]
             collisions.append(blocked)
@@ -148,19 +139,15 @@ class Terrain:
     def _promising_orders(
         self, orders: list[list[_Stretch]], *, leaving: bool
     ) -> tuple[list[list[_Stretch]], list[Poses]]:
-        """Return the orders of which a few poses are free, and the first colliding pose of each
-        other order.
+        """Return orders of which a few poses are free, and the first colliding pose of the others.
 
-        All orders are tested in one call, as numpy's overhead is a large share of the time for so
-        few poses.
+        All orders are tested in one call: numpy's overhead is large for so few poses.
         """
-        glances = [
-            Poses.join([stances[::-_GLANCE][::-1] for _, stances in moves]) for moves in orders
-        ]
+        glances = list(map(_glance, orders))
         poses = Poses.join(glances)
-        least = (
-            np.where(self._least < self._deepest, -np.inf, self._least) if leaving else self._least
-        )
+        least = self._least
+        if leaving:
+            least = np.where(least < self._deepest, -np.inf, least)
         clear = (self._clearances(poses) >= least).all(axis=(1, 2))
         ends = np.cumsum([len(part) for part in glances])[:-1]
         promising: list[list[_Stretch]] = []
@@ -174,8 +161,7 @@ class Terrain:
         return promising, collisions
 
     def _first_collision(self, start: Poses, moves: list[Poses], *, leaving: bool) -> Poses | None:
-        """Return the first colliding pose (1) of movements, one after the other; None if they are
-        free.
+        """Return the first colliding pose (1) of movements in order; None if they are free.
 
         A part that touches a thing at the start of a movement may not get deeper into it. A part
         that is in a thing may leave it through other parts of it, if escapes are allowed.
@@ -205,25 +191,27 @@ class Terrain:
             return np.zeros((len(poses), 0))
         wrists = poses.world()
         held = self.linkage.held_box(poses).center[:, 0]
-        apart = [
-            np.maximum(
-                np.linalg.norm(wrists - c.wrist, axis=1), np.linalg.norm(held - c.held, axis=1)
-            )
-            for c in self.contacts
-        ]
+        apart = []
+        for contact in self.contacts:
+            to_wrist = np.linalg.norm(wrists - contact.wrist, axis=1)
+            to_held = np.linalg.norm(held - contact.held, axis=1)
+            apart.append(np.maximum(to_wrist, to_held))
         return np.stack(apart, axis=1)
 
 
+def _glance(moves: list[_Stretch]) -> Poses:
+    """Return a few poses of some movements, with the last of each."""
+    return Poses.join([stances[::-_GLANCE][::-1] for _, stances in moves])
+
+
 def _tolerance(clearance: Array) -> Array:
-    """Return how near parts may come to things, or how deep they may be in them, given their
-    clearance at the start."""
+    """Return how near (or deep) parts may come to things, given the clearance at the start."""
     tolerated: Array = np.minimum(_MARGIN, clearance - _SAME)
     return tolerated
 
 
 def _moves(start: Poses, order: Sequence[MoveKind], spans: Sequence[Array]) -> Iterator[_Stretch]:
-    """Yield each movement of an order with the poses on its path (n); `spans` has what each kind
-    changes, by step."""
+    """Yield each movement of an order with its poses (n); `spans` has what each kind changes."""
     done = {MoveKind.LIFT: start.bases, MoveKind.REACH: start.wrists, MoveKind.TURN: start.turns}
     for kind in order:
         count = len(spans[kind])
@@ -234,8 +222,7 @@ def _moves(start: Poses, order: Sequence[MoveKind], spans: Sequence[Array]) -> I
 
 
 def _spans(start: Poses, end: Poses, sizes: Array) -> list[Array]:
-    """Return what each kind of movement (base, wrist, turn) changes from one pose (1) to another,
-    step by step."""
+    """Return what each kind of movement changes from one pose (1) to another, step by step."""
     shares = [
         np.linspace(0.0, 1.0, max(1, math.ceil(float(size) / step)) + 1)[1:]
         for size, step in zip(sizes, (_STEP, _STEP, _ANGLE), strict=True)
@@ -246,8 +233,7 @@ def _spans(start: Poses, end: Poses, sizes: Array) -> list[Array]:
 
 
 def _sizes(start: Poses, end: Poses) -> Array:
-    """Return how far (3, n) poses are from others: metres of the base, metres of the wrist,
-    radians."""
+    """Return how far (3, n) poses are from others: metres of base and wrist, radians."""
     cosine = (np.einsum("nij,nij->n", start.turns, end.turns) - 1.0) / 2.0
     return np.stack([
         np.abs(end.bases - start.bases), np.linalg.norm(end.wrists - start.wrists, axis=1),
@@ -270,8 +256,7 @@ class Roadmap:
     """Free poses, and the costs of moving from one to another."""
 
     def __init__(self, terrain: Terrain, others: Poses, ends: Poses, costs: Array) -> None:
-        """Collect the poses that may be passed (n), and those to reach (m) with their costs
-        (m,)."""
+        """Collect the poses that may be passed (n), and those to reach (m), with costs (m,)."""
         self._terrain = terrain
         self._costs = costs
         self._poses = Poses.join([terrain.linkage.now, ends, others])
@@ -285,8 +270,7 @@ class Roadmap:
         self._squared_lengths = np.maximum((self._edge_lines**2).sum(axis=1), _SAME)
 
     def _edge_costs(self) -> Array:
-        """Return the costs (n, n) of moving from each pose to each other; infinite if they are not
-        joined."""
+        """Return the costs (n, n) of moving between poses; infinite if they are not joined."""
         p = self._poses
         count = len(p)
         wide = np.linalg.norm(p.wrists[:, None] - p.wrists[None], axis=2)
@@ -300,9 +284,8 @@ class Roadmap:
         nearest = np.argsort(lengths, axis=1)[:, _NEIGHBOURS:]
         kept = np.ones_like(lengths, dtype=bool)
         np.put_along_axis(kept, nearest, values=False, axis=1)
-        kept[0, : 1 + self._n_ends] = (
-            True  # the present pose is joined to all ends: a direct path is the best
-        )
+        # The present pose is joined to all ends: a direct path is the best.
+        kept[0, : 1 + self._n_ends] = True
         lengths[~(kept | kept.T)] = np.inf
         return lengths
 
@@ -312,9 +295,8 @@ class Roadmap:
             path = self._cheapest()
             if path is None:
                 return None
-            blocked = next(
-                (edge for edge in itertools.pairwise(path) if self._edge(*edge) is None), None
-            )
+            edges = itertools.pairwise(path)
+            blocked = next((edge for edge in edges if self._edge(*edge) is None), None)
             if blocked is None:
                 return self._shorten(path)
             self._lengths[blocked] = self._lengths[blocked[::-1]] = np.inf
@@ -341,19 +323,16 @@ class Roadmap:
             self._lengths[starts[near], ends[near]] += _HARD
 
     def _spots_of(self, poses: Poses) -> Array:
-        """Return the positions (n, 6) of the wrist and of the middle of the held object in poses,
-        metres."""
-        return np.concatenate(
-            [poses.world(), self._terrain.linkage.held_box(poses).center[:, 0]], axis=1
-        )
+        """Return the positions (n, 6) of the wrist and the held object's middle, metres."""
+        held = self._terrain.linkage.held_box(poses)
+        return np.concatenate([poses.world(), held.center[:, 0]], axis=1)
 
     def _pose(self, index: int) -> Poses:
         # `Terrain` knows the present pose by identity, see `leaving`.
         return self._poses[index : index + 1] if index else self._terrain.linkage.now
 
     def _cheapest(self) -> list[int] | None:
-        """Return the cheapest path by the present costs, as indices of poses (Dijkstra's
-        algorithm)."""
+        """Return the cheapest path by the present costs (Dijkstra), as indices of poses."""
         best = np.full(len(self._poses), np.inf)
         best[0] = 0.0
         came: dict[int, int] = {}
@@ -381,9 +360,9 @@ class Roadmap:
             after = at + 1
             for later in range(len(path) - 1, at + 1, -1):
                 moves_between = self._edge(path[at], path[later])
-                if moves_between is not None and len(moves_between) <= sum(
-                    len(self._movements[e] or ()) for e in itertools.pairwise(path[at : later + 1])
-                ):
+                edges = itertools.pairwise(path[at : later + 1])
+                n_moves = sum(len(self._movements[edge] or ()) for edge in edges)
+                if moves_between is not None and len(moves_between) <= n_moves:
                     after = later
                     break
             moves += self._edge(path[at], path[after]) or ()

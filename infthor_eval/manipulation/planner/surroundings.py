@@ -1,5 +1,4 @@
-"""The surroundings of an agent that is to put an object down, and beliefs about what in them is an
-obstacle."""
+"""The surroundings of an agent that puts an object down, and beliefs about obstacles in them."""
 
 import math
 from enum import IntEnum
@@ -33,16 +32,14 @@ _FLOOR_EXTENT = 3.0  # metres of the floor to each side
 _SUNK = 0.02  # metres that places may be inside a box that they are only beside
 _UNEXPLAINED = 0.03  # metres from all known boxes: a collision there is with something else
 _ASIDE = 0.25  # of an opening's width: an origin so far from its middle is at the hinge
-_LEFT = {
-    "Microwave"
-}  # doors that hang on the left; others hang on the right, if their origin does not tell
+# Doors that hang on the left; others hang on the right, if their origin does not tell.
+_LEFT = {"Microwave"}
 
 _Boxes = list[tuple[str, Corners]]
 
 
 class Belief(IntEnum):
-    """Which boxes are believed to be obstacles: furniture is partly empty, which the metadata do
-    not tell."""
+    """Which boxes are taken for obstacles: metadata do not tell which furniture is partly empty."""
 
     NOTHING = 0
     RECEPTACLE = 1  # the parts of the receptacle that the object is to be put into
@@ -60,19 +57,17 @@ class Surroundings:
     """
 
     def __init__(self, environment: ArmEnvironment, linkage: Linkage, floor: float) -> None:
-        """Collect the boxes around an environment that was reset to an episode; `floor` is a height
-        in metres."""
+        """Collect the boxes around a reset environment; `floor` is a height in metres."""
         self._environment = environment
         self._linkage = linkage
-        self._item = environment.view.objects[str(environment.start.receptacle_id)]
-        self.places = places_of(environment, self._item)
-        self.entry = (
-            None if self.places is None else entry_of(environment.view, self._item, self.places)
-        )
-        self._hinges = _hinges(self._item, self.places, self.entry)
-        self._n_refuted = [0] * len(
-            self._hinges
-        )  # collisions that each side of the door cannot explain
+        self._receptacle_object = environment.view.objects[str(environment.start.receptacle_id)]
+        self.places = places_of(environment, self._receptacle_object)
+        self.entry: Entry | None = None
+        if self.places is not None:
+            self.entry = entry_of(environment.view, self._receptacle_object, self.places)
+        self._hinges = _hinges(self._receptacle_object, self.places, self.entry)
+        # Collisions that each side of the door cannot explain.
+        self._n_refuted = [0] * len(self._hinges)
         x, _, z = linkage.shoulder.tolist()
         self._floor = Corners(
             (x - _FLOOR_EXTENT, floor - 1.0, z - _FLOOR_EXTENT),
@@ -84,8 +79,7 @@ class Surroundings:
         }
 
     def obstacles(self, belief: Belief) -> Obstacles:
-        """Return the obstacles of a belief, with the door on the side that collisions have refuted
-        least often."""
+        """Return the obstacles of a belief, with the door on the side that was refuted least."""
         if belief == Belief.NOTHING:
             return obstacles_of(())
         hinge = self._hinges[self._n_refuted.index(min(self._n_refuted))]
@@ -97,14 +91,14 @@ class Surroundings:
         return obstacles_of([*self._receptacle(hinge), *around])
 
     def others(self) -> list[Corners]:
-        """Return boxes that may be on the receptacle's places, or cover them: loose objects, and
-        furniture nearby."""
-        loose = others_on(self._environment.view, self._item, self._environment.start.object_id)
+        """Return boxes that may be on the receptacle's places or cover them, loose or furniture."""
+        loose = others_on(
+            self._environment.view, self._receptacle_object, self._environment.start.object_id
+        )
         return [*map(corners_of, loose), *(box for _, box in self._around[Belief.FILLED])]
 
     def add_collision(self, parts: Parts, error: str) -> bool:
-        """Take a collision; one with the receptacle counts against each side of the door that does
-        not explain it.
+        """Take a collision; with the receptacle it counts against sides of the door it refutes.
 
         Args:
             parts: parts of the arm in the colliding pose (1).
@@ -113,8 +107,10 @@ class Surroundings:
             Whether the arm collided with the receptacle.
         """
         objects = self._environment.view.objects
-        self._collided.update(name for name, item in objects.items() if f"'{item.name}'" in error)
-        if f"'{self._item.name}'" not in error:
+        self._collided.update(
+            name for name, nearby in objects.items() if f"'{nearby.name}'" in error
+        )
+        if f"'{self._receptacle_object.name}'" not in error:
             return False
         for number, hinge in enumerate(self._hinges):
             obstacles = obstacles_of(self._receptacle(hinge))
@@ -123,81 +119,83 @@ class Surroundings:
         return True
 
     def _receptacle(self, hinge: int) -> _Boxes:
-        if self._item.pickupable or self.places is None:
+        if self._receptacle_object.pickupable or self.places is None:
             return []
         if self.entry is None:
-            boxes = columns(self._item, self.places)
+            boxes = columns(self._receptacle_object, self.places)
         else:
-            boxes = cavity(self._item, self.places, self.entry, hinge)
-        return [(self._item.object_id, box) for box in boxes]
+            boxes = cavity(self._receptacle_object, self.places, self.entry, hinge)
+        return [(self._receptacle_object.object_id, box) for box in boxes]
 
     def _boxes_around(self, belief: Belief) -> _Boxes:
         """Return the boxes of the floor, and of everything nearby that cannot be picked up."""
         view = self._environment.view
         wrist: Point = tuple(self._linkage.now.world()[0].tolist())
         around = [("Floor", self._floor)]
-        for name, item in view.objects.items():
-            if item.pickupable or item.object_type == "Floor" or name == self._item.object_id:
+        for name, nearby in view.objects.items():
+            if (
+                nearby.pickupable
+                or nearby.object_type == "Floor"
+                or name == self._receptacle_object.object_id
+            ):
                 continue
-            box = corners_of(item)
+            box = corners_of(nearby)
             if _distance_to_box(wrist, box) > _REACH:
                 continue
             is_whole = belief == Belief.WHOLE and not self._is_in(box)
-            boxes = [box] if is_whole else self._boxes_of(item)
+            boxes = [box] if is_whole else self._boxes_of(nearby)
             around += [(name, part) for part in boxes if not self._has_places_in(part)]
         return around
 
     def _has_places_in(self, box: Corners) -> bool:
-        """Return whether a box has places of the receptacle, and so is partly empty: a shelf in a
-        table's box."""
+        """Return whether a box has places of the receptacle: it is partly empty, as a table is."""
         if self.places is None:
             return False
         points = self.places.points
-        return bool(
-            ((points > np.array(box.low) + _SUNK) & (points < np.array(box.high) - _SUNK))
-            .all(axis=1)
-            .any()
-        )
+        is_above = points > np.array(box.low) + _SUNK
+        is_below = points < np.array(box.high) - _SUNK
+        return bool((is_above & is_below).all(axis=1).any())
 
     def _is_in(self, box: Corners) -> bool:
         """Return whether the arm is in a box, which is then partly empty."""
-        return bool(
-            clearances(self._linkage.parts(self._linkage.now), obstacles_of([("", box)])).min() < 0
-        )
+        parts = self._linkage.parts(self._linkage.now)
+        return bool(clearances(parts, obstacles_of([("", box)])).min() < 0)
 
-    def _boxes_of(self, item: ThorObject) -> list[Corners]:
-        """Return boxes of a piece of furniture without the room in an open cupboard, or below a
-        counter."""
-        hollow = item.is_open if is_entered(item) and item.openable else not item.openable
-        places = places_of(self._environment, item) if item.receptacle and hollow else None
+    def _boxes_of(self, furniture: ThorObject) -> list[Corners]:
+        """Return furniture's boxes without the room in an open cupboard, or below a counter."""
+        is_cupboard = is_entered(furniture) and furniture.openable
+        hollow = furniture.is_open if is_cupboard else not furniture.openable
+        places = (
+            places_of(self._environment, furniture) if furniture.receptacle and hollow else None
+        )
         if places is None:
-            return [corners_of(item)]
-        entry = entry_of(self._environment.view, item, places)
+            return [corners_of(furniture)]
+        entry = entry_of(self._environment.view, furniture, places)
         if entry is None:
-            return columns(item, places)
-        return cavity(item, places, entry, _hinges(item, places, entry)[0])
+            return columns(furniture, places)
+        return cavity(furniture, places, entry, _hinges(furniture, places, entry)[0])
 
 
 def _distance_to_box(point: Point, box: Corners) -> float:
     """Return the metres from a point to a box."""
-    return math.hypot(
-        *(max(a - v, v - b, 0.0) for a, v, b in zip(box.low, point, box.high, strict=True))
-    )
+    by_axis = zip(box.low, point, box.high, strict=True)
+    return math.hypot(*(max(low - value, value - high, 0.0) for low, value, high in by_axis))
 
 
-def _hinges(item: ThorObject, places: Places | None, entry: Entry | None) -> list[int]:
+def _hinges(furniture: ThorObject, places: Places | None, entry: Entry | None) -> list[int]:
     """Return the edges of an opening that the door may hang on, the likeliest first; see `cavity`.
 
     The origin of a cupboard is at its hinge.
     """
-    if entry is None or places is None or not item.openable:
+    if entry is None or places is None or not furniture.openable:
         return [0]
     across = 2 - entry.axis
-    low, high = float(places.points[:, across].min()), float(places.points[:, across].max())
-    aside = (item.position.x if across == 0 else item.position.z) - (low + high) / 2
+    low = float(places.points[:, across].min())
+    high = float(places.points[:, across].max())
+    aside = (furniture.position.x if across == 0 else furniture.position.z) - (low + high) / 2
     right = entry.sign if entry.axis == 0 else -entry.sign
     if abs(aside) > _ASIDE * (high - low):
         first = 1 if aside > 0 else -1
     else:
-        first = -right if item.object_type in _LEFT else right
+        first = -right if furniture.object_type in _LEFT else right
     return [first, -first, 0]

@@ -1,5 +1,4 @@
-"""Cumulative reward along trajectories in which an arm does the expert's pick-ups and puts, from
-journals alone.
+"""Cumulative reward along trajectories of an arm's episodes, from journals alone.
 
 Every episode begins in the expert's own state, so after a failed one the next is independent of it.
 An episode's place is the expert's low-level action that it replaces.
@@ -28,11 +27,13 @@ _END = "at step"
 
 
 def arm_curves(runs: Sequence[ArmRun], tasks: str | None = None) -> RewardCurves:
-    """Compute the curves of runs (at least one) in tasks, separated by commas (None: all shared);
-    see `compute_curves`.
+    """Compute the curves of runs (at least one) in tasks; see `compute_curves`.
 
     The mean is over the same trajectories in every facet, so that the curves of the kinds add up to
     that of both. Episodes that a run excludes are left out of all of them.
+
+    Args:
+        tasks: names separated by commas; None for all that the runs share.
 
     Raises:
         UsageError: they share no task or several of a kind, or their successes earn differently.
@@ -42,7 +43,7 @@ def arm_curves(runs: Sequence[ArmRun], tasks: str | None = None) -> RewardCurves
     facets = _facets(list(task_kinds(runs, shared.tasks)))
 
     def functions(trajectories: Sequence[Earned[ArmRecord]]) -> Functions:
-        return {name: [_function(units, name) for units in trajectories] for name in facets}
+        return {name: _functions(trajectories, name) for name in facets}
 
     return compute_curves(runs, shared, facets, functions, _count)
 
@@ -58,9 +59,12 @@ def _facets(kinds: Sequence[ManipulationKind]) -> dict[str, Facet]:
     return {ALL: Facet(_OVER, title, end_at=_END), **by_kind}
 
 
-def _function(units: Earned[ArmRecord], facet: str) -> StepFunction:
-    chosen = [(r.payload.index, reward) for r, reward in units if facet in (ALL, r.payload.kind)]
-    return StepFunction.of(chosen, start=0.0)
+def _functions(trajectories: Sequence[Earned[ArmRecord]], facet: str) -> list[StepFunction]:
+    functions = []
+    for units in trajectories:
+        chosen = [(r.payload.index, gain) for r, gain in units if facet in (ALL, r.payload.kind)]
+        functions.append(StepFunction.of(chosen, start=0.0))
+    return functions
 
 
 def _count(episodes: Sequence[UnitRecord[ArmRecord]]) -> dict[str, int]:

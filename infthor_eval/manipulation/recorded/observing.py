@@ -1,5 +1,4 @@
-"""What replays show of an arm: the frame, and the arm with nearby objects in the agent's
-coordinates."""
+"""What replays show of an arm: the frame, the arm and nearby objects in the agent's coordinates."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -27,29 +26,32 @@ class ArmObserver:
     """Observes one episode; all its pictures have the same bounds."""
 
     def __init__(self, begun: SimulatorView, hands: Iterable[Point], named: Sequence[str]) -> None:
-        """Set the bounds by the world at the start, the hand's sphere centres in the world, and
-        named objects' ids."""
-        self._agent, self._named = begun.agent, frozenset(named)
+        """Set the bounds by the world at the start, and the sphere's centres in it.
+
+        Args:
+            named: ids of the objects that the instruction names.
+        """
+        self._agent = begun.agent
+        self._named = frozenset(named)
         self._path = [self._hand(begun)]
         points = [
             *self._path,
-            *map(self._place, hands),
+            *map(self._to_agent, hands),
             *self._joints(begun),
             (0.0, 0.0, self._path[0][2]),
         ]
-        for item in self._objects(begun):
-            if item.is_named:
-                points += [
-                    (*corner, height) for corner in item.corners for height in (item.low, item.high)
-                ]
+        for nearby in self._objects(begun):
+            if nearby.is_named:
+                points += [(*corner, nearby.low) for corner in nearby.corners]
+                points += [(*corner, nearby.high) for corner in nearby.corners]
         radius = arm_of(begun).sphere_radius
         right, ahead, up = self._path[0]
         points += [(right + offset, ahead + offset, up + offset) for offset in (-radius, radius)]
-        self._low, self._high = _corner(points, min, -_MARGIN), _corner(points, max, _MARGIN)
+        self._low = _corner(points, min, -_MARGIN)
+        self._high = _corner(points, max, _MARGIN)
 
     def observe(self, view: SimulatorView) -> ArmObservation:
-        """Return what is seen in the next view of the episode; raises DataError if the simulator
-        sent no frame."""
+        """Return what is seen in the next view of the episode; DataError if it has no frame."""
         if view.frame is None:
             raise DataError("the simulator sent no frame; use one that renders")
         arm = arm_of(view)
@@ -68,39 +70,40 @@ class ArmObserver:
         return ArmObservation(view.frame, reach, tuple(map(object_type_of, arm.held)))
 
     def _hand(self, view: SimulatorView) -> Place:
-        return self._place(point_of(arm_of(view).sphere_center))
+        return self._to_agent(point_of(arm_of(view).sphere_center))
 
     def _joints(self, view: SimulatorView) -> Iterator[Place]:
-        return (self._place(point_of(joint.position)) for joint in arm_of(view).joints)
+        return (self._to_agent(point_of(joint.position)) for joint in arm_of(view).joints)
 
     def _objects(self, view: SimulatorView) -> Iterator[NearbyObject]:
-        return (self._nearby_object(item) for item in view.objects.values() if self._is_drawn(item))
+        return (self._nearby(each) for each in view.objects.values() if self._is_drawn(each))
 
-    def _is_drawn(self, item: ThorObject) -> bool:
-        if item.object_id in self._named:
+    def _is_drawn(self, thor_object: ThorObject) -> bool:
+        if thor_object.object_id in self._named:
             return True
         if (
-            item.object_type in _NOT_DRAWN
-            or item.pickupable
-            or item.axis_aligned_bounding_box is None
+            thor_object.object_type in _NOT_DRAWN
+            or thor_object.pickupable
+            or thor_object.axis_aligned_bounding_box is None
         ):
             return False
-        right, ahead, _ = self._place(middle_of(item))
-        return (item.receptacle or item.moveable) and math.hypot(right, ahead) < _NEAR
+        right, ahead, _ = self._to_agent(middle_of(thor_object))
+        return (thor_object.receptacle or thor_object.moveable) and math.hypot(right, ahead) < _NEAR
 
-    def _nearby_object(self, item: ThorObject) -> NearbyObject:
-        (x, y, z), (width, height, depth) = middle_of(item), size_of(item)
+    def _nearby(self, thor_object: ThorObject) -> NearbyObject:
+        x, y, z = middle_of(thor_object)
+        width, height, depth = size_of(thor_object)
         signs = ((-1, -1), (-1, 1), (1, 1), (1, -1))
-        corners = (self._place((x + i * width / 2, y, z + j * depth / 2))[:2] for i, j in signs)
-        is_named = item.object_id in self._named
+        corners = (self._to_agent((x + i * width / 2, y, z + j * depth / 2))[:2] for i, j in signs)
+        is_named = thor_object.object_id in self._named
         return NearbyObject(
-            item.object_type, tuple(corners), y - height / 2, y + height / 2, is_named
+            thor_object.object_type, tuple(corners), y - height / 2, y + height / 2, is_named
         )
 
-    def _place(self, point: Point) -> Place:
-        """Return a point of the world in the agent's coordinates; its rotation goes from +z towards
-        +x."""
-        x, z = point[0] - self._agent.position.x, point[2] - self._agent.position.z
+    def _to_agent(self, point: Point) -> Place:
+        """Return a point in the agent's coordinates; its rotation goes from +z towards +x."""
+        x = point[0] - self._agent.position.x
+        z = point[2] - self._agent.position.z
         turn = math.radians(self._agent.rotation)
         right = x * math.cos(turn) - z * math.sin(turn)
         return right, x * math.sin(turn) + z * math.cos(turn), point[1]
@@ -109,5 +112,5 @@ class ArmObserver:
 def _corner(
     points: Sequence[Place], choose: Callable[[Iterable[float]], float], margin: float
 ) -> Place:
-    right, ahead, up = (choose(values) + margin for values in zip(*points, strict=True))
-    return right, ahead, up
+    right, ahead, up = zip(*points, strict=True)
+    return choose(right) + margin, choose(ahead) + margin, choose(up) + margin

@@ -1,6 +1,6 @@
 """Success over the radius of the hand's sphere, from the journals of runs with different radii."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.episodes.shared_units import SharedUnits
@@ -100,23 +100,22 @@ def _line(
     label: str, kind: ManipulationKind, radii: Mapping[float, tuple[ArmRun, list[Record]]]
 ) -> RadiusLine:
     runs = [run for run, _ in radii.values()]
+    by_radius = {radius: records for radius, (_, records) in radii.items()}
     return RadiusLine(
         label=label,
         kind=kind,
         is_bound=all(run.is_planner for run in runs),
         is_embedded=any(run.is_embedded for run in runs),
-        points=_points({
-            radius: [(float(r.failure is None and r.payload.done), r) for r in records]
-            for radius, (_, records) in radii.items()
-        }),
-        n_failed=sum(record.failure is not None for _,
-                     records in radii.values() for record in records),
-    )  # fmt: skip
+        points=_points(by_radius, lambda r: r.failure is None and r.payload.done),
+        n_failed=sum(r.failure is not None for records in by_radius.values() for r in records),
+    )
 
 
 def _floor(task: str | None, runs: Sequence[ArmRun], shared: SharedUnits[ArmRecord]) -> Points:
-    """Return the share of pick-ups by radius that begin in the sphere, as the first run that acted
-    recorded them."""
+    """Return the share of pick-ups that begin in the sphere, by radius.
+
+    The first run that acted in an episode says whether it does.
+    """
     if task is None:
         return ()
     radii: dict[float, dict[str, Record]] = {}
@@ -125,22 +124,20 @@ def _floor(task: str | None, runs: Sequence[ArmRun], shared: SharedUnits[ArmReco
         for record in _records_of(task, shared, number):
             if record.failure is None:
                 episodes.setdefault(record.id, record)
-    return _points({
-        radius: [(float(r.payload.starts_inside), r) for r in episodes.values()] for radius,
-        episodes in radii.items()
-    })  # fmt: skip
+    by_radius = {radius: list(episodes.values()) for radius, episodes in radii.items()}
+    return _points(by_radius, lambda record: record.payload.starts_inside)
 
 
 def _records_of(task: str, shared: SharedUnits[ArmRecord], run: int) -> list[Record]:
     return [record for records in shared.records[run] for record in records if record.task == task]
 
 
-def _points(radii: Mapping[float, Sequence[tuple[float, Record]]]) -> Points:
-    rates = (
-        (
-            radius,
-            clustered_rate([value for value, _ in units], [record.cluster for _, record in units]),
-        )
-        for radius, units in sorted(radii.items())
-    )
-    return tuple((radius, rate) for radius, rate in rates if rate is not None)
+def _points(radii: Mapping[float, Sequence[Record]], holds: Callable[[Record], bool]) -> Points:
+    """Return by radius the share of records for which something holds."""
+    points = []
+    for radius, records in sorted(radii.items()):
+        outcomes = [float(holds(record)) for record in records]
+        rate = clustered_rate(outcomes, [record.cluster for record in records])
+        if rate is not None:
+            points.append((radius, rate))
+    return tuple(points)

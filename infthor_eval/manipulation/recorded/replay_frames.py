@@ -9,9 +9,8 @@ from infthor_eval.episodes.replay_frames import EpisodeFrame
 
 __all__ = ["ArmFrame", "ArmObservation", "EpisodeTitle", "NearbyObject", "Place", "Reach"]
 
-Place = tuple[
-    float, float, float
-]  # metres to the right of the agent, ahead of it, and up in the world
+# Metres to the right of the agent, ahead of it, and up in the world.
+Place = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,7 @@ class EpisodeTitle:
     """What an episode asks for.
 
     Attributes:
-        number: place among the run's episodes of the trajectory, from 1 on.
+        number: number among the run's episodes of the trajectory, from 1 on.
         n_episodes: number of these.
         action: index of the expert's low-level action that the episode replaces.
         radius: radius of the hand's sphere, metres.

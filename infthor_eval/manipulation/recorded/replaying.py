@@ -45,8 +45,7 @@ class RecordedEpisodes(RecordedTrajectory[ArmRun, ArmRecord]):
     """What a run recorded of an arm's episodes in one trajectory."""
 
     def at_actions(self, actions: Sequence[int]) -> list[Record]:
-        """Return the records of the episodes for some of the expert's actions; UsageError if the
-        run lacks one."""
+        """Return the records for some of the expert's actions; UsageError if the run lacks one."""
         known = [record.payload.index for record in self.records]
         for action in actions:
             if action not in known:
@@ -87,8 +86,7 @@ def replay_episodes(
 
 
 class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
-    """Simulators in which recorded episodes are replayed. They are started for the first
-    episode."""
+    """Simulators in which recorded episodes are replayed, started for the first episode."""
 
     def __init__(
         self,
@@ -99,9 +97,8 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
         self._recorded = recorded
         self._trajectory = trajectory
         self._start_simulator = start_simulator
-        self._environments: dict[
-            tuple[int, float], ArmEnvironment
-        ] = {}  # by camera, see `ArmTaskSettings.camera`
+        # By camera, see `ArmTaskSettings.camera`.
+        self._environments: dict[tuple[int, float], ArmEnvironment] = {}
 
     @property
     def n_episodes(self) -> int:
@@ -114,19 +111,17 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
 
     def _begin(self, record: Record) -> "_EpisodeInReplay":
         payload = record.payload
-        episode = next(
-            (item for item in self._trajectory.episodes if item.index == payload.index), None
-        )
-        if episode is None:
+        by_index = {episode.index: episode for episode in self._trajectory.episodes}
+        if payload.index not in by_index:
             raise DataError(
                 f"{self._trajectory.traj_id}: action {payload.index} is no pick-up or put; restore "
                 "the journal"
             )
         settings = self._settings(record)
+        episode = by_index[payload.index]
         start = self._expert_states.before(episode)
         environment = self._environment(settings)
-        # Calls are repeated as recorded, so nothing is converted; and frames are taken from the
-        # view.
+        # Calls are repeated as recorded, so nothing is converted; frames are taken from the view.
         begun = environment.reset(episode, start, Conversion(), settings.grasp, NoFrames())
         return _EpisodeInReplay(environment, begun, payload)
 
@@ -145,7 +140,7 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
             self._environments[settings.camera] = ArmEnvironment(self._trajectory.data, simulator)
         return self._environments[settings.camera]
 
-    def _place(self, record: Record, number: int) -> str:
+    def _describe_step(self, record: Record, number: int) -> str:
         return f"action {record.payload.index}, step {number}"
 
     def _frame(
@@ -153,13 +148,11 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
     ) -> ArmFrame:
         payload = record.payload
         steps = payload.steps[:number]
-        distances = (
-            [payload.start_distance, *(step.distance for step in steps)]
-            if payload.attempted
-            else []
-        )
+        distances = [payload.start_distance] if payload.attempted else []
+        distances += [step.distance for step in steps]
         is_end = payload.attempted and number == len(payload.steps)
         last = steps[-1] if steps else None
+        calls = last.calls if last is not None else ()
         return ArmFrame(
             title=self._title(record),
             observation=observation,
@@ -168,9 +161,7 @@ class ArmReplay(EpisodeReplay[ArmRecord, ArmFrame]):
             done=is_end and payload.done,
             note=note,
             requests=tuple(describe_request(last)) if last is not None else (),
-            actions=tuple(str(call.get("action", "")) for call in last.calls)
-            if last is not None
-            else (),
+            actions=tuple(str(call.get("action", "")) for call in calls),
             refusals=last.refusals if last is not None else (),
             distance=distances[-1] if distances else None,
             closest=min(distances, default=None),
@@ -199,11 +190,8 @@ class _EpisodeInReplay:
         self._environment = environment
         self._outcome = begun
         self._payload = payload
-        named = [
-            name
-            for name in (environment.start.object_id, environment.start.receptacle_id)
-            if name is not None
-        ]
+        start = environment.start
+        named = [start.object_id, *([start.receptacle_id] if start.receptacle_id else [])]
         self._observer = ArmObserver(begun.view, [step.hand for step in payload.steps], named)
 
     def repeat(self, step: ArmStep, *, is_last: bool) -> str:
@@ -211,9 +199,8 @@ class _EpisodeInReplay:
         if self._outcome.ended is not None:
             return ""
         self._outcome = self._environment.step(step.calls)
-        recorded = (
-            self._payload.ended if is_last and self._payload.ended in _ENDED_BY_WORLD else None
-        )
+        ended = self._payload.ended
+        recorded = ended if is_last and ended in _ENDED_BY_WORLD else None
         return _difference(step, self._outcome, recorded)
 
     def observe(self) -> ArmObservation:

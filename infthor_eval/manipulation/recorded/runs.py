@@ -29,15 +29,17 @@ class ArmRun(RecordedRun[ArmRecord, ManipulationConfig]):
 
 
 def label_by_radius(runs: Sequence[ArmRun]) -> list[ArmRun]:
-    """Return the same runs, with the radius of the hand in their labels if it is not the same in
-    all of them."""
-    radii = [sorted({task.radius for task in run.config.tasks.values()}) for run in runs]
-    if all(of_run == radii[0] for of_run in radii):
+    """Return the same runs, with the radius of the hand in their labels if it differs."""
+    radii = [_radii(run) for run in runs]
+    if radii.count(radii[0]) == len(runs):
         return list(runs)
-    texts = [" and ".join(f"{radius:g}" for radius in of_run) for of_run in radii]
-    return [
-        replace(run, label=f"{run.label}, {text} m") for run, text in zip(runs, texts, strict=True)
-    ]
+    labels = [f"{run.label}, {text} m" for run, text in zip(runs, radii, strict=True)]
+    return [replace(run, label=label) for run, label in zip(runs, labels, strict=True)]
+
+
+def _radii(run: ArmRun) -> str:
+    radii = sorted({task.radius for task in run.config.tasks.values()})
+    return " and ".join(f"{radius:g}" for radius in radii)
 
 
 def task_kinds(runs: Sequence[ArmRun], tasks: Sequence[str]) -> dict[ManipulationKind, str]:
@@ -49,8 +51,7 @@ def task_kinds(runs: Sequence[ArmRun], tasks: Sequence[str]) -> dict[Manipulatio
 def shared_episodes(
     runs: Sequence[ArmRun], tasks: str | None, *, one_radius: bool = True
 ) -> SharedUnits[ArmRecord]:
-    """Find the episodes that all runs have: of one task of each kind, in trajectories that each run
-    has in full.
+    """Find the episodes that all runs have, of one task of each kind, in trajectories had in full.
 
     Args:
         runs: at least one run.
@@ -81,16 +82,18 @@ def shared_episodes(
 def _require_same_rewards(runs: Sequence[ArmRun], tasks: Sequence[str]) -> None:
     """Check that a success earns the same in all episodes of a task."""
     for name in tasks:
-        rewards = [
-            {record.payload.max_reward for record in run.records if record.task == name}
-            for run in runs
-        ]
-        for run, of_run in zip(runs, rewards, strict=True):
-            if len(of_run | rewards[0]) > 1 and of_run and rewards[0]:
+        first = _rewards(runs[0], name)
+        for run in runs:
+            rewards = _rewards(run, name)
+            if len(rewards | first) > 1 and rewards and first:
                 raise UsageError(
                     f"{runs[0].label} and {run.label} earn different rewards in {name}; draw runs "
                     "of the same task file"
                 )
+
+
+def _rewards(run: ArmRun, task: str) -> set[float]:
+    return {record.payload.max_reward for record in run.records if record.task == task}
 
 
 def _differences(runs: Sequence[ArmRun], tasks: Sequence[str], one_radius: bool) -> Iterator[str]:

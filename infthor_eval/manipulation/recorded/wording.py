@@ -13,13 +13,10 @@ _LEFT_OUT = {"action", "returnToStart"}
 
 
 def describe_request(step: ArmStep) -> Iterator[str]:
-    """Yield the request of a policy in centimetres and degrees, then the simulator's calls, a line
-    each."""
+    """Yield a policy's request in centimetres and degrees, then the simulator's calls, by line."""
     if step.delta is not None:
         x, y, z, roll, pitch, yaw, gripper = step.delta
-        moved = ", ".join(
-            f"{name} {100 * value:+.1f}" for name, value in (("x", x), ("y", y), ("z", z))
-        )
+        moved = f"x {100 * x:+.1f}, y {100 * y:+.1f}, z {100 * z:+.1f}"
         turned = (("roll", roll), ("pitch", pitch), ("yaw", yaw))
         angles = ", ".join(f"{name} {math.degrees(value):+.0f}" for name, value in turned)
         yield f"delta: {moved} cm; {angles} deg; gripper {gripper:.2f}"

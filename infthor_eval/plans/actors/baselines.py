@@ -1,5 +1,4 @@
-"""Baselines that see no frame: the expert, chance, a script for a plan's words, and habits of
-experts."""
+"""Baselines that see no frame: expert, chance, a script for a plan's words, experts' habits."""
 
 import random
 from collections.abc import Callable, Mapping, Sequence
@@ -57,11 +56,8 @@ class _RandomPlanActor(_BlindActor):
         self._random = random.Random(situation.seed)
 
     def act(self) -> Act:
-        return Act(
-            self._random.choice(
-                applicable_calls(self._view, self._situation.environment.look_degrees)
-            )
-        )
+        look_degrees = self._situation.environment.look_degrees
+        return Act(self._random.choice(applicable_calls(self._view, look_degrees)))
 
 
 class _ScriptedActor(_BlindActor):
@@ -85,8 +81,7 @@ class PlannerAgent(_PlanBaseline):
 
 
 class RandomAgent(_PlanBaseline):
-    """Draws uniformly, by the situation's seed alone, from the calls possible in view: each action
-    with each object."""
+    """Draws uniformly, by the seed alone, from the calls possible in view, with any object."""
 
     name = "random"
     _actor = _RandomPlanActor
@@ -100,8 +95,7 @@ class ScriptedAgent(_PlanBaseline):
 
 
 class HabitualAgent(_PlanBaseline):
-    """Does what experts did next in other scenes, after the same action in a plan of the same
-    words; see `Habits`."""
+    """Does what experts did next elsewhere, after the same action in an equal plan (`Habits`)."""
 
     name = "history"
 
@@ -112,7 +106,7 @@ class HabitualAgent(_PlanBaseline):
     def actor(self, trajectory: Trajectory, words: Words) -> _HabitualActor:
         """See `PlanBaseline`; it learns from other scenes than the trajectory's."""
         scene = trajectory.scene.floor_plan
-        elsewhere = (item for item in self._trajectories if item.scene.floor_plan != scene)
+        elsewhere = (one for one in self._trajectories if one.scene.floor_plan != scene)
         return _HabitualActor(Habits(elsewhere, words))
 
 

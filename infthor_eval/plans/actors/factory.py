@@ -29,8 +29,7 @@ class ActorFactory:
 
 
 def actor_factory(subject: Subject, trajectories: Sequence[Trajectory]) -> ActorFactory:
-    """Return the factory of a model, or of a baseline, which is fitted to all trajectories;
-    TypeError for others."""
+    """Return the factory of a model, or of a baseline, which is fitted; TypeError for others."""
     if isinstance(subject, PlanBaseline):
         subject.fit(trajectories)
         return ActorFactory(False, lambda task, trajectory: subject.actor(trajectory, task.words))

@@ -1,5 +1,4 @@
-"""What experts did next, by the words of their plan and the action before: how far an agent gets
-without a frame."""
+"""What experts did next, by their plan's words and the last action: acting without a frame."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,8 +16,7 @@ _Key = tuple[str, ...]
 
 
 class Habits:
-    """The most frequent next action in the most similar known situation; of equally frequent ones
-    the first by name.
+    """The most frequent next action in the most similar known situation; of equals by name.
 
     A situation is the plan's text, the number of actions so far, and the last action. If it is
     unknown, less and less of it is compared (`_situations`). Actions are learned with placeholders

@@ -77,28 +77,26 @@ class ModelActor:
             past = with_recorded_state(past, environment.trajectory, situation.plan.low[0])
         self._past = past
         with wrap_request_errors(self._model.name):
-            self._given = self._config.history.recall(past, self._count)
-            self._restart(self._given)
+            self._recalled = self._config.history.recall(past, self._count)
+            self._restart(self._recalled)
 
     def act(self) -> Act:
         """See `PlanActor`."""
         decoding = replace(self._config.decoding, seed=seed_of(f"{self._seed}/{self._n_acts}"))
         if self._config.constrained:
-            possible = tuple(
-                str(text) for text in applicable_actions(self._observation.view, self._config.words)
-            )
+            actions = applicable_actions(self._observation.view, self._config.words)
+            possible = tuple(map(str, actions))
             max_new_tokens = max(decoding.max_new_tokens, _MAX_ACTION_TOKENS)
             decoding = replace(decoding, choices=possible, max_new_tokens=max_new_tokens)
         self._n_acts += 1
         if self._asks_anew:
-            self._restart([*self._given, *present_parts(self._present_frame())])
+            self._restart([*self._recalled, *present_parts(self._present_frame())])
         with wrap_request_errors(self._model.name):
             reply = self._conversation.reply(decoding)
         return Act(answer_of(reply).answer, reply)
 
     def observe(self, outcome: StepOutcome) -> None:
-        """See `PlanActor`; the action is appended as it was understood, not as the model wrote
-        it."""
+        """See `PlanActor`; the action is appended as it was understood, not as it was written."""
         self._observation = outcome.observation
         if self._asks_anew:
             return
@@ -108,9 +106,8 @@ class ModelActor:
     def tokens_between(self, first: int, last: int) -> int | None:
         """See `CountingActor`."""
         parts: list[Part] = []
-        ends: list[
-            int
-        ] = []  # of the parts up to each frame; a task's first frame is there again behind its goal
+        # Of the parts up to each frame; a task's first frame is there again behind its goal.
+        ends: list[int] = []
         for segment in self._past.all:
             parts += segment.opening()
             ends += [] if ends else [parts.index(segment.before) + 1]
@@ -118,7 +115,7 @@ class ModelActor:
                 parts += action_part(action), frame
                 ends.append(len(parts))
         counts = [self._count(parts[: ends[frame]]) for frame in (first, last)]
-        self._restart(self._given)
+        self._restart(self._recalled)
         return None if counts[0] is None or counts[1] is None else counts[1] - counts[0]
 
     @property

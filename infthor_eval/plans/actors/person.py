@@ -10,8 +10,7 @@ __all__ = ["PersonActor"]
 
 
 class PersonActor(ModelActor):
-    """Asks a person for one action after the other; tells goal, plan, rewards, and the actions that
-    are possible."""
+    """Asks a person for actions; tells goal, plan, rewards, and the actions that are possible."""
 
     def __init__(self, person: Attended, config: AgentConfig) -> None:
         super().__init__(person, config)
@@ -52,9 +51,7 @@ class PersonActor(ModelActor):
         """See `EndedActor`."""
         self._add(outcome)
         ended = f"{self._title}. {outcome.info.ended}".rstrip()
-        self._news = " ".join(
-            filter(None, (f"{ended}, reward {self._of_plan:g}.", outcome.info.message))
-        )
+        self._news = f"{ended}, reward {self._of_plan:g}. {outcome.info.message}".rstrip()
 
     def _add(self, outcome: StepOutcome) -> None:
         self._of_plan = round(self._of_plan + outcome.reward, 6)

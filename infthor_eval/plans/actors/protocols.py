@@ -1,5 +1,4 @@
-"""The protocols of actors and baselines: an actor begins a plan, and acts until the plan is
-over."""
+"""The protocols of actors and baselines: an actor begins a plan, and acts until it is over."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,8 +15,7 @@ __all__ = ["Act", "CountingActor", "EndedActor", "PlanActor", "PlanBaseline", "P
 
 @dataclass(frozen=True)
 class Act:
-    """An action that an actor chose, as a text or a call of AI2-THOR's, and the model's reply (None
-    for baselines)."""
+    """A chosen action, a text or a call of AI2-THOR's, and a model's reply (None: a baseline)."""
 
     action: str | Mapping[str, Any]
     reply: Reply | None = None
@@ -69,8 +67,7 @@ class CountingActor(PlanActor, Protocol):
     """An actor with a model that may count tokens."""
 
     def tokens_between(self, first: int, last: int) -> int | None:
-        """Return the tokens of the whole history from one frame to another; None if the model
-        counts none.
+        """Return the tokens of the history from one frame to another; None if not counted.
 
         Frames are numbered from the trajectory's first; the history is that before the plan that
         has begun.

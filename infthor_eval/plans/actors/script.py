@@ -10,9 +10,8 @@ __all__ = ["read_plan", "replace_objects", "scripted_action"]
 
 _TYPES = {compact_name(name): name for name in sorted(KNOWN_TYPES)}
 _TYPES |= {"sink": "SinkBasin", "bathtub": "BathtubBasin"}  # things are put into the basin
-_CLOSED = frozenset(
-    {"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"}
-)  # at first, as a rule
+# At first, as a rule.
+_CLOSED = frozenset({"Box", "Cabinet", "Drawer", "Fridge", "Laptop", "Microwave", "Safe"})
 _VERBS = ("go to", "open", "close", "pick up", "put", "wash", "heat", "cool", "toggle", "slice")
 _PLAN = re.compile(rf"({'|'.join(_VERBS)}) (?:the )?(\S+)(?: in the (\S+))?")
 
@@ -41,21 +40,16 @@ def replace_objects(plan: str, types: Sequence[str]) -> str:
     """Return a plan of the usual form with other objects, in the order in which it names them."""
     match = _PLAN.fullmatch(plan)
     assert match is not None
-    for group, name in reversed(
-        [*enumerate(types, start=2)]
-    ):  # from the end, so that earlier spans stay valid
+    # From the end, so that earlier spans stay valid.
+    for group, name in reversed([*enumerate(types, start=2)]):
         start, end = match.span(group)
-        plan = (
-            plan[:start]
-            + (compact_name(name) if match.group(group).islower() else name)
-            + plan[end:]
-        )
+        word = compact_name(name) if match.group(group).islower() else name
+        plan = plan[:start] + word + plan[end:]
     return plan
 
 
 def scripted_action(plan: str, done: Sequence[str]) -> str:
-    """Return the next action of a plan's script, after the actions done so far; its last action is
-    repeated."""
+    """Return the next action of a plan's script after those done; its last one is repeated."""
     actions = _script(*read_plan(plan))
     return actions[min(len(done), len(actions) - 1)]
 
@@ -69,13 +63,15 @@ def _script(verb: str, types: tuple[str, ...]) -> list[str]:
         "pick up": [f"PickupObject {item}"],
         "toggle": [f"ToggleObjectOn {item}"],
         "put": _inside(receptacle, f"PutObject {item} {receptacle}"),
-        "wash": _treat(item, "SinkBasin", ["ToggleObjectOn Faucet", "ToggleObjectOff Faucet"]),
-        "heat": _treat(
-            item, "Microwave", ["ToggleObjectOn Microwave", "ToggleObjectOff Microwave"]
-        ),
+        "wash": _treat(item, "SinkBasin", _switch("Faucet")),
+        "heat": _treat(item, "Microwave", _switch("Microwave")),
         "cool": _treat(item, "Fridge", []),
     }
     return scripts.get(verb, ["MoveAhead"])
+
+
+def _switch(name: str) -> list[str]:
+    return [f"ToggleObjectOn {name}", f"ToggleObjectOff {name}"]
 
 
 def _treat(item: str, appliance: str, treatment: list[str]) -> list[str]:
@@ -85,8 +81,7 @@ def _treat(item: str, appliance: str, treatment: list[str]) -> list[str]:
 
 
 def _inside(receptacle: str, action: str) -> list[str]:
-    """Return the action, with the receptacle opened before and closed after it if it is closed at
-    first."""
+    """Return the action, within opening and closing the receptacle if it is closed at first."""
     if receptacle not in _CLOSED:
         return [action]
     return [f"OpenObject {receptacle}", action, f"CloseObject {receptacle}"]

@@ -1,5 +1,4 @@
-"""Where the object of a plan was last in view before the agent needs it: what a memory would have
-to recall.
+"""Where a plan's object was last in view before it is needed: what a memory has to recall.
 
 The trajectory's object log has the types in view at each frame. A final task needs an object and a
 place that were seen at the two ends of the trajectory before it
@@ -21,8 +20,7 @@ _TO_RECEPTACLE = {PlanKind.PUT, PlanKind.CLEAN, PlanKind.HEAT, PlanKind.COOL}
 
 
 def object_logs(trajectory: Trajectory) -> Sequence[ObjectLog]:
-    """Return what each frame shows, by the trajectory's own log; empty if it has none for every
-    frame."""
+    """Return what each frame shows, by the trajectory's log; empty if it lacks a frame."""
     log = trajectory.object_log
     if len(log) != len(trajectory.plan.low_actions) + 1:
         return ()
@@ -35,16 +33,15 @@ def object_logs(trajectory: Trajectory) -> Sequence[ObjectLog]:
 def clue_step(
     logs: Sequence[ObjectLog], trajectory: Trajectory, plan: Plan, before: int
 ) -> int | None:
-    """Return the last frame, up to `before`, with a plan's object in view, or its receptacle if the
-    plan goes there.
+    """Return the last frame, up to `before`, with a plan's object (or goal receptacle) in view.
 
     None if it was never in view, or if that is not known.
     """
     wanted = _wanted(trajectory.plan.high_pddl[plan.high], plan.kind)
-    frames = range(min(before + 1, len(logs)))
-    return next(
-        (frame for frame in reversed(frames) if wanted in map(str.lower, logs[frame].visible)), None
-    )
+    for frame in reversed(range(min(before + 1, len(logs)))):
+        if wanted in map(str.lower, logs[frame].visible):
+            return frame
+    return None
 
 
 def _wanted(high: HighAction, kind: PlanKind) -> str:

@@ -5,13 +5,20 @@ from typing import ClassVar
 
 from infthor_eval.errors import ModelError, UsageError
 from infthor_eval.household.sequence_text import ACT, action_part, goal_part, plan_part
-from infthor_eval.plans.history.chat import GoalHistory, PlanHistory
 from infthor_eval.plans.history.past import CountTokens, History, Past
 from infthor_eval.plans.history.recalled import MemoryChoice
 from infthor_eval.plans.history.retrieved import RetrievedFrames
 from infthor_eval.plans.history.segments import Part, PlanSegment, restart_at, segment_parts
 
-__all__ = ["FullHistory", "LastTokens", "PublishedHistory", "StateInWords", "history_named"]
+__all__ = [
+    "FullHistory",
+    "GoalHistory",
+    "LastTokens",
+    "PlanHistory",
+    "PublishedHistory",
+    "StateInWords",
+    "history_named",
+]
 
 
 class FullHistory:
@@ -42,15 +49,49 @@ class PublishedHistory:
                 parts += goal_part(segment.goal), past.all[0].before
             if segment.in_task:
                 parts += plan_part(segment.plan), *((ACT,) if segment.steps else ())
-                parts += (
-                    part for action, frame in segment.steps for part in (action_part(action), frame)
-                )
+                for action, frame in segment.steps:
+                    parts += action_part(action), frame
         return parts
 
 
+class GoalHistory:
+    """The whole history with goals and actions, as in the published chats of branch `dev`.
+
+    Plans begin with a mark and have no text.
+    """
+
+    needs_state: ClassVar[bool] = False
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        parts: list[Part] = []
+        for segment in past.all:
+            if segment.goal is not None:
+                parts += goal_part(segment.goal), past.all[0].before
+            if segment.steps and segment.in_task:
+                parts.append(ACT)
+                for action, frame in segment.steps:
+                    parts += action_part(action), frame
+        return parts
+
+
+class PlanHistory:
+    """The plans before in words, as in the published chats of branch `dev`.
+
+    Goal, frames and the plan itself are left out; the present frame follows.
+    """
+
+    needs_state: ClassVar[bool] = False
+
+    def recall(self, past: Past, count: CountTokens) -> list[Part]:
+        """See `History`."""
+        plans = [segment.plan for segment in past.segments if segment.in_task]
+        text = f"{'; '.join(plans)};" if plans else "No history is available."
+        return [f"Action history: {text}\n"]
+
+
 class LastTokens:
-    """As many of the last plans as fit, after the goal that they belong to and the frame that they
-    begin with.
+    """As many of the last plans as fit, after their goal and the frame that they begin with.
 
     Whole plans are left out, from the first on, and the goal is repeated if the rest would begin
     without it. So every window has the form of a trajectory's beginning, which is what the models
@@ -60,14 +101,13 @@ class LastTokens:
     needs_state: ClassVar[bool] = False
 
     def __init__(self, n_tokens: int) -> None:
-        """Set the maximum number of tokens before the model's first action; the plan's own steps
-        come on top."""
+        """Set the maximum tokens before the first action; the plan's own steps come on top."""
         self._n_tokens = n_tokens
 
     def recall(self, past: Past, count: CountTokens) -> list[Part]:
         """See `History`; by bisection, as each count encodes the window."""
         segments = past.all
-        # number of last segments
+        # Numbers of last segments.
         least = 1
         most = len(segments)
         if not self._fits(segments, least, count):
@@ -123,9 +163,8 @@ def history_named(text: str, memory: MemoryChoice) -> History:
     if text == "memory":
         return memory.open()
     memory.refuse(text)
-    if (
-        kind == "frames" and size
-    ):  # where the trajectories have no frames of their own for `retrieved:K`
+    if kind == "frames" and size:
+        # Where the trajectories have no frames of their own for `retrieved:K`.
         return MemoryChoice("clip-view", f"k={size}", None, memory.retriever, memory.blank).open()
     if memory.retriever is not None:
         raise UsageError(

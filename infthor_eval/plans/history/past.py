@@ -29,7 +29,7 @@ class Past:
             it is not known.
         clue: number of the last frame with what the plan needs in view (`clue_steps`); None if
             there is none.
-        trajectory: the trajectory's own file, for what it has retrieved (`retrieved_frames`); None
+        trajectory: the trajectory's own file, for what it has retrieved (`retrieved`); None
             if it is not known.
     """
 
@@ -82,8 +82,7 @@ class Past:
 
 
 class History(Protocol):
-    """Selects what a model is given of the past; `needs_state` tells whether it needs the state in
-    words."""
+    """Selects a model's past; `needs_state` tells whether it needs the state in words."""
 
     needs_state: ClassVar[bool]
 

@@ -27,8 +27,7 @@ __all__ = ["MemoryChoice", "RecalledHistory"]
 
 
 class RecalledHistory:
-    """What a memory recalls of the steps before the present one (`infthor_eval.memory`), the goal,
-    and that frame.
+    """What a memory (`infthor_eval.memory`) recalls of earlier steps, the goal, and the frame.
 
     The memory observes each step once, as long as one episode goes on.
     """
@@ -157,8 +156,8 @@ class MemoryChoice:
         Raises:
             UsageError: there is one.
         """
-        given = {"--memory": self.name, "--memory-args": self.options, "--budget": self.budget}
-        for option, value in given.items():
+        typed = {"--memory": self.name, "--memory-args": self.options, "--budget": self.budget}
+        for option, value in typed.items():
             if value is not None:
                 raise UsageError(
                     f"{option} {value}: --history {history} has no memory; use --history memory"

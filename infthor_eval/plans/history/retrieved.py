@@ -1,5 +1,4 @@
-"""An agent's image memory as the trajectory's own file names it (`retrieved_image`), as the
-published script reads it.
+"""An agent's image memory by the trajectory's own `retrieved_image`, as the script reads it.
 
 The file has, for low-level actions, the names of the frames that a retriever found before each
 (`top20`). A name is looked up in `images`, which has the action that each frame was taken at; what
@@ -33,8 +32,7 @@ class _Image(msgspec.Struct):
 
 
 class RetrievedFrames:
-    """The K frames that the trajectory's file says were retrieved for a plan's first action, the
-    goal, and the plan."""
+    """The K frames that the file names for a plan's first action, the goal, and the plan."""
 
     needs_state: ClassVar[bool] = False
 
@@ -66,8 +64,7 @@ class RetrievedFrames:
 
 
 def require_retrieved(trajectories: Iterable[Trajectory], task: str) -> None:
-    """Check before the work that some trajectory names retrieved frames; `task` is named in the
-    message.
+    """Check that some trajectory names retrieved frames; `task` is for the message.
 
     Raises:
         DataError: none does.
@@ -78,41 +75,39 @@ def require_retrieved(trajectories: Iterable[Trajectory], task: str) -> None:
 
 
 def retrieved_steps(trajectory: Trajectory, action: int, k: int) -> Sequence[int]:
-    """Return the frames that a trajectory's file says were retrieved before an action: 0 is the
-    first, n + 1 after n.
+    """Return the frames that a file names before an action: 0 is the first, n + 1 after n.
 
     Raises:
         DataError: it names none, or one that is not known or is taken after the action.
     """
-    place = f'trajectory {trajectory.traj_id}: retrieved_image["{action}"]["top{k}"]'
-    names = _names(trajectory.retrieved_image, action, k, place)
+    entry = f'trajectory {trajectory.traj_id}: retrieved_image["{action}"]["top{k}"]'
+    names = _names(trajectory.retrieved_image, action, k, entry)
     steps = _steps_of_images(trajectory)
-    found = [steps.get(Path(name).stem) for name in names]
-    for name, step in zip(names, found, strict=True):
+    retrieved = []
+    for name in names:
+        step = steps.get(Path(name).stem)
         if step is None or step > action:
             wrong = "is in no entry of images" if step is None else "is taken after that action"
-            raise DataError(f"{place}: {name!r:.60} {wrong}; restore the file")
-    return [step for step in found if step is not None]
+            raise DataError(f"{entry}: {name!r:.60} {wrong}; restore the file")
+        retrieved.append(step)
+    return retrieved
 
 
-def _names(retrieved: Mapping[str, Any] | None, action: int, k: int, place: str) -> Sequence[str]:
-    entry = (retrieved or {}).get(str(action))
-    if entry is None or (isinstance(entry, dict) and f"top{k}" not in entry):
-        there = (
-            f"it has {', '.join(sorted(entry))}"
-            if entry
-            else "nothing was retrieved before this action"
-        )
-        raise DataError(f"{place} is not in the file ({there}); take --history frames:{k}")
-    with wrap_errors(
-        f"{place} is no list of frame names", "restore the file", catch=msgspec.ValidationError
-    ):
-        return msgspec.convert(entry, dict[str, list[str]])[f"top{k}"]
+def _names(retrieved: Mapping[str, Any] | None, action: int, k: int, entry: str) -> Sequence[str]:
+    """Return the file names of frames before an action; `entry` says in messages where they are."""
+    lists = (retrieved or {}).get(str(action))
+    if lists is None or (isinstance(lists, dict) and f"top{k}" not in lists):
+        there = "nothing was retrieved before this action"
+        if lists:
+            there = f"it has {', '.join(sorted(lists))}"
+        raise DataError(f"{entry} is not in the file ({there}); take --history frames:{k}")
+    problem = f"{entry} is no list of frame names"
+    with wrap_errors(problem, "restore the file", catch=msgspec.ValidationError):
+        return msgspec.convert(lists, dict[str, list[str]])[f"top{k}"]
 
 
 def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
-    """Return the step of each named frame; of several frames of one action all stand for its last
-    one."""
+    """Return the step of each named frame; all frames of one action stand for its last one."""
     where = f"trajectory {trajectory.traj_id}: images is no list of low_idx and image_name"
     hint = "restore the file"
     with wrap_errors(where, hint, catch=msgspec.ValidationError):
@@ -121,8 +116,7 @@ def _steps_of_images(trajectory: Trajectory) -> Mapping[str, int]:
 
 
 def _resized(frame: FrameRef) -> FrameRef:
-    """Return a frame in the published size, in a file beside it (an episode's folder, which ends
-    with the episode).
+    """Return a frame in the published size, in a file beside it, which ends with the episode.
 
     Raises:
         DataError: it cannot be read or written.

@@ -57,7 +57,6 @@ def goal_of_last(segments: Sequence[PlanSegment]) -> str:
 def restart_at(
     segments: Sequence[PlanSegment], first: int, end: int | None = None
 ) -> list[PlanSegment]:
-    """Return `segments[first:end]` in the form of a history's beginning: the first one has its goal
-    and its frame."""
+    """Return `segments[first:end]` as a history begins: the first one has goal and frame."""
     opening = replace(segments[first], goal=goal_of_last(segments[: first + 1]))
     return [opening, *segments[first + 1 : end]]

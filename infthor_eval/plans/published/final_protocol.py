@@ -1,14 +1,18 @@
-"""Final tasks as the published scripts run them (`--protocol published`): in one go, and without
-the text of a plan.
+"""Tasks as the published scripts ask for them: a system prompt, and no text of a plan.
 
-The expert carries out all tasks but the last; the agent then has the last one, its plans following
-each other in the world that it has made. It is told the goal alone, in one of three forms:
+Final tasks (`--protocol published`) are run in one go. The expert carries out all tasks but the
+last; the agent then has the last one, its plans following each other in the world that it has made.
+It is told the goal alone, in one of three forms:
 
 - interleaved (`--history full`): the whole history as a user's turn. After the first plan, done or
   failed, the script ends; the other plans are never tried, and count as not done.
 - memory as text (`--history text`) and as frames (`--history retrieved:K`, the frames that the
   trajectory's file names, or `frames:K`, those nearest to the present one): each action is asked
   for anew, with the memory and the present frame. After a failure the next plan follows.
+
+In the chats of branch `dev` every plan begins in the true state, as in the default protocol:
+`--history goals` is `run_interactive_eval_qwen.py`, `--history plans`
+`run_interactive_eval_history.py`.
 """
 
 from collections.abc import Sequence
@@ -18,8 +22,7 @@ from typing import ClassVar
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.sequence_text import ACT
-from infthor_eval.plans.history.chat import GoalHistory
-from infthor_eval.plans.history.forms import StateInWords
+from infthor_eval.plans.history.forms import GoalHistory, PlanHistory, StateInWords
 from infthor_eval.plans.history.past import CountTokens, History, Past
 from infthor_eval.plans.history.recalled import RecalledHistory
 from infthor_eval.plans.history.retrieved import RetrievedFrames
@@ -27,7 +30,14 @@ from infthor_eval.plans.history.segments import Part
 from infthor_eval.plans.published.system_prompts import system_prompt
 from model_adapters import Decoding
 
-__all__ = ["MAX_STEPS", "FinalForm", "final_form", "present_parts", "with_recorded_state"]
+__all__ = [
+    "MAX_STEPS",
+    "FinalForm",
+    "chat_form",
+    "final_form",
+    "present_parts",
+    "with_recorded_state",
+]
 
 _MAX_TOKENS = 32
 MAX_STEPS = 201  # of one plan
@@ -53,8 +63,7 @@ class FinalForm:
     ends: tuple[str, ...] = ()
 
     def decoding(self, seed: int) -> Decoding:
-        """Return the decoding: as Qwen2.5-VL's own settings have it, greedy with the checkpoint's
-        penalty."""
+        """Return the decoding of Qwen2.5-VL's settings: greedy, with the checkpoint's penalty."""
         return Decoding(max_new_tokens=_MAX_TOKENS, seed=seed, stop=self.ends)
 
 
@@ -94,17 +103,24 @@ def final_form(history: History, name: str) -> FinalForm:
     if isinstance(history, RetrievedFrames) or (
         name.startswith("frames:") and isinstance(history, RecalledHistory)
     ):
-        return FinalForm(
-            system_prompt("frames"), _FrameMemory(history), asks_anew=True, goes_on=True
-        )
+        memory = _FrameMemory(history)
+        return FinalForm(system_prompt("frames"), memory, asks_anew=True, goes_on=True)
     raise UsageError(
         f"--protocol published has the histories full, text, retrieved:K and frames:K, not {name}"
     )
 
 
+def chat_form(history: History) -> FinalForm | None:
+    """Return how a chat asks an agent with this history; None if it continues the bare sequence."""
+    if isinstance(history, GoalHistory):
+        return FinalForm(system_prompt("goals"), history, ends=(ACT,))
+    if isinstance(history, PlanHistory):
+        return FinalForm(system_prompt("plans"), history, asks_anew=True)
+    return None
+
+
 def with_recorded_state(past: Past, trajectory: Trajectory, first: int) -> Past:
-    """Return a past with the state that the trajectory's own file has for an action, if it has
-    one."""
+    """Return a past with the state that the trajectory's file has for an action, if it has one."""
     recorded = (trajectory.state_summary or {}).get(str(first))
     return past if recorded is None else replace(past, state=recorded)
 

@@ -1,9 +1,8 @@
-"""The published table of final long-horizon tasks from the published plan logs: plans done of plans
-counted."""
+"""The published table of final tasks from the published plan logs: plans done of plans counted."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from infthor_eval.formats.plan_logs import LoggedPlans, PlanCount, PlanLog
+from infthor_eval.formats.plan_logs import PlanCount, PlanLog
 from infthor_eval.formats.published import PublishedRow, PublishedTable, published_tables
 from infthor_eval.plans.summary import FINAL_COLUMNS
 from infthor_eval.rates import clustered_rate
@@ -41,37 +40,31 @@ def final_table(logs: Sequence[PlanLog]) -> Table:
             remarks += wrong
             n_cells += len(cells)
     rows += _without_log(published, logs)
-    follow = (
-        [f"{n_cells - len(remarks)} of {n_cells} printed cells follow from these logs."]
-        if n_cells
-        else []
-    )
-    columns = (
-        Column("model", False),
-        Column("from", False),
-        *map(Column, (*FINAL_COLUMNS, "95 %", "set-up failed")),
-    )
+    follow = f"{n_cells - len(remarks)} of {n_cells} printed cells follow from these logs."
+    numbers = map(Column, (*FINAL_COLUMNS, "95 %", "set-up failed"))
+    columns = (Column("model", False), Column("from", False), *numbers)
     return Table(
         "Final long-horizon tasks: plans done, % (plans)",
         columns,
         tuple(rows),
-        (*follow, *remarks, *_NOTES, *published.notes, *_same_logs(logs)),
+        (*([follow] if n_cells else []), *remarks, *_NOTES, *published.notes, *_same_logs(logs)),
     )
 
 
 def count_plans(log: PlanLog) -> dict[str, PlanCount]:
     """Return the plans of a log by column of the published table."""
-    of_rows = [_by_column(row) for row in log.rows]
-    return {
-        name: PlanCount(
-            sum(row[name].n_done for row in of_rows), sum(row[name].n for row in of_rows)
-        )
-        for name in FINAL_COLUMNS
-    }
+    rows = log.rows
+    counts = (
+        _total([row.goto for row in rows]),
+        _total([row.pick for row in rows]),
+        _total([row.put for row in rows]),
+        _total([row.total for row in rows]),
+    )
+    return dict(zip(FINAL_COLUMNS, counts, strict=True))
 
 
-def _by_column(row: LoggedPlans) -> dict[str, PlanCount]:
-    return dict(zip(FINAL_COLUMNS, (row.goto, row.pick, row.put, row.total), strict=True))
+def _total(counts: Sequence[PlanCount]) -> PlanCount:
+    return PlanCount(sum(count.n_done for count in counts), sum(count.n for count in counts))
 
 
 def _row_of(log: PlanLog, counts: Mapping[str, PlanCount], ends_section: bool) -> Row:
@@ -88,8 +81,8 @@ def _interval(log: PlanLog) -> TableCell:
         for number in range(row.total.n)
     ]
     rate = clustered_rate([done for done, _ in plans], [traj_id for _, traj_id in plans])
-    ends = (None, None) if rate is None else (rate.low, rate.high)
-    low, high = (None if end is None else 100 * end for end in ends)
+    low = None if rate is None or rate.low is None else 100 * rate.low
+    high = None if rate is None or rate.high is None else 100 * rate.high
     return interval_cell(low, high, pattern="{}–{}")
 
 
@@ -108,8 +101,7 @@ def _percent(count: PlanCount) -> str:
 def _printed(
     row: PublishedRow, table: PublishedTable, counts: Mapping[str, PlanCount]
 ) -> tuple[list[str], list[str]]:
-    """Return the printed cells, those that do not follow with a mark, and a note on each of
-    these."""
+    """Return the printed cells, with a mark where they do not follow, and a note on each mark."""
     cells = []
     notes = []
     for name, value in zip(table.columns, row.values, strict=True):
@@ -117,10 +109,8 @@ def _printed(
         cells.append(f"{value:.1f}{'' if follows else '*'}")
         if not follows:
             why = _explanation(f"{value:.1f}", name, counts)
-            notes.append(
-                f"*: {row.name}, {name}: printed {value:.1f}, in the log {_cell(counts[name])}. "
-                f"{why}"
-            )
+            logged = f"in the log {_cell(counts[name])}"
+            notes.append(f"*: {row.name}, {name}: printed {value:.1f}, {logged}. {why}")
     return cells, notes
 
 
@@ -138,15 +128,16 @@ def _explanation(printed: str, column: str, counts: Mapping[str, PlanCount]) -> 
 
 def _without_log(table: PublishedTable, logs: Sequence[PlanLog]) -> Iterator[Row]:
     """Yield the printed rows that none of the logs is of."""
-    given = {log.model for log in logs}
+    logged = {log.model for log in logs}
     for row in table.rows:
-        if row.log is None or row.log not in given:
+        if row.log is None or row.log not in logged:
             yield Row((row.name, "printed", *map("{:.1f}".format, row.values)), is_published=True)
 
 
 def _same_logs(logs: Sequence[PlanLog]) -> Iterator[str]:
     """Yield a note on each log that is an earlier one under another name."""
-    for place, log in enumerate(logs):
-        first = next((other for other in logs[:place] if other.digest == log.digest), None)
-        if first is not None:
-            yield f"{log.path.name} is byte for byte {first.path.name}."
+    first: dict[str, PlanLog] = {}
+    for log in logs:
+        if log.digest in first:
+            yield f"{log.path.name} is byte for byte {first[log.digest].path.name}."
+        first.setdefault(log.digest, log)

@@ -1,12 +1,11 @@
-"""Goals of tasks as the published functions test them (`env/tasks.py`), by the name of the task's
-type.
+"""Goals of tasks as the published functions test them (`env/tasks.py`), by the task's type.
 
 They differ from ALFRED's, which `household.goals` tests: no lamp is ever asked for, so that looking
 at an object in light never counts; objects are told apart by the first part of their ids, so that
 no slice is ever asked for by its type; the basin of a sink is found in tasks of two objects alone.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from infthor_eval.formats.object_ids import Words
@@ -27,8 +26,7 @@ class Treated:
 
 @dataclass(frozen=True)
 class Scene:
-    """What goals are tested on: all objects by id, the ids of those that are held, and what was
-    done to objects."""
+    """What goals are tested on: objects by id, ids of held ones, and what was done to objects."""
 
     objects: Mapping[str, ThorObject]
     held: tuple[str, ...]
@@ -38,53 +36,55 @@ class Scene:
         self, name: str | None, has_property: Callable[[ThorObject], bool]
     ) -> list[ThorObject]:
         """Return the objects of a name that have a property."""
-        every = self.objects.values()
         return [
-            item
-            for item in every
-            if Words.PUBLISHED.name_of(item.object_id) == name and has_property(item)
+            candidate
+            for candidate in self.objects.values()
+            if Words.PUBLISHED.name_of(candidate.object_id) == name and has_property(candidate)
         ]
 
 
-def _pickupable(item: ThorObject) -> bool:
-    return bool(item.pickupable)
+def _pickupable(thor_object: ThorObject) -> bool:
+    return bool(thor_object.pickupable)
 
 
-def _receptacle(item: ThorObject) -> bool:
-    return bool(item.receptacle)
+def _receptacle(thor_object: ThorObject) -> bool:
+    return bool(thor_object.receptacle)
 
 
-def _inside(item: ThorObject, receptacles: Iterable[ThorObject]) -> bool:
-    return any(
-        item.object_id in (receptacle.receptacle_object_ids or ()) for receptacle in receptacles
-    )
+def _inside(target: ThorObject, receptacles: Iterable[ThorObject]) -> bool:
+    return bool(_filled([target], receptacles))
+
+
+def _filled(targets: Sequence[ThorObject], receptacles: Iterable[ThorObject]) -> list[ThorObject]:
+    """Return the receptacles with any of the objects in them."""
+    ids = {target.object_id for target in targets}
+    return [each for each in receptacles if ids & set(each.receptacle_object_ids or ())]
 
 
 def _targets(info: TaskInfo, scene: Scene) -> tuple[list[ThorObject], list[ThorObject], int]:
-    """Return a task's objects, its receptacles, and the number of slices that are asked for and
-    lacking."""
-    items = scene.named(info.pickup, _pickupable)
-    n_slices = sum("Sliced" in item.object_id for item in items)
+    """Return a task's objects, its receptacles, and the number of slices that it lacks."""
+    targets = scene.named(info.pickup, _pickupable)
+    n_slices = sum("Sliced" in target.object_id for target in targets)
     if info.pickup is None:
         raise TypeError("the task names no object")
     lacking = max(0, 1 - n_slices) if "Sliced" in info.pickup else 0
-    return items, scene.named(info.receptacle, _receptacle), lacking
+    return targets, scene.named(info.receptacle, _receptacle), lacking
 
 
 def _place(info: TaskInfo, scene: Scene) -> bool:
-    items, receptacles, lacking = _targets(info, scene)
-    return not lacking and any(_inside(item, receptacles) for item in items)
+    targets, receptacles, lacking = _targets(info, scene)
+    return not lacking and any(_inside(target, receptacles) for target in targets)
 
 
 def _place_two(info: TaskInfo, scene: Scene) -> bool:
-    items, receptacles, _ = _targets(info, scene)
+    targets, receptacles, _ = _targets(info, scene)
     if not receptacles and info.receptacle == "SinkBasin":
         receptacles = scene.named("Sink", _receptacle)
-    if "Sliced" in str(info.pickup) and sum("Sliced" in item.object_id for item in items) < 2:
+    if "Sliced" in str(info.pickup) and sum("Sliced" in target.object_id for target in targets) < 2:
         return False
-    return any(
-        sum(_inside(item, [receptacle]) for item in items) >= 2 for receptacle in receptacles
-    )
+    ids = {target.object_id for target in targets}
+    contents = [set(receptacle.receptacle_object_ids or ()) for receptacle in receptacles]
+    return any(len(ids & inside) >= 2 for inside in contents)
 
 
 def _look_in_light(info: TaskInfo, scene: Scene) -> bool:
@@ -96,17 +96,17 @@ def _place_treated(
     chosen: Callable[[Treated], Collection[str]],
 ) -> Callable[[TaskInfo, Scene], bool]:
     def holds(info: TaskInfo, scene: Scene) -> bool:
-        items, receptacles, lacking = _targets(info, scene)
-        ready = [item for item in items if item.object_id in chosen(scene.treated)]
-        return not lacking and any(_inside(item, receptacles) for item in ready)
+        targets, receptacles, lacking = _targets(info, scene)
+        ready = [target for target in targets if target.object_id in chosen(scene.treated)]
+        return not lacking and any(_inside(target, receptacles) for target in ready)
 
     return holds
 
 
 def _place_with_movable(info: TaskInfo, scene: Scene) -> bool:
-    items, receptacles, lacking = _targets(info, scene)
+    targets, receptacles, lacking = _targets(info, scene)
     carriers = scene.named(info.movable, _pickupable)
-    filled = [carrier for carrier in carriers if any(_inside(item, [carrier]) for item in items)]
+    filled = _filled(targets, carriers)
     there = any(_inside(carrier, receptacles) for carrier in carriers)
     ids = {receptacle.object_id for receptacle in receptacles}
     stacked = any(ids & set(carrier.parent_receptacles or ()) for carrier in filled)
@@ -114,8 +114,10 @@ def _place_with_movable(info: TaskInfo, scene: Scene) -> bool:
 
 
 def _put(info: TaskInfo, scene: Scene) -> bool:
-    """What is put away after a task: anything of a name lies in anything of another, and the hand
-    is empty."""
+    """Whether anything of a name lies in anything of another, and the hand is empty.
+
+    This is what is put away after a task.
+    """
     wanted = {info.pickup, info.movable}
     receptacles = [] if scene.held else scene.named(info.receptacle, _receptacle)
     inside = (key for receptacle in receptacles for key in receptacle.receptacle_object_ids or ())
@@ -135,6 +137,5 @@ _GOALS: Mapping[str, Callable[[TaskInfo, Scene], bool]] = {
 
 
 def goal_holds(info: TaskInfo, scene: Scene) -> bool:
-    """Return whether the goal of a task holds; KeyError if its name, with blanks or underscores, is
-    unknown."""
+    """Return whether a task's goal holds; KeyError if its name (with blanks or "_") is unknown."""
     return _GOALS[info.goal.replace(" ", "_")](info, scene)

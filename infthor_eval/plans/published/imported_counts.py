@@ -49,8 +49,7 @@ class ImportedCounts:
 
 
 def import_counts(log: PlanLog, model: str | None = None) -> ImportedCounts:
-    """Return the run that a log holds; `model` names it, None for the name in that of a published
-    log.
+    """Return the run that a log holds; `model` names it, None for the published log's model.
 
     Raises:
         UsageError: the log names no model and none is given.
@@ -59,17 +58,14 @@ def import_counts(log: PlanLog, model: str | None = None) -> ImportedCounts:
     name = model or log.model
     if name is None:
         raise UsageError(f"{log.path}: its name has no model; give one with --model")
-    mixed = {row.line for row in log.rows if sum(count.n for _, count in _kinds(row)) < row.total.n}
-    refused = tuple(
-        UnreadRow(line, "counts plans of other kinds than goto, pick and put")
-        for line in sorted(mixed)
-    )
-    records = tuple(record for row in log.rows if row.line not in mixed for record in _records(row))
+    whole = [row for row in log.rows if row.goto.n + row.pick.n + row.put.n >= row.total.n]
+    mixed = sorted({row.line for row in log.rows} - {row.line for row in whole})
+    problem = "counts plans of other kinds than goto, pick and put"
+    refused = tuple(UnreadRow(line, problem) for line in mixed)
+    records = tuple(record for row in whole for record in _records(row))
     if not records:
-        raise DataError(
-            f"{log.path}: none of its plans can be imported; give a log that counts goto, pick and "
-            "put"
-        )
+        hint = "give a log that counts goto, pick and put"
+        raise DataError(f"{log.path}: none of its plans can be imported; {hint}")
     without = [row.traj_id for row in log.rows if not row.total.n]
     unread = (*log.unread, *refused)
     return ImportedCounts(log, _header(name, log, without, unread), records, len(without), unread)

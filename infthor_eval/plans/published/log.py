@@ -1,5 +1,4 @@
-"""What the published loop logs of a trajectory (`agent.log`): a row for each action of the agent,
-with running totals.
+"""What the published loop logs of a trajectory (`agent.log`): an action a row, running totals.
 
 `total_reward` is set to the expert's at the beginning of each plan; `agent_reward` goes on from
 plan to plan. The reward of an action that completes a plan enters neither, as the loop returns
@@ -38,8 +37,7 @@ class LogRow:
 
 
 def log_rows(plans: Sequence[PlanRecord]) -> Iterator[LogRow]:
-    """Yield the rows of a trajectory's plans, in time order and run under the published rules; the
-    first is `INIT`."""
+    """Yield the rows of plans, in time order and run under the published rules, after `INIT`."""
     last = LogRow()
     yield last
     n_expert = 0
@@ -52,10 +50,10 @@ def log_rows(plans: Sequence[PlanRecord]) -> Iterator[LogRow]:
             # A failed action ends the plan and earns nothing; a completing one is left out.
             ends = number == len(plan.steps) and plan.ended != Ended.LIMIT
             if not ends:
-                n_actions = n_actions + 1
-                total = total + step.reward
-                agent_total = agent_total + step.reward
-            said = step.reply if step.reply is not None else step.action
-            yield LogRow(n_actions, total, agent_total, said, step.reward, plan.kind, plan.index)
-        n_expert = n_expert + plan.n_expert_steps
-        expert_total = expert_total + (plan.expert_reward or 0.0)
+                n_actions += 1
+                total += step.reward
+                agent_total += step.reward
+            text = step.reply if step.reply is not None else step.action
+            yield LogRow(n_actions, total, agent_total, text, step.reward, plan.kind, plan.index)
+        n_expert += plan.n_expert_steps
+        expert_total += plan.expert_reward or 0.0

@@ -1,5 +1,4 @@
-"""Distances as the published script has them: the length of the path that its search finds, up to
-the first wall.
+"""Distances as the published script has them: lengths of paths that it finds, up to a wall.
 
 The search is networkx's A* on a graph of cells and directions, with a heuristic that overestimates
 turns. So a path need not be a shortest one, which one is found hangs on the order of nodes and
@@ -15,9 +14,8 @@ import numpy as np
 
 __all__ = ["OffGridError", "Pose", "PublishedGraph", "PublishedPaths"]
 
-Pose = tuple[
-    int, int, int, int
-]  # cell (x, z) of 0.25 m, quarter turn, degrees of the camera downwards
+# Cell (x, z) of 0.25 m, quarter turn, degrees of the camera downwards.
+Pose = tuple[int, int, int, int]
 _Node = tuple[int, int, int]
 _MARGIN = 30  # cells around the reachable ones
 # costs of entering a cell; those of turns are 1
@@ -29,8 +27,7 @@ _AHEAD = ((0, 1), (1, 0), (0, -1), (-1, 0))  # by quarter turn
 
 
 class OffGridError(ValueError):
-    """A pose is not on the graph, or has no quarter turn; the published search fails with an
-    assertion."""
+    """A pose is not on the graph, or has no quarter turn: the published search's assertion."""
 
 
 class PublishedGraph:
@@ -42,7 +39,8 @@ class PublishedGraph:
         # The coordinates are numpy's, as with them sums of costs and distances are rounded
         # otherwise.
         points = np.array(sorted(reachable), dtype=np.int32)
-        (x_min, z_min), (x_max, z_max) = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+        x_min, z_min = points.min(axis=0) - _MARGIN
+        x_max, z_max = points.max(axis=0) + _MARGIN
         self.graph = nx.DiGraph()
         for z in np.arange(z_min, z_max + 1):
             for x in np.arange(x_min, x_max + 1):
@@ -64,10 +62,8 @@ class PublishedGraph:
     def n_passable(self, path: list[_Node]) -> int:
         """Return the number of a path's steps before the first that enters a wall."""
         weights = (self.graph[one][other]["weight"] for one, other in pairwise(path))
-        return next(
-            (number for number, weight in enumerate(weights) if weight >= _IMPASSABLE),
-            len(path) - 1,
-        )
+        walls = (number for number, weight in enumerate(weights) if weight >= _IMPASSABLE)
+        return next(walls, len(path) - 1)
 
 
 def _estimate(node: _Node, goal: _Node) -> int:
@@ -75,13 +71,13 @@ def _estimate(node: _Node, goal: _Node) -> int:
 
 
 class PublishedPaths:
-    """The paths that were found in a graph so far: an earlier search answers for all nodes of its
-    path."""
+    """Paths that were found in a graph so far: a search answers for all nodes of its path."""
 
     def __init__(
         self, graph: PublishedGraph, known: dict[tuple[_Node, _Node], list[_Node]] | None = None
     ) -> None:
-        self._graph, self._known = graph, dict(known or {})
+        self._graph = graph
+        self._known = dict(known or {})
 
     def copy(self) -> "PublishedPaths":
         """Return paths that go on from here on their own."""
@@ -93,7 +89,8 @@ class PublishedPaths:
         It ends at the first wall, wherever the goal is. Looks count if the angles differ by a
         multiple of 30 degrees.
         """
-        start, end = pose[:3], goal[:3]
+        start = pose[:3]
+        end = goal[:3]
         for node in (start, end):
             if node not in self._graph.graph:
                 raise OffGridError(f"{node} is not on the grid")

@@ -9,7 +9,7 @@ from copy import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.object_ids import Words
 from infthor_eval.formats.trajectory import HighAction, PlannerAction, TaskInfo
 from infthor_eval.plans.plan import PlanKind
@@ -55,7 +55,8 @@ class Transition(NamedTuple):
 def pose_of(view: SimulatorView) -> Pose:
     """Return the pose of the agent as the published environment rounds it."""
     agent = view.agent
-    x, z = round(agent.position.x / _CELL), round(agent.position.z / _CELL)
+    x = round(agent.position.x / _CELL)
+    z = round(agent.position.z / _CELL)
     return x, z, round(agent.rotation / _QUARTER) % 4, round(agent.horizon)
 
 
@@ -118,14 +119,12 @@ class PublishedTask:
             sub_goal = self.plan[index].discrete_action.action
             raise UnscoredError(
                 f"the published rewards fail at {state.last_action:.40} in sub-goal {sub_goal:.40} "
-                f"({error}); use"
-                " --rewards default"
+                f"({error}); use --rewards default"
             ) from error
         self.previous = state
         reward += self.rules.task_done * self.goal_reached
-        return Transition(
-            reward, self.goal_index >= self.n_sub_goals or self.goal_reached, plan_done
-        )
+        task_done = self.goal_index >= self.n_sub_goals or self.goal_reached
+        return Transition(reward, task_done, plan_done)
 
     def _goal_holds(self, state: PublishedState, treated: Treated) -> bool:
         return goal_holds(self.info, Scene(state.objects, state.held, treated))
@@ -143,9 +142,8 @@ class PublishedTask:
 
     def _goto(self, step: "_Step") -> tuple[float, bool]:
         goal = _location(self._planner_action(step.index))
-        before, left = (
-            self.paths.n_actions(pose, goal) for pose in (step.before.pose, step.state.pose)
-        )
+        before = self.paths.n_actions(step.before.pose, goal)
+        left = self.paths.n_actions(step.state.pose, goal)
         gained = (before - left) * self.rules.per_step if before > left else 0.0
         arrived = left < self.rules.nearer_than
         return gained + self.rules.rewards[PlanKind.GOTO] * arrived, arrived
@@ -163,13 +161,11 @@ class PublishedTask:
         sub_goal = self.plan[step.index]
         planner = self._planner_action(step.index)
         # What a sub-goal lacks is missed only where the published function comes to it.
-        receptacle_id = (
-            ""
-            if planner.object_id is None
-            else _required(planner.receptacle_id, "receptacleObjectId")
-        )
+        receptacle_id = ""
         if planner.object_id is None:
             sub_goal.discrete_action.args[1]  # type: ignore[index]
+        else:
+            receptacle_id = _required(planner.receptacle_id, "receptacleObjectId")
         if now == "OpenObject" and step.state.held:
             return per_success, False
         if planner.object_id is None:
@@ -184,58 +180,52 @@ class PublishedTask:
         return per_success, not (step.before.last_action == "OpenObject" and now == "PutObject")
 
     def _open(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.OPEN, lambda item: bool(item.is_open))
+        return self._state_reward(step, PlanKind.OPEN, lambda changed: bool(changed.is_open))
 
     def _close(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.CLOSE, lambda item: not item.is_open)
+        return self._state_reward(step, PlanKind.CLOSE, lambda changed: not changed.is_open)
 
     def _toggle(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.TOGGLE, lambda item: item.is_toggled)
+        return self._state_reward(step, PlanKind.TOGGLE, lambda changed: changed.is_toggled)
 
     def _slice(self, step: "_Step") -> tuple[float, bool]:
-        return self._state_reward(step, PlanKind.SLICE, lambda item: item.is_sliced)
+        return self._state_reward(step, PlanKind.SLICE, lambda changed: changed.is_sliced)
 
     def _state_reward(
         self, step: "_Step", kind: PlanKind, is_done: Callable[[ThorObject], bool]
     ) -> tuple[float, bool]:
-        """Return the reward of a state that the plan's object is in, by whatever action it came
-        there."""
-        item = step.state.objects.get(
-            _required(self._planner_action(step.index).object_id, "objectId")
-        )
-        return self._pay(kind, item is not None and is_done(item))
+        """Return the reward of a state of the plan's object, by whatever action it came there."""
+        object_id = _required(self._planner_action(step.index).object_id, "objectId")
+        changed = step.state.objects.get(object_id)
+        return self._pay(kind, changed is not None and is_done(changed))
 
     def _clean(self, step: "_Step") -> tuple[float, bool]:
-        item = step.state.objects.get(
-            _required(self._planner_action(step.index).clean_id, "cleanObjectId")
-        )
-        return self._pay(
-            PlanKind.CLEAN, item is not None and item.object_id in step.treated.cleaned
-        )
+        object_id = _required(self._planner_action(step.index).clean_id, "cleanObjectId")
+        washed = step.state.objects.get(object_id)
+        is_done = washed is not None and washed.object_id in step.treated.cleaned
+        return self._pay(PlanKind.CLEAN, is_done)
 
     def _heat(self, step: "_Step") -> tuple[float, bool]:
-        item = self._put_next(step)
-        return self._pay(PlanKind.HEAT, item is not None and item.object_id in step.treated.heated)
+        heated = self._put_next(step)
+        is_done = heated is not None and heated.object_id in step.treated.heated
+        return self._pay(PlanKind.HEAT, is_done)
 
     def _cool(self, step: "_Step") -> tuple[float, bool]:
         per_success = self.rules.rewards[PlanKind.COOL]
-        item = self._put_next(step)
-        if item is None or item.object_id not in step.treated.cooled:
+        cooled = self._put_next(step)
+        if cooled is None or cooled.object_id not in step.treated.cooled:
             return 0.0, False
         if not self.cooled:
             self.cooled = True
             return per_success, False
         if step.state.last_action == "OpenObject":
-            fridge = step.state.objects.get(
-                _required(self._planner_action(step.index).object_id, "objectId")
-            )
+            fridge_id = _required(self._planner_action(step.index).object_id, "objectId")
+            fridge = step.state.objects.get(fridge_id)
             if fridge is not None and not self.opened_again and fridge.is_open:
                 self.opened_again = True
                 return per_success, False
-        picked = step.state.last_action == "PickupObject" and step.state.held[:1] == (
-            item.object_id,
-        )
-        return self._pay(PlanKind.COOL, picked)
+        is_held = step.state.held[:1] == (cooled.object_id,)
+        return self._pay(PlanKind.COOL, step.state.last_action == "PickupObject" and is_held)
 
     # -- their parts
 
@@ -243,15 +233,14 @@ class PublishedTask:
         return self.rules.rewards[kind] * is_done, is_done
 
     def _put_next(self, step: "_Step") -> ThorObject | None:
-        """Return the object of the plan two further on, which puts away what was heated or cooled;
-        None at the end."""
+        """Return the object of the plan two further on, which puts it away; None at the end."""
         if step.index + 2 >= len(self.plan):
             return None
         object_id = _required(self._planner_action(step.index + 2).object_id, "objectId")
-        item = step.state.objects.get(object_id)
-        if item is None:
+        put = step.state.objects.get(object_id)
+        if put is None:
             raise TypeError(f"there is no {object_id:.80}")
-        return item
+        return put
 
 
 @dataclass(frozen=True)

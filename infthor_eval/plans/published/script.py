@@ -1,5 +1,4 @@
-"""The published loop's tasks along a trajectory (`run_interactive_eval.py`): which state each plan
-is rewarded from.
+"""The published loop's tasks (`run_interactive_eval.py`): which state each plan is rewarded from.
 
 The loop sets up a task at its first plan, and again after each plan, before the expert repeats that
 plan. So the agent meets a task that has counted the expert's actions of the plan before, from the
@@ -12,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from infthor_eval.episodes.errors import InfeasibleError
+from infthor_eval.episodes.records import InfeasibleError
 from infthor_eval.formats.trajectory import Trajectory
 from infthor_eval.household.scout import reachable_grid
 from infthor_eval.plans.expert import Replayed
@@ -31,8 +30,7 @@ _FIRST = "TeleportFull"  # the last action of a scene that was set up
 
 
 class PublishedReward:
-    """The rewards of one plan from its start on, as the published loop gives them; `goal_reached`
-    see `PlanReward`."""
+    """The rewards of one plan as the published loop gives them; `goal_reached` see `PlanReward`."""
 
     def __init__(self, task: PublishedTask, sub_goal: int) -> None:
         self._task = task
@@ -117,9 +115,8 @@ class PublishedScript:
             )
         self._graph = PublishedGraph(cells)
         self._passed: dict[int, ScriptedPlan | UnscoredError] = {}
-        self._repeated: PublishedTask | None = (
-            None  # with the expert's actions of the plan passed last
-        )
+        # With the expert's actions of the plan passed last.
+        self._repeated: PublishedTask | None = None
         self._stopped: UnscoredError | None = None
 
     def plan(self, index: int) -> ScriptedPlan:
@@ -156,15 +153,14 @@ class PublishedScript:
 
     def _pass(self, plan: Plan, replayed: Sequence[Replayed]) -> ScriptedPlan:
         sub_goal = plan.high - self._tasks[plan.task].first_high
-        met = (
-            self._repeated if sub_goal and self._repeated is not None else self._new_task(plan.task)
-        )
+        met = self._repeated if sub_goal else None
+        if met is None:
+            met = self._new_task(plan.task)
         states = [PublishedState.of(view, action.call["action"]) for action, view, *_ in replayed]
         self._repeated = self._new_task(plan.task)
         expert_reward = sum(self._repeated.transition(state).reward for state in states)
-        return ScriptedPlan(
-            met, sub_goal, expert_reward, self._planner_reward(met, sub_goal, replayed)
-        )
+        planner_reward = self._planner_reward(met, sub_goal, replayed)
+        return ScriptedPlan(met, sub_goal, expert_reward, planner_reward)
 
     def _new_task(self, number: int) -> PublishedTask:
         task = self._tasks[number]
@@ -175,8 +171,7 @@ class PublishedScript:
     def _planner_reward(
         self, met: PublishedTask, sub_goal: int, replayed: Sequence[Replayed]
     ) -> float:
-        """Return what an agent earns that repeats the expert; up to where the published functions
-        fail, if they do."""
+        """Return what an agent earns that repeats the expert, up to a failure of the functions."""
         reward = PublishedReward(met.copy(), sub_goal)
         total = 0.0
         try:
@@ -191,8 +186,7 @@ class PublishedScript:
 
 
 def _first_empty(plans: Sequence[Plan], tasks: Sequence[TrajectoryTask]) -> int | None:
-    """Return the place of the first sub-goal of a task that has no actions, None if all have
-    some."""
+    """Return the index of the first sub-goal of a task without actions, None if all have some."""
     acted = {plan.high for plan in plans}
     every = (high for task in tasks for high in range(task.first_high, task.end_high))
     return next((high for high in every if high not in acted), None)

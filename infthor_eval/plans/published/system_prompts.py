@@ -1,5 +1,4 @@
-"""What agents are told by the published scripts and trainers of branch `dev`, word for word
-(`prompts.yaml`)."""
+"""System prompts of the published scripts and trainers of branch `dev` (`prompts.yaml`)."""
 
 from functools import cache
 from pathlib import Path

@@ -44,10 +44,9 @@ FACETS: Mapping[str, Facet] = {
 
 
 def plan_curves(runs: Sequence[PlansRun], task: str | None = None) -> RewardCurves:
-    """Compute the curves of runs (at least one) of a task (None: the only one they share); see
-    `compute_curves`.
+    """Compute the curves of runs (at least one) of a task (None: the only one they share).
 
-    Plans that a run excludes are left out of all of them.
+    See `compute_curves`. Plans that a run excludes are left out of all of them.
 
     Raises:
         UsageError: they share no task or several, or their reward rules differ.
@@ -61,29 +60,26 @@ def _functions(trajectories: Sequence[Earned[PlanRecord]]) -> Functions:
         Axis.STEPS: [_over_steps(units) for units in trajectories]
     }
     if any(_context(record) is not None for units in trajectories for record, _ in units):
-        functions[Axis.TOKENS] = [
-            StepFunction.of([(_context(r), reward) for r, reward in it]) for it in trajectories
-        ]
+        functions[Axis.TOKENS] = [_over_tokens(units) for units in trajectories]
     return functions
 
 
 def _over_steps(units: Earned[PlanRecord]) -> StepFunction:
-    ends = [
-        (record.payload.first_step + record.payload.n_expert_steps, reward)
-        for record, reward in units
-    ]
+    plans = [(record.payload, reward) for record, reward in units]
+    ends = [(plan.first_step + plan.n_expert_steps, reward) for plan, reward in plans]
     return StepFunction.of(ends, start=units[0][0].payload.first_step)
 
 
+def _over_tokens(units: Earned[PlanRecord]) -> StepFunction:
+    return StepFunction.of([(_context(record), reward) for record, reward in units])
+
+
 def _context(record: UnitRecord[PlanRecord]) -> float | None:
-    """Return the context tokens of the plan's last request; None if the model does not count, or
-    was not asked."""
+    """Return the context tokens of the plan's last request; None if there are none or no count."""
     steps = record.payload.steps
-    return (
-        record.tokens.context
-        if record.tokens.context is not None or not steps
-        else steps[-1].n_context_tokens
-    )
+    if record.tokens.context is not None or not steps:
+        return record.tokens.context
+    return steps[-1].n_context_tokens
 
 
 def _count(plans: Sequence[UnitRecord[PlanRecord]]) -> dict[str, int]:

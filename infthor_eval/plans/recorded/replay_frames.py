@@ -1,5 +1,4 @@
-"""What a replay shows of an agent at one step, as plain values: no simulator is needed to draw
-it."""
+"""What a replay shows of an agent's step, as plain values: no simulator is needed to draw it."""
 
 from dataclasses import dataclass
 
@@ -32,8 +31,7 @@ class FloorPose:
 
 @dataclass(frozen=True)
 class MapObject:
-    """An object from above: its type, its box's corners of lowest and highest x and z, whether the
-    plan names it."""
+    """An object from above: type, corners of lowest and highest x and z, and if it is named."""
 
     name: str
     low: Point
@@ -75,8 +73,7 @@ class PlanObservation:
 
 @dataclass(frozen=True)
 class PlanTitle:
-    """What a plan asks for, its number from 1 on, and the numbers of the expert's and of the
-    agent's actions."""
+    """What a plan asks for, its number from 1, and the counts of expert's and agent's actions."""
 
     number: int
     n_plans: int

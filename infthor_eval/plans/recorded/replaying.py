@@ -51,9 +51,9 @@ class RecordedPlans(RecordedTrajectory[PlansRun, PlanRecord]):
     """What a run recorded of the plans of one trajectory."""
 
     def between(self, first: int, last: int) -> list[Record]:
-        """Return the records of plans by number, from 1 on, ends included; UsageError if the run
-        lacks some of them."""
-        lowest, highest = (self.records[place].payload.index + 1 for place in (0, -1))
+        """Return the records of plans by number, from 1, ends included; UsageError if lacking."""
+        lowest = self.records[0].payload.index + 1
+        highest = self.records[-1].payload.index + 1
         if not lowest <= first <= last <= highest:
             chosen = f"{first}" if first == last else f"{first}-{last}"
             raise UsageError(
@@ -86,8 +86,7 @@ def replay_plans(
 
 
 class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
-    """A simulator in which recorded plans are replayed. It is started, and the scene restored, for
-    the first plan."""
+    """A simulator in which recorded plans are replayed, started and restored for the first plan."""
 
     def __init__(
         self,
@@ -118,13 +117,16 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
             rules = msgspec.convert(config.rewards, RewardRules)
             max_steps = msgspec.convert(config.dataset_kwargs.get("max_steps", MAX_STEPS), int)
         simulator = self._start_simulator()
-        data = self._trajectory.data
-        words = _words(config)
-        return PlanEnvironment(
-            data, simulator, rules=rules, words=words, max_steps=max_steps
-        ), simulator
+        environment = PlanEnvironment(
+            self._trajectory.data,
+            simulator,
+            rules=rules,
+            words=_words(config),
+            max_steps=max_steps,
+        )
+        return environment, simulator
 
-    def _place(self, record: Record, number: int) -> str:
+    def _describe_step(self, record: Record, number: int) -> str:
         return f"plan {record.payload.index + 1}, action {number}"
 
     def _frame(
@@ -156,17 +158,18 @@ class PlanReplay(EpisodeReplay[PlanRecord, PlanFrame]):
         )
 
     def _rewards(self, plan: PlanRecord, number: int) -> PlanRewards:
-        """Return the rewards after a number of actions; excluded plans of the trajectory do not
-        count."""
+        """Return the rewards after some actions; excluded plans do not count."""
         steps = plan.steps[:number]
         earned = sum(step.reward for step in steps)
-        so_far = [item.payload for item in self._recorded.records if item.excluded is None]
+        counted = [r.payload for r in self._recorded.records if r.excluded is None]
+        before = [other.reward for other in counted if other.index < plan.index]
+        most = [other.max_reward or 0.0 for other in counted if other.index <= plan.index]
         return PlanRewards(
             step=steps[-1].reward if steps else None,
             plan=earned,
             max_of_plan=plan.max_reward,
-            so_far=sum(item.reward for item in so_far if item.index < plan.index) + earned,
-            max_so_far=sum(item.max_reward or 0.0 for item in so_far if item.index <= plan.index),
+            so_far=sum(before) + earned,
+            max_so_far=sum(most),
         )
 
 
@@ -182,10 +185,9 @@ class _PlanInReplay:
         self._named = frozenset(environment.named_objects(plan))
         grid = reachable_grid(simulator)
         self._floor = tuple(grid.position(cell) for cell in sorted(grid.cells))
-        leads_somewhere = environment.plans[plan].kind == PlanKind.GOTO
-        self._goal = (
-            _floor_pose(environment.expert_actions(plan)[-1].pose) if leads_somewhere else None
-        )
+        self._goal: FloorPose | None = None
+        if environment.plans[plan].kind == PlanKind.GOTO:
+            self._goal = _floor_pose(environment.expert_actions(plan)[-1].pose)
 
     def repeat(self, step: StepRecord, *, is_last: bool) -> str:
         """See `EpisodeInReplay`; a reply that could not be executed has no call to repeat."""
@@ -204,30 +206,27 @@ class _PlanInReplay:
         view = self._view
         if view.frame is None:
             raise DataError("the simulator sent no frame; use one that renders")
-        drawn = (self._map_object(item) for item in view.objects.values() if self._is_drawn(item))
-        room = RoomMap(self._floor, tuple(item for item in drawn if item is not None), self._goal)
+        drawn = map(self._map_object, filter(self._is_drawn, view.objects.values()))
+        objects = tuple(each for each in drawn if each is not None)
+        room = RoomMap(self._floor, objects, self._goal)
         held = tuple(map(object_type_of, view.inventory))
         return PlanObservation(view.frame, room, _floor_pose(view.agent), tuple(self._walked), held)
 
-    def _is_drawn(self, item: ThorObject) -> bool:
-        if item.is_picked_up or item.object_type == _FLOOR:
+    def _is_drawn(self, thor_object: ThorObject) -> bool:
+        if thor_object.is_picked_up or thor_object.object_type == _FLOOR:
             return False
-        return item.object_id in self._named or (
-            not item.pickupable and (item.receptacle or item.moveable)
-        )
+        if thor_object.object_id in self._named:
+            return True
+        return not thor_object.pickupable and (thor_object.receptacle or thor_object.moveable)
 
-    def _map_object(self, item: ThorObject) -> MapObject | None:
-        box = item.axis_aligned_bounding_box
+    def _map_object(self, thor_object: ThorObject) -> MapObject | None:
+        box = thor_object.axis_aligned_bounding_box
         if box is None:
             return None
-        x = box.center.x
-        z = box.center.z
-        half_x = box.size.x / 2
-        half_z = box.size.z / 2
-        is_named = item.object_id in self._named
-        return MapObject(
-            item.object_type, (x - half_x, z - half_z), (x + half_x, z + half_z), is_named
-        )
+        low = box.center.x - box.size.x / 2, box.center.z - box.size.z / 2
+        high = box.center.x + box.size.x / 2, box.center.z + box.size.z / 2
+        is_named = thor_object.object_id in self._named
+        return MapObject(thor_object.object_type, low, high, is_named)
 
 
 def _words(config: PlansTaskConfig) -> Words:
@@ -238,10 +237,8 @@ def _words(config: PlansTaskConfig) -> Words:
 def _difference(step: StepRecord, outcome: StepOutcome, is_over: bool, is_last: bool) -> str:
     message = outcome.info.message
     if bool(step.message) != bool(message):
-        return (
-            f"{step.action} {_success_text(message)} now, and {_success_text(step.message)} in the "
-            "run"
-        )
+        then = _success_text(step.message)
+        return f"{step.action} {_success_text(message)} now, and {then} in the run"
     if abs(outcome.reward - step.reward) > _TOLERANCE:
         return f"{step.action} earns {outcome.reward:g} now, and {step.reward:g} in the run"
     if is_over != is_last:
@@ -257,8 +254,7 @@ def _success_text(message: str) -> str:
 
 
 def _action_text(step: StepRecord) -> str:
-    """Return the action in words; of an action given as a call, as by a baseline, the record has
-    its name alone."""
+    """Return the action in words; the record of a call has its name alone."""
     object_id = (step.call or {}).get("objectId")
     if isinstance(object_id, str) and step.call is not None and step.action == step.call["action"]:
         return str(text_of(step.action, object_id))

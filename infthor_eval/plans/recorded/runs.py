@@ -34,8 +34,7 @@ class PlansRun(RecordedRun[PlanRecord, PlansConfig]):
 
 
 def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[PlanRecord]:
-    """Find the plans of a task (None: the only one shared) in trajectories that all runs (at least
-    one) have in full.
+    """Find a task's plans (None: the only shared one) in trajectories that all runs have in full.
 
     Raises:
         UsageError: they share no task or several, or their reward rules differ.
@@ -53,9 +52,7 @@ def shared_plans(runs: Sequence[PlansRun], task: str | None) -> SharedUnits[Plan
                 f"{runs[0].label} and {run.label} have different reward rules; draw runs with the "
                 "same --rewards"
             )
-    differences = difference_notes(
-        "continuation after a failed plan", runs, [it.after_failure for it in configs]
-    )
-    return shared_units(
-        runs, shared, "plans left out, as a simulator refuses their expert", differences
-    )
+    after_failure = [config.after_failure for config in configs]
+    differences = difference_notes("continuation after a failed plan", runs, after_failure)
+    excluded = "plans left out, as a simulator refuses their expert"
+    return shared_units(runs, shared, excluded, differences)

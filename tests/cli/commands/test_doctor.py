@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from infthor_eval.cli.checks import Check
 from infthor_eval.cli.commands import doctor as checks
+from infthor_eval.cli.set_checks import Check
 from infthor_eval.formats.question import Question
 
 from ...bundled import BUNDLED

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from infthor_eval.memory import MEMORIES
+
 EXAMPLES = Path(__file__).parents[3] / "examples" / "memories"
 
 
@@ -77,12 +79,16 @@ def test_misuse_is_one_line(typed, words, tmp_path, run):
     assert "Traceback" not in err
 
 
-def test_all_are_listed_with_their_options(run):
+def test_all_are_listed_one_a_line_and_the_options_of_one(run):
     code, out, _ = run("ls", "memories")
     assert code == 0
-    for name in ("last", "uniform", "clip", "notes", "text-log", "oracle", "random"):
-        assert f" {name} " in out
-    assert "window=20" in out
+    lines = [line.split()[0] for line in out.splitlines()[3:] if line.strip()]
+    assert {"last", "uniform", "clip", "notes", "text-log", "oracle", "random"} <= set(lines)
+    assert set(lines) <= set(MEMORIES.names)
+    code, out, _ = run("ls", "memories", "notes")
+    assert (code, "window=20, tokens=64" in out) == (0, True)
+    code, _, err = run("ls", "memories", "note")
+    assert (code, "unknown memory 'note'" in err) == (2, True)
 
 
 def test_a_run_for_each_memory_and_budget_with_a_table_of_all(tmp_path, run):

@@ -7,6 +7,8 @@ import sys
 import pytest
 
 from infthor_eval.formats.question import Question
+from infthor_eval.suites import baseline_suites
+from model_adapters import names, options
 
 from ...waiting import PATIENCE_S, wait_until
 
@@ -372,9 +374,30 @@ def test_help_names_the_commands_and_the_version_is_printed(run):
     assert run("run", "--help")[0] == 0
 
 
-def test_ls_lists_models_and_tasks(run):
-    assert "qwen2.5-vl-tiny" in run("ls", "models")[1]
-    assert "nieh_mini" in run("ls", "tasks")[1]
+def test_ls_lists_models_one_a_line_with_engine_and_usual_checkpoint(run):
+    rows = [line.split() for line in run("ls", "models")[1].splitlines()[3:] if line.strip()]
+    assert [row[0] for row in rows] == [*baseline_suites(), *names()]
+    by_name = {row[0]: row[1:] for row in rows}
+    assert by_name["random"] == ["a", "baseline", "of", "nieh,", "plans", "-"]
+    assert by_name["qwen2.5-vl"] == ["usually", "Qwen/Qwen2.5-VL-7B-Instruct", "transformers"]
+    assert (by_name["qwen2.5-vl@vllm"][-1], by_name["openai"][-1]) == ("vllm", "-")
+
+
+def test_ls_prints_the_options_of_a_model(run):
+    said = " ".join(run("ls", "models", "qwen2.5-vl-tiny")[1].split())
+    assert "random weights" in said and options("qwen2.5-vl-tiny") in said
+    assert "a baseline of nieh; no options" in run("ls", "models", "blind")[1]
+    code, _, err = run("ls", "models", "blnd")
+    assert code == 2
+    assert err == "infthor-eval: unknown model 'blnd'; did you mean 'blind'?\n"
+
+
+def test_ls_lists_tasks_and_joins_those_that_differ_in_size(run):
+    said = " ".join(run("ls", "tasks")[1].split())
+    assert "nieh_mini_gt " in said
+    assert "nieh_haystack_{8k,...,1m} A window of {8K,...,1M} tokens, with" in said
+    assert "group: nieh_haystack_{8k,16k,32k,64k,128k,256k,512k,1m}" in said
+    assert "nieh_published_last_{32k,64k} " in said
 
 
 def test_ls_lists_a_users_own_tasks(run, tmp_path):

@@ -10,8 +10,7 @@ from infthor_eval.plans.history.forms import history_named
 from infthor_eval.plans.history.past import Past
 from infthor_eval.plans.history.recalled import MemoryChoice
 from infthor_eval.plans.history.segments import PlanSegment
-from infthor_eval.plans.published.chat_forms import chat_form
-from infthor_eval.plans.published.final_protocol import present_parts
+from infthor_eval.plans.published.final_protocol import chat_form, present_parts
 from infthor_eval.runs import execute
 
 from ..cut import FORK, cut, write

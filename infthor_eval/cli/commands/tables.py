@@ -1,4 +1,4 @@
-"""`infthor-eval table-final`: the paper's table of final tasks from the published plan logs."""
+"""`table4` and `table-final`: tables of the paper from its published files."""
 
 from pathlib import Path
 
@@ -7,21 +7,39 @@ import click
 from infthor_eval.cli.help import ExampleCommand
 from infthor_eval.cli.options.values import PATH
 
-__all__ = ["command"]
+__all__ = ["table4", "table_final"]
+
+
+@click.command("table4", cls=ExampleCommand, example="infthor-eval table4 SET")
+@click.argument("set_folder", metavar="SET", type=PATH)
+def table4(set_folder: Path) -> None:
+    """Compute the paper's Table 4 from the scores in the published question files, beside the
+    printed table.
+
+    SET is a folder with both files. It needs no frames.
+    """
+    from infthor_eval.cli.progress.notes import print_left_out
+    from infthor_eval.formats.nieh_set import NiehSet
+    from infthor_eval.nieh.published import table4 as published
+    from infthor_eval.report.terminal import print_table, table_console
+
+    data = NiehSet(set_folder)
+    print_left_out(data.root, data.skipped)
+    print_table(published.table4(data), table_console())
 
 
 @click.command(
     "table-final", cls=ExampleCommand, example="infthor-eval table-final LOGS/eval_longhrz_*.log"
 )
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=PATH)
-def command(logs: tuple[Path, ...]) -> int:
+def table_final(logs: tuple[Path, ...]) -> int:
     """Compute the paper's table of final long-horizon tasks from the published plan logs, beside
     the printed table.
 
     The name of a LOG says which row it is; a log of another name has a row of its own. A line
     without counts is counted and named; the exit code is then 1.
     """
-    from infthor_eval.cli.progress.refused_lines import print_refused
+    from infthor_eval.cli.progress.notes import print_refused
     from infthor_eval.formats.plan_logs import read_plan_log
     from infthor_eval.plans.published.final_table import final_table
     from infthor_eval.report.terminal import print_table, table_console

@@ -1,0 +1,148 @@
+"""`check-adapter`, `check-memory` and `check-parity`: checks of anybody's models and memories."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from infthor_eval.cli.help import ExampleCommand
+from infthor_eval.cli.options.values import PATH, FiniteFloat, parse_model_args
+
+if TYPE_CHECKING:
+    from model_adapters.check import CheckResult
+
+__all__ = ["check_adapter", "check_memory", "check_parity"]
+
+
+@click.command(
+    "check-adapter",
+    cls=ExampleCommand,
+    example="infthor-eval check-adapter ./my_adapter.py:MyModel",
+)
+@click.argument("model")
+@click.option(
+    "--model-args", default="", metavar="K=V,...", help="Options of MODEL (see `ls models MODEL`)."
+)
+def check_adapter(model: str, model_args: str) -> int:
+    """Check MODEL, a name or your own FILE.py:CLASS, against the adapter contract.
+
+    The model gets a few dozen short requests with frames of one colour. Each clause of the contract
+    has a line of output; docs/own-models.md explains them. Exit code 1 if a clause is broken.
+    """
+    from model_adapters import run_checks
+    from model_adapters.registry import build
+
+    adapter = build(model, parse_model_args(model_args), seed=0)
+    try:
+        return _print_checks(model, run_checks(adapter))
+    finally:
+        if hasattr(adapter, "close"):  # an adapter without it has been reported as broken
+            adapter.close()
+
+
+@click.command(
+    "check-memory", cls=ExampleCommand, example="infthor-eval check-memory ./my_memory.py:MyMemory"
+)
+@click.argument("memory")
+@click.option(
+    "--memory-args",
+    default="",
+    metavar="K=V,...",
+    help="Options of MEMORY (see `ls memories MEMORY`).",
+)
+def check_memory(memory: str, memory_args: str) -> int:
+    """Check MEMORY, a name or your own FILE.py:CLASS, against the contract of memories.
+
+    The memory observes short trajectories of plain frames and is asked on them. Each clause of the
+    contract has a line of output; docs/memories.md explains them. Exit code 1 if a clause is
+    broken.
+    """
+    from infthor_eval.memory import check, open_memory, parse_options
+
+    options = parse_options(memory_args) or {}
+    results = check.check_memory(open_memory(memory, tuple(sorted(options.items()))))
+    return _print_checks(memory, results)
+
+
+@click.command(
+    "check-parity",
+    cls=ExampleCommand,
+    example="infthor-eval check-parity openvla --reference-url http://HOST:8000",
+)
+@click.argument("model")
+@click.option(
+    "--reference-url",
+    required=True,
+    metavar="URL",
+    help="Server with the reference policy (/act convention).",
+)
+@click.option("--frames", type=PATH, help="Folder of images; default: black, white and noise.")
+@click.option(
+    "--instruction",
+    multiple=True,
+    help="Instruction to the policy; may be repeated. Default: a few.",
+)
+@click.option(
+    "--model-args",
+    default="",
+    metavar="K=V,...",
+    help="Options of MODEL; unnorm_key is sent to the server too.",
+)
+@click.option(
+    "--tolerance",
+    type=FiniteFloat(min=0),
+    default=1e-6,
+    show_default=True,
+    help="Largest difference of equal actions.",
+)
+def check_parity(
+    model: str,
+    reference_url: str,
+    frames: Path | None,
+    instruction: tuple[str, ...],
+    model_args: str,
+    tolerance: float,
+) -> int:
+    """Compare the actions of MODEL (openvla, spatialvla) with a reference server's on equal frames.
+
+    Exit code 1 if one differs.
+    """
+    from infthor_eval.report.terminal import print_table, table_console
+    from model_adapters.policies.parity import (
+        INSTRUCTIONS,
+        compare_policies,
+        frames_in_folder,
+        load_policy,
+        reference_policy,
+        synthetic_frames,
+    )
+
+    options = parse_model_args(model_args)
+    theirs = reference_policy(reference_url, options.get("unnorm_key"))
+    with nullcontext(frames_in_folder(frames)) if frames else synthetic_frames() as images:
+        ours = load_policy(model, options)
+        try:
+            comparison = compare_policies(
+                ours, theirs, images, instruction or INSTRUCTIONS, tolerance
+            )
+        finally:
+            ours.close()
+    print_table(comparison.table(), table_console())
+    return int(not comparison.equal)
+
+
+def _print_checks(name: str, results: Iterable[CheckResult]) -> int:
+    """Print a line a result and one for all; return the exit code, 1 if a clause is broken."""
+    from infthor_eval.terminal import print_line
+
+    n_broken = 0
+    for result in results:
+        verdict = "holds" if result.violation is None else "broken"
+        print_line(f"{verdict:8}{result.name:16}{result.violation or ''}".rstrip())
+        n_broken += result.violation is not None
+    print_line(f"{name}: {f'{n_broken} broken' if n_broken else 'keeps the contract'}")
+    return int(n_broken > 0)
