@@ -65,6 +65,7 @@ lint: $(INSTALLED)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python .ci/style.py
 
 # The documentation as a site, build/site/index.html; a link that leads nowhere ends it.
 docs: $(INSTALLED)

@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from PIL import Image
 
 from infthor_eval.errors import DataError, UsageError, wrap_errors
 from infthor_eval.storage.files import write_atomically
+
+if TYPE_CHECKING:
+    import cv2
 
 __all__ = ["ANIMATION_FORMATS", "require_animation_name", "write_animation"]
 
@@ -130,7 +134,7 @@ def _write_mp4(path: Path, pictures: Iterable[Image.Image], per_second: float) -
     return n_pictures
 
 
-def _open_writer(path: Path, size: tuple[int, int], per_second: float):  # type: ignore[no-untyped-def]  # cv2 untyped
+def _open_writer(path: Path, size: tuple[int, int], per_second: float) -> "cv2.VideoWriter":
     import cv2
 
     for codec in _CODECS:

@@ -18,7 +18,7 @@ class StoredSamples:
     """
 
     def __init__(self, samples: Iterable[UnitSample]) -> None:
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the last reference to this
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed with its owner
         for sample in samples:
             self._file.write(msgspec.json.encode(sample) + b"\n")
 

@@ -4,6 +4,7 @@ import contextlib
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from queue import Empty, SimpleQueue
 from threading import Condition, Lock, Thread
 from typing import Any
@@ -181,10 +182,10 @@ class Pool:
             if isinstance(event, WorkerLost):
                 if stopped:
                     n_left -= 1
-                # first in the queue: its results so far are fresh in the journal, and its group is
-                # half done
                 else:
-                    self._jobs.add(event.job, lambda job=event.job: create(job), first=True)  # type: ignore[misc]
+                    # First in the queue: its results so far are fresh in the journal, and its group
+                    # is half done.
+                    self._jobs.add(event.job, partial(create, event.job), first=True)
             n_left -= isinstance(event, _JobEnded | JobFailed)
             if isinstance(event, Event):
                 yield event
@@ -217,7 +218,7 @@ class Pool:
         try:
             while self._open_worker(number, link) and not self._do_jobs(number, link):
                 pass
-        except Exception as error:  # noqa: BLE001 - raised again in the thread that waits for greetings and events
+        except Exception as error:  # noqa: BLE001 - raised again in the thread that waits
             self._ready.put(error)
             self._events.put(error)
 

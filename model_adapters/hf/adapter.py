@@ -34,7 +34,12 @@ class CheckpointAdapter:
     model_types: ClassVar[tuple[str, ...]]
 
     @classmethod
-    def build(cls, name: str, options: CheckpointOptions, seed: int) -> TransformersModel:  # noqa: ARG003
+    def build(
+        cls,
+        name: str,
+        options: CheckpointOptions,
+        seed: int,  # noqa: ARG003
+    ) -> TransformersModel:
         """Load a checkpoint; the seed is not used.
 
         Raises:

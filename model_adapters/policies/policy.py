@@ -138,7 +138,12 @@ class PolicyAdapter:
         raise NotImplementedError
 
     @classmethod
-    def build(cls, name: str, options: CheckpointPolicyOptions, seed: int) -> VlaPolicy:  # noqa: ARG003
+    def build(
+        cls,
+        name: str,
+        options: CheckpointPolicyOptions,
+        seed: int,  # noqa: ARG003
+    ) -> VlaPolicy:
         """Load a checkpoint; the seed is not used.
 
         Raises:

@@ -27,7 +27,12 @@ class OpenVLAOnVllm:
     Options: ClassVar[type] = OpenVLAOnVllmOptions
 
     @classmethod
-    def build(cls, name: str, options: OpenVLAOnVllmOptions, seed: int) -> "VllmPolicy":  # noqa: ARG003
+    def build(
+        cls,
+        name: str,
+        options: OpenVLAOnVllmOptions,
+        seed: int,  # noqa: ARG003
+    ) -> "VllmPolicy":
         """Start vLLM with a checkpoint; the seed is not used.
 
         Raises:

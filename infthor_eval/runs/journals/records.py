@@ -179,8 +179,9 @@ class RecordTypes(Generic[P_co]):
     def decoder(self) -> msgspec.json.Decoder[Any]:
         """Return the decoder of a journal's lines."""
         header: Any = RunHeader[self.config]  # type: ignore[name-defined]
-        records: Any = UnitRecord[self.unit] | ArtifactRecord[self.artifact]  # type: ignore[name-defined]
-        return msgspec.json.Decoder(header | records)
+        record: Any = UnitRecord[self.unit]  # type: ignore[name-defined]
+        artifact: Any = ArtifactRecord[self.artifact]  # type: ignore[name-defined]
+        return msgspec.json.Decoder(header | record | artifact)
 
     def header_decoder(self) -> msgspec.json.Decoder[RunHeader[Any]]:
         """Return the decoder of a journal's first line."""

@@ -66,7 +66,7 @@ def _work(
                 results.put(record)
                 if stop.is_set():
                     return
-    except BaseException as error:  # noqa: BLE001 - raised again in the thread that waits for the records
+    except BaseException as error:  # noqa: BLE001 - raised again in the thread that waits
         results.put(error)
     else:
         results.put(None)
