@@ -9,10 +9,10 @@ from threading import Lock
 
 import msgspec
 
-import infthor_eval.nieh
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.question import Question
 from infthor_eval.formats.reading import NOT_JSON
+from infthor_eval.nieh import scoring
 from infthor_eval.nieh.contexts import Sample
 from infthor_eval.nieh.guessing.forms import form_of
 from infthor_eval.nieh.guessing.guessers import GUESSERS, Knowledge
@@ -42,9 +42,8 @@ def visible_knowledge(context: str) -> Knowledge:
     return Knowledge.WORDS | Knowledge.NUMBER if context == "clues" else Knowledge.WORDS
 
 
-_LEARNING = (
-    Lock()
-)  # questions that are asked at once need the same guesses: one learns them, the others wait
+# Questions that are asked at once need the same guesses: one learns them, the others wait.
+_LEARNING = Lock()
 
 
 def find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
@@ -73,9 +72,9 @@ def _find_guesses(data: NiehSet, knowledge: Knowledge) -> Mapping[str, Guess]:
 
 
 def _key(data: NiehSet, knowledge: Knowledge) -> str:
-    """Return a hash of all that guesses depend on: the questions, and this code with its
-    library."""
-    code = digest_of_files(sorted(Path(infthor_eval.nieh.__file__).parent.rglob("*.py")))
+    """Return a hash of all that guesses depend on: the questions, guessers, scorers and library."""
+    guessers = sorted(Path(__file__).parent.glob("*.py"))
+    code = digest_of_files([*guessers, Path(scoring.__file__)])
     learner = {"knowledge": knowledge.value, "code": code, "library": version("scikit-learn")}
     return fingerprint(learner | {"questions": list(map(repr, data.questions))})
 
