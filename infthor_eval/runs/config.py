@@ -92,8 +92,8 @@ class RunConfig(
             limit=limit,
             seed=seed,
         )
-        values = msgspec.to_builtins(whole, str_keys=True, enc_hook=_plain_text)
-        return msgspec.convert(values, type(self))
+        written = msgspec.json.encode(whole, enc_hook=_plain_text)
+        return msgspec.json.decode(written, type=type(self))
 
     @property
     def simulators(self) -> list[str]:
