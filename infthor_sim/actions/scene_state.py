@@ -1,19 +1,22 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Setting a scene to a recorded or random state: poses, toggles, states of objects, random
-placement."""
+"""Setting a scene to a recorded or random state: poses, toggles, states, random placement."""
 
+import os
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from infthor_eval.storage.limits import OBJECT_POSES
 from infthor_sim.actions.interaction import set_openness
 from infthor_sim.actions.registry import action, is_vector
-from infthor_sim.errors import ActionError
+from infthor_sim.errors import ActionError, UsageError
 from infthor_sim.geometry import to_array
 from infthor_sim.rearrange import NamedPose, set_poses, spawn_randomly
 from infthor_sim.simulation import Simulation
+
+# Poses that SetObjectPoses takes; real scenes have up to 60. The variable raises the limit.
+_MAX_POSES = 1000
+_MAX_POSES_VARIABLE = "INFTHOR_EVAL_MAX_OBJECT_POSES"
 
 
 @action("SetObjectPoses")
@@ -27,12 +30,25 @@ def set_object_poses(
 ) -> None:
     """Place the listed objects by name; a name listed twice is copied, pickupable objects not
     listed vanish."""
-    if len(objectPoses) > OBJECT_POSES.value:
+    limit = _max_poses()
+    if len(objectPoses) > limit:
         raise ActionError(
             f"objectPoses has {len(objectPoses):,} entries, too many for a scene; "
-            f"{OBJECT_POSES.hint}"
+            f"if this is intended, set {_MAX_POSES_VARIABLE} to more than {limit}"
         )
     set_poses(sim.world, [_named_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
+
+
+def _max_poses() -> int:
+    text = os.environ.get(_MAX_POSES_VARIABLE)
+    if text is None:
+        return _MAX_POSES
+    if not (text.isascii() and text.isdecimal() and len(text) <= 18 and int(text) > 0):
+        raise UsageError(
+            f"{_MAX_POSES_VARIABLE}={text[:40]}: not a whole number above 0; "
+            "set it to one, or unset it"
+        )
+    return int(text)
 
 
 def _named_pose(entry: Any) -> NamedPose:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from infthor_eval.errors import DataError
+from infthor_sim.errors import DataError
 from infthor_sim.actions.registry import action
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.render.camera import FAR, NEAR

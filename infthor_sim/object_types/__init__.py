@@ -4,7 +4,13 @@ To add a type, add a record. A type without a `shape` is drawn as a plain box. A
 function in `render/shapes` with `@draws`, whose name the record gives.
 """
 
-from infthor_sim.object_types.catalogue import OBJECT_TYPES, allowed_in, type_named
+from infthor_sim.object_types.catalogue import (
+    FORMER_NAMES,
+    OBJECT_TYPES,
+    allowed_in,
+    modern_type,
+    type_named,
+)
 from infthor_sim.object_types.record import ObjectType
 
-__all__ = ["OBJECT_TYPES", "ObjectType", "allowed_in", "type_named"]
+__all__ = ["FORMER_NAMES", "OBJECT_TYPES", "ObjectType", "allowed_in", "modern_type", "type_named"]

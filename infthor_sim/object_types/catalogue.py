@@ -3,13 +3,25 @@
 from infthor_sim.object_types import appliances, fixtures, food, furniture, household, kitchenware
 from infthor_sim.object_types.record import ObjectType
 
-__all__ = ["OBJECT_TYPES", "allowed_in", "type_named"]
+__all__ = ["FORMER_NAMES", "OBJECT_TYPES", "allowed_in", "modern_type", "type_named"]
 
 OBJECT_TYPES: dict[str, ObjectType] = {
     declared.name: declared
     for theme in (appliances, fixtures, food, furniture, household, kitchenware)
     for declared in theme.TYPES
 }
+
+FORMER_NAMES = {
+    "Glassbottle": "Bottle",
+    "PaperTowel": "PaperTowelRoll",
+    "ToiletPaperRoll": "ToiletPaper",
+}
+"""Types of AI2-THOR 2.1.0, as in ALFRED, that 5.x calls otherwise; the names in 5.x."""
+
+
+def modern_type(name: str) -> str:
+    """Return the name in AI2-THOR 5.x of a type that 2.1.0 may have called otherwise."""
+    return FORMER_NAMES.get(name, name)
 
 
 def type_named(name: str) -> ObjectType:

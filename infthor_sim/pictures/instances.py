@@ -1,12 +1,12 @@
 """Colours of objects and classes in the segmentation frames; the same name always has the same
 colour."""
 
+import hashlib
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from infthor_eval.storage.digests import digest
 from infthor_sim.render.picture import Picture
 from infthor_sim.world import World
 
@@ -50,5 +50,5 @@ def _paint(picture: Picture, colors: list[tuple[int, int, int]]) -> NDArray[np.u
 
 
 def _color(namespace: str, name: str) -> tuple[int, int, int]:
-    red, green, blue = bytes.fromhex(digest(f"{namespace}:{name}", 3))
+    red, green, blue = hashlib.blake2b(f"{namespace}:{name}".encode(), digest_size=3).digest()
     return red, green, max(blue, 1)  # never black, which is the void

@@ -16,7 +16,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import SimulatorError
+from infthor_sim.errors import SimulatorError
 
 __all__ = ["FieldType", "FifoPipes", "parse_action"]
 

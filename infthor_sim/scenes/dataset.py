@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from infthor_eval.errors import DataError, in_one_line
+from infthor_sim.errors import DataError, in_one_line
 from infthor_sim.geometry import Array
 
 __all__ = ["FloorPlanData"]

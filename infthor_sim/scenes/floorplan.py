@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import DataError
+from infthor_sim.errors import DataError
 from infthor_sim.agent import AGENT_HEIGHT, Agent
 from infthor_sim.geometry import Array
 from infthor_sim.objects import SimObject

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from infthor_eval.errors import SimulatorError
+from infthor_sim.errors import SimulatorError
 from infthor_sim.geometry import level_gaps
 from infthor_sim.scenes.bathroom import furnish_bathroom
 from infthor_sim.scenes.bedroom import furnish_bedroom

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from infthor_eval.errors import DataError
+from infthor_sim.errors import DataError
 from infthor_sim.scenes.catalogue import Catalogue
 from infthor_sim.scenes.supplement import read_supplement
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from infthor_eval.errors import DataError
+from infthor_sim.errors import DataError
 from infthor_sim.scenes.catalogue import Catalogue
 
 from .harness import Bench
