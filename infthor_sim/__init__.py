@@ -18,10 +18,12 @@ It differs from Unity on purpose in these points (docs/simulator.md lists all of
 
 from typing import TYPE_CHECKING, Any
 
+from infthor_sim.launch import player_command
+
 if TYPE_CHECKING:
     from infthor_sim.controller import Controller
 
-__all__ = ["Controller"]
+__all__ = ["Controller", "player_command"]
 
 
 def __getattr__(name: str) -> Any:
