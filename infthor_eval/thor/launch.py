@@ -39,7 +39,7 @@ def embedded_launch(
 
     Args:
         data: folder of recorded floor plans; without it there are only procedural scenes.
-        supplement: file with additions to the floor plans from trajectories (see `thor.supplement`).
+        supplement: file with additions to them from trajectories (see `thor.supplement`).
         start_timeout: time limit of the first message, seconds. The first start of an installation
             compiles the renderer, which takes ten seconds of a processor. Several at once on a busy
             machine take minutes, and one that is stopped in the middle would have to restart from

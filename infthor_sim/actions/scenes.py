@@ -2,9 +2,8 @@
 
 from typing import Any
 
-from infthor_sim.errors import DataError
 from infthor_sim.actions.registry import action
-from infthor_sim.errors import ActionError, ErrorCode
+from infthor_sim.errors import ActionError, DataError, ErrorCode
 from infthor_sim.render.camera import FAR, NEAR
 from infthor_sim.settings import AGENT_MODES, SimulatorSettings
 from infthor_sim.simulation import Simulation

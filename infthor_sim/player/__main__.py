@@ -51,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         return 0  # the controller went away while a reply was under way
     except SimulatorError as error:
-        print(f"infthor_sim: {error}", file=sys.stderr)
+        print(f"infthor_sim.player: {error}", file=sys.stderr)
         return error.exit_code
     return 0
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from infthor_sim.errors import DataError, in_one_line
 from infthor_sim.agent import AGENT_HEIGHT, Agent
+from infthor_sim.errors import DataError, in_one_line
 from infthor_sim.physics.navigation import NavGrid
 from infthor_sim.scenes.dataset import FloorPlanData
 from infthor_sim.scenes.floorplan import build_floor_plan

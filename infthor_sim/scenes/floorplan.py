@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from infthor_sim.errors import DataError
 from infthor_sim.agent import AGENT_HEIGHT, Agent
+from infthor_sim.errors import DataError
 from infthor_sim.geometry import Array
 from infthor_sim.objects import SimObject
 from infthor_sim.physics.navigation import NavGrid

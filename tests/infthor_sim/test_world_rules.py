@@ -4,7 +4,6 @@ import itertools
 
 import pytest
 
-
 from .harness import Bench
 
 
