@@ -22,6 +22,7 @@ _OUTSIDE = {  # where a file lies in the repository: where its page stands in th
     "benchmarks/gpu.md": "benchmarks/gpu.md",
     "examples/sums/README.md": "examples/sums/README.md",
     "examples/thumbnails/README.md": "examples/thumbnails/README.md",
+    "infthor_sim/README.md": "infthor_sim/README.md",
     "results/README.md": "results/README.md",
 }
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)#\s]+)")
