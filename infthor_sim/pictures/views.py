@@ -15,8 +15,8 @@ from infthor_sim.render.picture import (
     Picture,
     Rasterizer,
     cast_picture,
-    choose_rasterizer,
     colour_picture,
+    compiled_rasterizer,
 )
 from infthor_sim.render.scene import SceneModel
 from infthor_sim.settings import SimulatorSettings
@@ -40,7 +40,7 @@ class Display:
     height: int = 300
     antialias: bool = True
     map_view: bool = False
-    rasterizer: Rasterizer = field(default_factory=choose_rasterizer)
+    rasterizer: Rasterizer = field(default_factory=compiled_rasterizer)
 
 
 class Views:

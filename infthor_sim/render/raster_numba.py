@@ -1,9 +1,8 @@
-"""The ray caster compiled by numba: for each primitive, nearest first, the pixels of its box on the
-screen.
+"""The ray caster, compiled by numba: for each primitive the pixels of its box on the screen.
 
-`raster_numpy` computes the same picture to the last bit. So all numbers are float64, sums are in
-the same order (hence some parentheses), and numba's `fastmath`, which would reorder them, stays
-off.
+The nearest primitive comes first. The tests' renderer in numpy computes the same picture to the
+last bit. So all numbers are float64, sums are in the same order (hence some parentheses), and
+numba's `fastmath`, which would reorder them, stays off.
 """
 
 import math

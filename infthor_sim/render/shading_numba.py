@@ -32,19 +32,17 @@ _BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP
 _WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)
 _FABRIC, _STONE, _METAL = int(Material.FABRIC), int(Material.STONE), int(Material.METAL)
 _GLASS, _PAPER, _CARPET = int(Material.GLASS), int(Material.PAPER), int(Material.CARPET)
-# Compiled here and not in `patterns`, which must work without numba.
-_wood, _planks, _tiles = (
-    njit(cache=True, error_model="numpy")(f)
-    for f in (patterns.wood, patterns.planks, patterns.tiles)
-)
-_fabric, _stone, _metal = (
-    njit(cache=True, error_model="numpy")(f)
-    for f in (patterns.fabric, patterns.stone, patterns.metal)
-)
-_glass, _paper, _carpet = (
-    njit(cache=True, error_model="numpy")(f)
-    for f in (patterns.glass, patterns.paper, patterns.carpet)
-)
+# Compiled here: the tests' renderer in numpy calls the plain functions with arrays.
+_compiled = njit(cache=True, error_model="numpy")
+_wood = _compiled(patterns.wood)
+_planks = _compiled(patterns.planks)
+_tiles = _compiled(patterns.tiles)
+_fabric = _compiled(patterns.fabric)
+_stone = _compiled(patterns.stone)
+_metal = _compiled(patterns.metal)
+_glass = _compiled(patterns.glass)
+_paper = _compiled(patterns.paper)
+_carpet = _compiled(patterns.carpet)
 
 
 def shade(

@@ -1,4 +1,9 @@
-"""Smoothing of jagged pixels, compiled by numba."""
+"""Anti-aliasing: which pixels are jagged, and the rays that smooth them; compiled by numba.
+
+Only pixels at a jump of brightness are smoothed. Four rays through such a pixel are tested against
+the primitives that the pixel and its neighbours show, and no others. That misses what no pixel near
+shows, but costs little.
+"""
 
 import math
 from typing import Any
@@ -13,13 +18,20 @@ from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import BOTTOM, COLOR, FORM, TOP
 from infthor_sim.render.raster_numba import hit
 from infthor_sim.render.shading_numba import brightness, eye_of
-from infthor_sim.render.smoothing import JUMP, NEIGHBOURS, SUBPIXELS
 from infthor_sim.render.table import ORIGIN, STEPS, shading_table
 
-__all__ = ["smooth"]
+__all__ = ["JUMP", "NEIGHBOURS", "SUBPIXELS", "smooth"]
 
-_NEIGHBOURS = np.array(NEIGHBOURS)
-_SUBPIXELS = np.array(SUBPIXELS)
+JUMP = 48  # of brightness between neighbours, as the sum of three channels (of 765)
+# A rotated grid: no two rays share a row or column, so that nearly level and nearly upright edges
+# get all four steps.
+SUBPIXELS = np.array([(-0.125, -0.375), (0.375, -0.125), (-0.375, 0.125), (0.125, 0.375)])
+"""Points of a pixel that the rays go through, from its middle, as shares of its width and
+height."""
+NEIGHBOURS = np.array(
+    [(0, 0), (0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)]
+)
+"""The pixel and its neighbours, as offsets of row and column."""
 
 
 def smooth(
@@ -78,9 +90,9 @@ def _candidates(
     """Write the primitives that a pixel and its neighbours show to `orders`, and where to `at`;
     return how many."""
     count = 0
-    for j in range(len(_NEIGHBOURS)):
-        yy = y + _NEIGHBOURS[j, 0]
-        xx = x + _NEIGHBOURS[j, 1]
+    for j in range(len(NEIGHBOURS)):
+        yy = y + NEIGHBOURS[j, 0]
+        xx = x + NEIGHBOURS[j, 1]
         if (
             yy < 0
             or xx < 0
@@ -118,7 +130,7 @@ def _smooth(
 ) -> None:
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
     # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
-    parts = len(_SUBPIXELS)
+    parts = len(SUBPIXELS)
     shown = np.full(
         len(jagged) * parts, -1, dtype=np.int32
     )  # the primitive that each ray hits; -1 for none
@@ -127,13 +139,13 @@ def _smooth(
     depths = np.empty(len(shown))
     crease = np.empty(len(shown))
     levels = np.empty(len(shown))
-    orders = np.empty(len(_NEIGHBOURS), dtype=np.int32)
-    at = np.empty((len(_NEIGHBOURS), 2), dtype=np.int64)
+    orders = np.empty(len(NEIGHBOURS), dtype=np.int32)
+    at = np.empty((len(NEIGHBOURS), 2), dtype=np.int64)
     for place in range(len(jagged)):
         y, x = jagged[place, 0], jagged[place, 1]
         count = _candidates(nearest, y, x, orders, at)
         for part in range(parts):
-            u, v = us[x] + _SUBPIXELS[part, 0] * pixel, vs[y] + _SUBPIXELS[part, 1] * pixel
+            u, v = us[x] + SUBPIXELS[part, 0] * pixel, vs[y] + SUBPIXELS[part, 1] * pixel
             best = math.inf
             chosen = -1
             for k in range(count):

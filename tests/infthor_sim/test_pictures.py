@@ -12,13 +12,15 @@ from infthor_sim.player.fifo import FieldType
 from infthor_sim.render.camera import PinholeCamera, project
 from infthor_sim.render.hand import HAND
 from infthor_sim.render.lighting import Lights
-from infthor_sim.render.picture import cast_picture, choose_rasterizer, colour_picture
+from infthor_sim.render.picture import cast_picture, colour_picture, compiled_rasterizer
 from infthor_sim.render.primitives import Form, Material, ShapePart, rows
 from infthor_sim.render.shapes import shape
 
 from .harness import Bench
+from .numpy_renderer import NUMPY
 
-RASTERIZERS = pytest.mark.parametrize("name", ["numba", "numpy"])
+COMPILED = compiled_rasterizer()
+RASTERIZERS = pytest.mark.parametrize("rasterizer", [COMPILED, NUMPY], ids=["numba", "numpy"])
 STRAIGHT = np.eye(3)
 
 
@@ -36,8 +38,8 @@ def one(form: Form, distance: float, half: float = 0.5, **more: float) -> np.nda
     ("form", "depth"),
     [(Form.BOX, 2.5), (Form.ELLIPSOID, 2.5), (Form.CYLINDER, 2.5), (Form.CUP, 2.5)],
 )
-def test_depth_is_that_of_geometry(name, form, depth):
-    picture = cast_picture(one(form, 3.0), ("a",), camera(), choose_rasterizer(name))
+def test_depth_is_that_of_geometry(rasterizer, form, depth):
+    picture = cast_picture(one(form, 3.0), ("a",), camera(), rasterizer)
     assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
     assert picture.instances[50, 50] == 0
     assert picture.instances[0, 0] == -1
@@ -48,11 +50,11 @@ def test_depth_is_that_of_geometry(name, form, depth):
 
 
 @RASTERIZERS
-def test_a_cup_shows_its_inside_from_above(name):
+def test_a_cup_shows_its_inside_from_above(rasterizer):
     above = PinholeCamera(np.array([0.0, 2.0, 0.0]), euler_matrix((90, 0, 0)), 60.0, 101, 101)
     for form, depth in ((Form.CYLINDER, 1.5), (Form.CUP, 2.5), (Form.BOWL, 2.5)):
         drawn = rows([ShapePart(form, (0, 0, 0), (0.5,) * 3, (1, 1, 1))], np.zeros(3), STRAIGHT, 0)
-        picture = cast_picture(drawn, ("a",), above, choose_rasterizer(name))
+        picture = cast_picture(drawn, ("a",), above, rasterizer)
         assert picture.depth[50, 50] == pytest.approx(depth, abs=1e-3)
 
 
@@ -70,8 +72,7 @@ def test_both_renderers_draw_the_same_picture():
     prims, names = np.concatenate(parts), tuple(map(str, range(120)))
     lights = Lights(np.array([[0.3, 1.0, 1.0, 0.9]]), 0.7)
     pictures = []
-    for name in ("numba", "numpy"):
-        rasterizer = choose_rasterizer(name)
+    for rasterizer in (COMPILED, NUMPY):
         picture = cast_picture(prims, names, camera(120), rasterizer)
         pictures.append(
             (picture.depth, picture.instances, colour_picture(picture, lights, rasterizer))
@@ -82,12 +83,7 @@ def test_both_renderers_draw_the_same_picture():
 
 def test_near_plane_and_things_behind_are_cut():
     assert not len(project(one(Form.BOX, -3.0), camera()).index)
-    assert (
-        cast_picture(
-            one(Form.BOX, 0.0, 0.05), ("a",), camera(), choose_rasterizer("numba")
-        ).instances.max()
-        == -1
-    )
+    assert cast_picture(one(Form.BOX, 0.0, 0.05), ("a",), camera(), COMPILED).instances.max() == -1
 
 
 FLAT = {
@@ -167,8 +163,7 @@ def test_smoothing_changes_colours_only():
 
 
 @RASTERIZERS
-def test_a_smooth_edge_is_between_what_it_divides(name):
-    rasterizer = choose_rasterizer(name)
+def test_a_smooth_edge_is_between_what_it_divides(rasterizer):
     tilted = [
         ShapePart(
             Form.BOX, (0, 0, 0), (0.5, 0.5, 0.1), (0.9, 0.1, 0.1), matrix=euler_matrix((0, 0, 20))

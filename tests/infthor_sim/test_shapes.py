@@ -17,16 +17,17 @@ from infthor_sim.physics.receptacles import surfaces
 from infthor_sim.physics.solids import as_open
 from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.lighting import Lights
-from infthor_sim.render.picture import cast_picture, choose_rasterizer, colour_picture
+from infthor_sim.render.picture import cast_picture, colour_picture
 from infthor_sim.render.primitives import Form, ShapePart, rows
 from infthor_sim.render.shapes import shape
+
+from .numpy_renderer import NUMPY
 
 _OUT = 0.02  # metres that handles and the like may stand out
 _STYLES = 12
 # What lies in a bowl rests on its sides; a pan's box has its handle, so that its middle is not the
 # pan's.
 _UNEVEN = {"Bowl", "Pan"}
-_RASTERIZER = choose_rasterizer("numpy")
 
 
 def states(item: SimObject) -> Iterator[SimObjectState]:
@@ -99,9 +100,9 @@ def looks(item: SimObject, pitch: float, yaw: float) -> tuple[Array, Array]:
     away = 3.0 * float(np.linalg.norm(item.box_size))
     camera = PinholeCamera(item.center - view[:, 2] * away, view, 30.0, 60, 60)
     seen = cast_picture(
-        rows(shape(item), item.position, item.matrix, 0), (item.object_id,), camera, _RASTERIZER
+        rows(shape(item), item.position, item.matrix, 0), (item.object_id,), camera, NUMPY
     )
-    return colour_picture(seen, Lights.none(), _RASTERIZER, antialias=False).astype(
+    return colour_picture(seen, Lights.none(), NUMPY, antialias=False).astype(
         float
     ), seen.instances == 0
 

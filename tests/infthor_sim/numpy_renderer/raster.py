@@ -1,8 +1,4 @@
-"""The ray caster in numpy, for machines without numba; draws the same picture as `raster_numba`,
-bit for bit.
-
-Every formula has the order of operations of its counterpart there, which has the comments.
-"""
+"""The ray caster of `raster_numba`, which has the comments, in numpy."""
 
 import numpy as np
 from numpy.typing import NDArray

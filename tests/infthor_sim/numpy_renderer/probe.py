@@ -1,4 +1,4 @@
-"""Checking whether an object is visible, in numpy; gives the same answer as `probe_numba`."""
+"""Whether an object is visible, in numpy; the same answer as `probe_numba`."""
 
 from dataclasses import replace
 
@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
-from infthor_sim.render.raster_numpy import cast, hit
+
+from .raster import cast, hit
 
 __all__ = ["is_visible"]
 

@@ -1,21 +1,11 @@
-"""Light and shadow at creases and outlines, from depth alone, so that neighbours of one colour can
-be told apart.
-
-The inverse of depth is linear in the picture wherever a surface is flat. How far a pixel's differs
-from the mean of its neighbours' therefore shows creases and outlines, and not slopes.
-"""
+"""Light and shadow at creases and outlines, in numpy."""
 
 import numpy as np
 
 from infthor_sim.geometry import Array
+from infthor_sim.render.creases_numba import DARKEST, LIGHTEST, ROWS, STRENGTH
 
-__all__ = ["DARKEST", "LIGHTEST", "ROWS", "STRENGTH", "crease_factors"]
-
-STRENGTH = 7.0
-DARKEST = 0.68
-LIGHTEST = 1.1
-# of the picture for each pixel to the neighbours: shadows are as wide in pictures of any size
-ROWS = 150
+__all__ = ["crease_factors"]
 
 
 def crease_factors(depth: Array) -> Array:
