@@ -13,9 +13,8 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from infthor_sim.actions import bind
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import euler_matrix
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
 from infthor_sim.pictures.views import Display
 from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.lighting import Lights

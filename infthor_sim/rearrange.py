@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import Array, object_id
 from infthor_sim.object_types import ObjectType, allowed_in, modern_type, type_named
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import find_parent
 from infthor_sim.world import World

@@ -10,8 +10,7 @@ import numpy as np
 from infthor_sim.actions.registry import action
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array
-from infthor_sim.pictures.appearance import Finish
-from infthor_sim.render.finishes import RANDOM_PATTERNS
+from infthor_sim.pictures.appearance import RANDOM_PATTERNS, Finish
 from infthor_sim.render.shell import SHELL_NAMES
 from infthor_sim.simulation import Simulation
 

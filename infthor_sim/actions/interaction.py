@@ -11,7 +11,7 @@ from infthor_sim.object_types import allowed_in
 from infthor_sim.objects import SimObject
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import drawer_offset
-from infthor_sim.physics.unfolding import unfold
+from infthor_sim.physics.solids import unfold
 from infthor_sim.simulation import Simulation
 
 # Overlaps of boxes that `forceAction` tolerates in a full receptacle of a recording, smallest

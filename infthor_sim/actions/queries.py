@@ -1,5 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Questions about the scene: what is at a pixel, outlines from above, the way to an object."""
+"""Questions about the scene (at a pixel, outlines, ways), and which objects replies list."""
 
 from typing import Any
 
@@ -126,3 +126,15 @@ def get_map_view_camera_properties(sim: Simulation) -> dict[str, Any]:
         "orthographic": True,
         "orthographicSize": camera.orthographic_size,
     }
+
+
+@action("SetObjectFilter")
+def set_object_filter(sim: Simulation, objectIds: list[str]) -> None:
+    """Leave all objects but these out of the metadata; the world stays as it is."""
+    sim.object_filter = frozenset(objectIds)
+
+
+@action("ResetObjectFilter")
+def reset_object_filter(sim: Simulation) -> None:
+    """List all objects again."""
+    sim.object_filter = None

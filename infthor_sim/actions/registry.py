@@ -9,8 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Concatenate, TypeGuard
 
-from infthor_sim.actions.signatures import type_name, unknown_arguments_text
-from infthor_sim.actions.vectors import Vector3
+from infthor_sim.actions.signatures import Vector3, type_name, unknown_arguments_text
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.settings import AGENT_MODES
 from infthor_sim.simulation import Simulation

@@ -1,5 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Setting a scene to a recorded or random state: poses, toggles, states, random placement."""
+"""Setting a scene to a recorded, random or saved state: poses, toggles, states, placement."""
 
 import os
 from collections.abc import Mapping
@@ -205,3 +205,19 @@ def set_random_seed(sim: Simulation, seed: int) -> None:
 
 def _random_from_seed(seed: int) -> np.random.Generator:
     return np.random.default_rng(int(seed) % 2**32)  # Unity's seeds are signed, numpy's are not
+
+
+@action("SaveState", query=True)
+def save_state(sim: Simulation, slot: int = 0) -> None:
+    """Keep the present state in a slot, in place of an earlier one.
+
+    Unity cannot: generation undoes failed subtasks with it, without a replay.
+    """
+    sim.save(slot)
+
+
+@action("RestoreState")
+def restore_state(sim: Simulation, slot: int = 0) -> None:
+    """Bring back the state kept in a slot; it stays kept."""
+    if not sim.restore(slot):
+        raise ActionError("There is no saved state of this scene")

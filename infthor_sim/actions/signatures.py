@@ -1,5 +1,4 @@
-"""The words of messages about wrong arguments: parameters by the names and types that Unity
-prints."""
+"""Types of arguments, and the words in which Unity's messages about wrong ones print them."""
 
 import inspect
 import types
@@ -7,9 +6,13 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from infthor_sim.actions.vectors import Vector3
+__all__ = ["Vector3", "type_name", "unknown_arguments_text"]
 
-__all__ = ["type_name", "unknown_arguments_text"]
+
+class Vector3(dict[str, float]):
+    """Annotates arguments that are a position (metres) or rotation (degrees): `{"x", "y", "z"}`,
+    any of them absent."""
+
 
 _SCALARS = {int: "int", float: "float", str: "String", bool: "Boolean", Vector3: "Vector3"}
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from infthor_sim.arm.arm import Arm
 from infthor_sim.arm.holding import touched_objects
-from infthor_sim.arm.rotations import axis_angle
-from infthor_sim.geometry import Array, round_xyz
+from infthor_sim.geometry import Array, axis_angle, round_xyz
 from infthor_sim.world import World
 
 __all__ = ["arm_metadata"]

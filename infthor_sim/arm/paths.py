@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from infthor_sim.arm.rotations import axis_angle, rotation
-from infthor_sim.geometry import Array
+from infthor_sim.geometry import Array, axis_angle, axis_rotation
 
 __all__ = ["STEP", "path_distances", "rotation_steps", "shares"]
 
@@ -37,4 +36,4 @@ def rotation_steps(turn: Array, step: float) -> list[Array]:
     apart."""
     axis, angle = axis_angle(turn)
     # `turn` itself ends the list, as the last part of the way differs from it by rounding.
-    return [*(rotation(axis, angle * share) for share in shares(angle, step)[:-1]), turn]
+    return [*(axis_rotation(axis, angle * share) for share in shares(angle, step)[:-1]), turn]

@@ -5,7 +5,7 @@ import numpy as np
 
 from infthor_sim.geometry import Array
 from infthor_sim.objects import SimObject
-from infthor_sim.render.finishes import apply_finishes
+from infthor_sim.pictures.appearance import apply_finishes
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import COLUMNS, rows
 from infthor_sim.render.shapes import shape

@@ -5,8 +5,7 @@ chairs, small things."""
 import numpy as np
 
 from infthor_sim.objects import SimObject
-from infthor_sim.scenes.basins import name_after, rim_pieces
-from infthor_sim.scenes.roomplan import RoomPlan
+from infthor_sim.scenes.roomplan import RoomPlan, name_after, rim_pieces
 
 __all__ = ["furnish_kitchen"]
 

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from infthor_sim.agent import AGENT_HEIGHT, Agent
-from infthor_sim.default_objects import style_of
 from infthor_sim.errors import DataError
 from infthor_sim.geometry import Array, level_gaps, to_array
 from infthor_sim.object_types import type_named
-from infthor_sim.objects import SimObject, SimObjectState
+from infthor_sim.objects import SimObject, SimObjectState, style_of
 from infthor_sim.physics.footprints import Rect, polygon_rects
 from infthor_sim.physics.navigation import CELL, NavGrid
 from infthor_sim.rearrange import assign_parents

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from infthor_sim.default_objects import style_of
 from infthor_sim.errors import DataError
 from infthor_sim.geometry import Array, to_array, wrap_degrees, yaw_matrix
 from infthor_sim.object_types import ObjectType, type_named
-from infthor_sim.objects import SimObject, SimObjectState
+from infthor_sim.objects import SimObject, SimObjectState, style_of
 
 __all__ = ["recorded_object"]
 

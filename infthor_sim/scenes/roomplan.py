@@ -5,16 +5,16 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from infthor_sim.agent import AGENT_HEIGHT, Agent
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import Array, aabb_overlap, level_gaps
 from infthor_sim.object_types import allowed_in, type_named
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
+from infthor_sim.physics.footprints import Rect, subtract
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.navigation import CELL, NavGrid
 from infthor_sim.physics.solids import opening_space
 from infthor_sim.world import RoomShell, World
 
-__all__ = ["RoomPlan", "build_world"]
+__all__ = ["RoomPlan", "build_world", "name_after", "rim_pieces"]
 
 _BODY = 0.23  # the agent's radius and a margin, metres
 # heights in metres between which an object takes floor from the agent
@@ -273,3 +273,20 @@ def _scatter(world: World, plan: RoomPlan) -> None:
                 world.add(placed)
                 world.attach(placed, home)
                 break
+
+
+def name_after(outer: SimObject, basin: SimObject) -> None:
+    """Give a basin the id and name that AI2-THOR derives from those of its sink or tub."""
+    basin.object_id = f"{outer.object_id}|{basin.object_type}"
+    basin.name = f"{basin.object_type}_{outer.name.split('_')[1]}"
+
+
+def rim_pieces(outer: SimObject, inner: SimObject) -> tuple[Rect, ...]:
+    """Return the outline of `outer` from above without that of `inner`; both have the same yaw."""
+    middle = outer.matrix.T @ (inner.center - outer.center)
+    whole = outer.box_size / 2
+    hole = inner.box_size / 2
+    return subtract(
+        (-float(whole[0]), -float(whole[2]), float(whole[0]), float(whole[2])),
+        [(middle[0] - hole[0], middle[2] - hole[2], middle[0] + hole[0], middle[2] + hole[2])],
+    )

@@ -9,10 +9,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import Array
 from infthor_sim.object_types import type_named
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
 from infthor_sim.physics.navigation import NavGrid
 
 __all__ = ["use_trajectory_ids"]

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.object_types import OBJECT_TYPES, allowed_in
+from infthor_sim.objects import default_object
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.solids import Wall, opening_space, part_boxes
 from infthor_sim.scenes.catalogue import Catalogue

@@ -4,7 +4,6 @@ else."""
 import numpy as np
 import pytest
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.object_types import (
     FORMER_NAMES,
     OBJECT_TYPES,
@@ -13,6 +12,7 @@ from infthor_sim.object_types import (
     modern_type,
     type_named,
 )
+from infthor_sim.objects import default_object
 from infthor_sim.pictures.instances import instance_color
 from infthor_sim.player.fifo import FieldType
 from infthor_sim.render.shapes.catalogue import SHAPES, shape

@@ -4,9 +4,9 @@ object."""
 import numpy as np
 import pytest
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import euler_matrix
 from infthor_sim.object_types import OBJECT_TYPES, type_named
+from infthor_sim.objects import default_object
 from infthor_sim.pictures.instances import class_color, instance_color
 from infthor_sim.player.fifo import FieldType
 from infthor_sim.render.camera import PinholeCamera, project

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import to_xyz
+from infthor_sim.objects import default_object
 from infthor_sim.physics.receptacles import surfaces
 
 from .harness import Bench

@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import Array, euler_matrix
 from infthor_sim.object_types import OBJECT_TYPES
-from infthor_sim.objects import DRAWER_SLIDE, SimObject, SimObjectState
+from infthor_sim.objects import DRAWER_SLIDE, SimObject, SimObjectState, default_object
 from infthor_sim.physics.receptacles import surfaces
 from infthor_sim.physics.solids import as_open
 from infthor_sim.render.camera import PinholeCamera

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import aabb_overlap
 from infthor_sim.object_types import OBJECT_TYPES, allowed_in
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import surfaces
 from infthor_sim.physics.solids import as_open

@@ -4,7 +4,7 @@ hand."""
 import numpy as np
 import pytest
 
-from infthor_sim.default_objects import default_object
+from infthor_sim.objects import default_object
 from infthor_sim.physics.clearance import occupant
 from infthor_sim.render.primitives import CENTER, HALF, rows
 from infthor_sim.render.shapes import shape

@@ -2,8 +2,8 @@
 
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, BRASS, CHROME, DARK, STEEL, WHITE, pick
-from infthor_sim.render.shapes.register import draws
 
 _SCREEN: Color = (0.35, 0.6, 0.9)
 _ICONS: tuple[Color, ...] = (

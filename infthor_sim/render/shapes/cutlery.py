@@ -4,8 +4,8 @@ import math
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CHROME, DARK, STEEL
-from infthor_sim.render.shapes.register import draws
 
 _BRIGHT: Color = (0.9, 0.92, 0.95)
 _GRIP: Color = (0.15, 0.13, 0.12)

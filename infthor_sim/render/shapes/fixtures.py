@@ -2,6 +2,7 @@
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import (
     BLACK,
     BRASS,
@@ -14,7 +15,6 @@ from infthor_sim.render.shapes.palette import (
     WOODS,
     pick,
 )
-from infthor_sim.render.shapes.register import draws
 from infthor_sim.render.shapes.tables import cut_slab
 from infthor_sim.render.shell import FLOORS
 from infthor_sim.world import FLOOR_STYLES

@@ -2,7 +2,7 @@
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
-from infthor_sim.render.shapes.register import draws
+from infthor_sim.render.shapes.catalogue import draws
 
 __all__ = ["APPLES", "CRUST", "LETTUCE", "POTATO", "TOMATO"]
 

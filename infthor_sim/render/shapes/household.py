@@ -2,6 +2,7 @@
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import (
     BLACK,
     BRASS,
@@ -15,7 +16,6 @@ from infthor_sim.render.shapes.palette import (
     WOODS,
     pick,
 )
-from infthor_sim.render.shapes.register import draws
 
 _COVERS: tuple[Color, ...] = (
     (0.6, 0.18, 0.15),

@@ -2,6 +2,7 @@
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, Vector, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import (
     BLACK,
     CERAMICS,
@@ -13,7 +14,6 @@ from infthor_sim.render.shapes.palette import (
     WOODS,
     pick,
 )
-from infthor_sim.render.shapes.register import draws
 
 _LIQUIDS: dict[str, Color] = {
     "water": (0.5, 0.72, 0.88),

@@ -3,8 +3,8 @@
 from infthor_sim.object_types import OBJECT_TYPES
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.food import APPLES, CRUST, LETTUCE, POTATO, TOMATO, loaf
-from infthor_sim.render.shapes.register import draws
 
 # Number of slices, by the type of slice.
 _COUNTS = {whole.slice_type: whole.slices for whole in OBJECT_TYPES.values() if whole.slices}

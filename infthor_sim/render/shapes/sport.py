@@ -4,8 +4,8 @@ import math
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, CHROME, DARK, pick
-from infthor_sim.render.shapes.register import draws
 
 _STRING: Color = (0.3, 0.3, 0.32)
 

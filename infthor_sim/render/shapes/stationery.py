@@ -4,8 +4,8 @@ import math
 
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, BRASS, CHROME, STEEL, WHITE, pick
-from infthor_sim.render.shapes.register import draws
 
 
 @draws

@@ -3,8 +3,8 @@
 from infthor_sim.objects import DOOR_SWING, DRAWER_SLIDE, WALL
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, WHITE, WOODS, pick
-from infthor_sim.render.shapes.register import draws
 
 _LEAF = 0.02  # thickness of a door, metres
 _FRIDGE_GRIP = (

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from infthor_sim.physics.footprints import Rect
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CHROME, CLOTHS, DARK, WOODS, pick
-from infthor_sim.render.shapes.register import draws
 
 __all__ = ["cut_slab"]
 

@@ -5,10 +5,9 @@ Every formula has the order of operations of its counterpart in `infthor_sim.ren
 
 from infthor_sim.render.picture import Rasterizer
 
-from .creases import crease_factors
 from .probe import is_visible
 from .raster import cast
-from .shading import shade
+from .shading import crease_factors, shade
 from .smoothing import smooth
 
 __all__ = ["NUMPY"]
