@@ -35,7 +35,7 @@ _CORNERS = np.array(  # of a box, in the order of AI2-THOR's `cornerPoints`
 def euler_matrix(rotation: Sequence[float] | Array) -> Array:
     """Return the rotation matrix (3, 3) of Unity's Euler angles (x, y, z) in degrees: first z, then
     x, then y."""
-    x, y, z = (math.radians(float(a)) for a in rotation)
+    x, y, z = map(math.radians, rotation)
     cx = math.cos(x)
     sx = math.sin(x)
     cy = math.cos(y)
@@ -119,9 +119,8 @@ def convex_hull(points: Array) -> list[Array]:
     """Return the corners of the convex hull of points (n, 2), in order around it; none lies between
     two others."""
     # Andrew's monotone chain. Rounding merges corners of upright boxes, which coincide from above.
-    ordered = [
-        np.array(p) for p in sorted({(float(p[0]), float(p[1])) for p in np.round(points, 6)})
-    ]
+    distinct = {(x, z) for x, z in np.round(points, 6).tolist()}
+    ordered = [np.array(point) for point in sorted(distinct)]
     return _half_hull(ordered)[:-1] + _half_hull(ordered[::-1])[:-1]
 
 

@@ -155,7 +155,7 @@ def _set_pose(world: World, item: SimObject, pose: SimObject) -> None:
 def _surface_points(surface: Surface) -> Array:
     """Return a grid of points (n, 3) on a surface."""
     spans = [np.arange(-half + _SPACING / 2, half, _SPACING) for half in surface.half]
-    across, along = (axis.ravel() for axis in np.meshgrid(*spans, indexing="ij"))
-    flat = np.stack([across, np.zeros(len(across)), along], axis=1)
+    across, along = np.meshgrid(*spans, indexing="ij")
+    flat = np.stack([across.ravel(), np.zeros(across.size), along.ravel()], axis=1)
     points: Array = flat @ yaw_matrix(surface.yaw).T + surface.center
     return points

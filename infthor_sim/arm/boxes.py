@@ -58,11 +58,12 @@ class Boxes:
 
 
 def join(parts: Sequence[Boxes], axis: int = 0) -> Boxes:
-    """Return all boxes of some collections, in order; with `axis` 1, join their groups one by
-    one."""
-    return Boxes(
-        *(np.concatenate([getattr(p, f.name) for p in parts], axis=axis) for f in fields(Boxes))
-    )
+    """Return all boxes of collections, in order; with `axis` 1, join their groups one by one."""
+    columns = []
+    for field in fields(Boxes):
+        values = [getattr(part, field.name) for part in parts]
+        columns.append(np.concatenate(values, axis=axis))
+    return Boxes(*columns)
 
 
 def separations(first: Boxes, second: Boxes) -> Array:

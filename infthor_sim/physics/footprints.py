@@ -39,9 +39,9 @@ def polygon_rects(points: Sequence[tuple[float, float]]) -> tuple[Rect, ...]:
     zs = np.unique(np.round(outline[:, 1], 4))
     mid_x = (xs[1:] + xs[:-1]) / 2
     mid_z = (zs[1:] + zs[:-1]) / 2
-    solid = np.array(
-        [[_contains(outline, x, z) for z in mid_z] for x in mid_x], dtype=bool
-    ).reshape(len(mid_x), len(mid_z))
+    solid = np.zeros((len(mid_x), len(mid_z)), dtype=bool)
+    for i, x in enumerate(mid_x):
+        solid[i] = [_contains(outline, x, z) for z in mid_z]
     return tuple(_cover(solid, xs, zs))
 
 

@@ -81,7 +81,7 @@ def _standing_area(receptacle: SimObject) -> tuple[Array, tuple[float, float]]:
 
     Its height is that of the box's middle.
     """
-    half_x, _, half_z = (float(side) / 2 for side in receptacle.box_size)
+    half_x, _, half_z = (receptacle.box_size / 2).tolist()
     x0, z0, x1, z1 = receptacle.type.area or _body(receptacle)
     offset = np.array([(x0 + x1) / 2 * half_x, 0.0, (z0 + z1) / 2 * half_z])
     return receptacle.center + receptacle.matrix @ offset, (
@@ -93,10 +93,11 @@ def _standing_area(receptacle: SimObject) -> tuple[Array, tuple[float, float]]:
 def _body(receptacle: SimObject) -> Rect:
     """Return the part of a box that neither a handle nor the flaps of an open carton take up, as
     shares of its half."""
-    width, _, depth = (float(side) for side in receptacle.box_size)
+    width, _, depth = receptacle.box_size.tolist()
     if receptacle.type.handled:
         return (-1.0, -1.0, min(1.0, 2 * depth / width - 1), min(1.0, 2 * width / depth - 1))
-    x, z = (_closed_share(receptacle, axis) for axis in (0, 2))
+    x = _closed_share(receptacle, axis=0)
+    z = _closed_share(receptacle, axis=2)
     return (-x, -z, x, z)
 
 

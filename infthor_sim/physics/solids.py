@@ -105,7 +105,7 @@ def outline(item: SimObject) -> Array:
 def opening_space(item: SimObject) -> Box | None:
     """Return the box in front of an object that its door or drawer needs to open; None for one
     without."""
-    width, height, depth = (float(v) for v in item.front_size)
+    width, height, depth = item.front_size.tolist()
     if not (item.type.hinged or item.type.slides):
         return None
     reach = width if item.type.hinged else DRAWER_SLIDE * depth

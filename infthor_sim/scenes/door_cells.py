@@ -65,7 +65,7 @@ def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
 def _clear(world: World, places: Array) -> NDArray[np.bool_]:
     """Return at which places (n, 2) the agent's capsule touches neither an object nor the room's
     walls."""
-    low, high = (corner[[0, 2]] for corner in world.scene_bounds())
+    low, high = np.array(world.scene_bounds())[:, [0, 2]]
     floor = world.standing_height - AGENT_HEIGHT
     clear = np.minimum(places - low, high - places).min(axis=1, initial=np.inf) >= _RADIUS
     for item in world.objects.values():

@@ -51,8 +51,7 @@ def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
 
 
 def _extents(box: Mapping[str, float]) -> tuple[float, float, float]:
-    x, y, z = (max(float(box[axis]), 0.002) for axis in "xyz")
-    return x, y, z
+    return max(float(box["x"]), 0.002), max(float(box["y"]), 0.002), max(float(box["z"]), 0.002)
 
 
 def build_house(
@@ -74,12 +73,10 @@ def build_house(
 
 
 def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> World:
-    outlines = [[(float(p["x"]), float(p["z"])) for p in r["floorPolygon"]] for r in house["rooms"]]
-    types = [str(r.get("roomType", "")) for r in house["rooms"]]
-    floors = [
-        (room_type, polygon_rects(outline))
-        for room_type, outline in zip(types, outlines, strict=True)
-    ]
+    floors = []
+    for room in house["rooms"]:
+        outline = [(float(point["x"]), float(point["z"])) for point in room["floorPolygon"]]
+        floors.append((str(room.get("roomType", "")), polygon_rects(outline)))
     ids = [str(r.get("id", f"room|{index}")) for index, r in enumerate(house["rooms"])]
     doors = list(_door_spans(house))
     walls = tuple(_walls(house, doors))
@@ -175,11 +172,11 @@ def _window(entry: Mapping[str, Any], house: Mapping[str, Any]) -> SimObject:
 
 
 def _base(polygon: Sequence[Mapping[str, float]]) -> Span:
-    """Return the two lower corners of a wall, in the order of its polygon: places along a wall
-    count from the first."""
-    lower = sorted(polygon, key=lambda p: float(p["y"]))[:2]
-    first, second = [p for p in polygon if any(p is q for q in lower)]
-    return float(first["x"]), float(first["z"]), float(second["x"]), float(second["z"])
+    """Return a wall's lower corners in the order of its polygon; distances count from the first."""
+    by_height = sorted(range(len(polygon)), key=lambda index: float(polygon[index]["y"]))
+    first, second = sorted(by_height[:2])
+    start, end = polygon[first], polygon[second]
+    return float(start["x"]), float(start["z"]), float(end["x"]), float(end["z"])
 
 
 def _door_spans(house: Mapping[str, Any]) -> Iterator[tuple[str, float, float]]:

@@ -52,7 +52,8 @@ def test_a_scene_survives_being_written_and_read(folder):
             assert after[name][key] == item[key], (name, key)
         for axis in "xyz":
             for part in ("center", "size"):
-                old, new = (o["axisAlignedBoundingBox"][part][axis] for o in (item, after[name]))
+                old = item["axisAlignedBoundingBox"][part][axis]
+                new = after[name]["axisAlignedBoundingBox"][part][axis]
                 assert new == pytest.approx(old, abs=2e-3), (name, part)
     lying = [n for n, o in before.items() if o["parentReceptacles"] and o["pickupable"]]
     same = [n for n in lying if after[n]["parentReceptacles"] == before[n]["parentReceptacles"]]
@@ -124,9 +125,8 @@ def test_poses_rearrange_the_loose_objects(folder):
     mug = bench.object(bench.first("Mug"))
     table = bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"]
     top = table["center"]["y"] + table["size"]["y"] / 2
-    here, there = (
-        {"x": table["center"]["x"], "y": top, "z": table["center"]["z"] + d} for d in (0.1, -0.25)
-    )
+    here = {**table["center"], "y": top, "z": table["center"]["z"] + 0.1}
+    there = {**here, "z": table["center"]["z"] - 0.25}
     bench.ok(
         "SetObjectPoses",
         objectPoses=[

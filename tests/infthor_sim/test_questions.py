@@ -114,7 +114,7 @@ def test_interactable_poses_can_be_narrowed(bench):
     place = {key: every[0][key] for key in "xyz"}
     here = bench.ok("GetInteractablePoses", objectId=fridge, positions=[place])["actionReturn"]
     assert here
-    assert all({key: p[key] for key in "xyz"} == place for p in here)
+    assert all(place.items() <= pose.items() for pose in here)
     inside = next(
         o.object_id for o in bench.sim.world.objects.values() if bench.sim.world.is_hidden(o)
     )

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from infthor_sim.objects import SimObject
 from infthor_sim.render.primitives import Color, ShapePart
 from infthor_sim.render.shapes.builder import Builder, shade_of
@@ -45,5 +47,5 @@ def box(b: Builder) -> None:
 
 
 def _dirty_color(color: Color) -> Color:
-    r, g, b = (c * (1 - _DIRT_SHARE) + d * _DIRT_SHARE for c, d in zip(color, _DIRT, strict=True))
-    return (r, g, b)
+    red, green, blue = np.array(color) * (1 - _DIRT_SHARE) + np.array(_DIRT) * _DIRT_SHARE
+    return float(red), float(green), float(blue)

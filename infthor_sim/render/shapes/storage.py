@@ -40,7 +40,7 @@ def _door(
     front.
     """
     side = b.item.hinge or -1
-    width, height, depth = (float(v) for v in b.half)
+    width, height, depth = map(float, b.half)
     middle = (low + high) / 2 * height
     half = (high - low) / 2 * height
     angle = side * DOOR_SWING * b.state.openness
@@ -150,7 +150,7 @@ def _door_racks(b: Builder) -> None:
     """The white inner side of the open doors, with racks."""
     side = b.item.hinge or -1
     angle = side * DOOR_SWING * b.state.openness
-    width, height, _ = (float(v) for v in b.half)
+    width, height, _ = map(float, b.half)
     hinge = (side, 0.0, 1.0)
     inward = -_LEAF - _FRIDGE_GRIP
     for low, high in ((-0.93, 0.26), (0.37, 0.96)):

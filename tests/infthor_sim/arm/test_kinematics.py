@@ -44,7 +44,8 @@ def test_the_elbow_turns_about_the_line_from_shoulder_to_wrist(direction, share,
     target = SHOULDER + direction / np.linalg.norm(direction) * share * REACH
     (_, before), (_, after) = solved(target, elbow), solved(target, elbow + turn)
     line = (target - SHOULDER) / np.linalg.norm(target - SHOULDER)
-    first, second = (j[2] - SHOULDER - line * (line @ (j[2] - SHOULDER)) for j in (before, after))
+    first = before[2] - SHOULDER - line * (line @ (before[2] - SHOULDER))
+    second = after[2] - SHOULDER - line * (line @ (after[2] - SHOULDER))
     cosine = first @ second / np.linalg.norm(first) / np.linalg.norm(second)
     assert cosine == pytest.approx(np.cos(np.radians(turn)), abs=1e-6)
 
