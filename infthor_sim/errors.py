@@ -45,8 +45,7 @@ class UsageError(SimulatorError):
 
 
 class DataError(SimulatorError):
-    """A file is missing or not of the documented form, or a scene is unknown; the message names
-    it."""
+    """A file is missing or malformed, or a scene is unknown; the message names it."""
 
     exit_code = 2
 
@@ -80,8 +79,7 @@ class ErrorCode(StrEnum):
 
 
 class ActionError(Exception):
-    """An action that the world refuses: its reply has `lastActionSuccess` false, and message and
-    code."""
+    """A refused action: its reply has `lastActionSuccess` false, this message and code."""
 
     def __init__(self, message: str, code: ErrorCode = ErrorCode.NONE) -> None:
         super().__init__(message)

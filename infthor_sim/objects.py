@@ -25,8 +25,7 @@ WALL = 0.02  # thickness in metres of the sides and floors of hollow things
 
 @dataclass
 class SimObjectState:
-    """What actions change about an object, besides its pose; the names follow AI2-THOR's
-    metadata."""
+    """What actions change about an object but its pose; names are as in AI2-THOR's metadata."""
 
     openness: float = 0.0
     toggled: bool = False
@@ -132,8 +131,7 @@ class SimObject:
 
     @property
     def floors(self) -> tuple[float, ...]:
-        """Heights in metres above the underside of its box at which contents stand inside it,
-        lowest first.
+        """Heights above its box's underside at which contents stand in it, metres, lowest first.
 
         Placement and drawing both take them from here. Empty if nothing stands inside.
         """
@@ -145,8 +143,7 @@ class SimObject:
         return ()
 
     def place_bottom(self, point: Array) -> None:
-        """Move the object so that the middle of the underside of its box is at `point` (world,
-        metres)."""
+        """Move the object: the middle of its box's underside to `point` (world, metres)."""
         low, high = self.bounds()
         middle = (low + high) / 2
         self.position = self.position + np.array(
@@ -154,8 +151,7 @@ class SimObject:
         )
 
     def duplicate(self, object_id: str) -> "SimObject":
-        """Return a copy of this object with a state of its own, another id, and neither parent nor
-        contents."""
+        """Return a copy with its own state, another id, and neither parent nor contents."""
         return replace(
             self,
             object_id=object_id,

@@ -34,8 +34,7 @@ class NamedPose:
 
 
 def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
-    """Give the named objects new poses, and new ids made of the poses; loose objects that are not
-    named vanish.
+    """Give the named objects new poses, and ids by them; loose objects that are not named vanish.
 
     A name that the scene does not have means any object of its type: the part of a name after the
     type differs between versions of AI2-THOR.
@@ -65,8 +64,7 @@ def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = Fa
 
 
 def _lower_supports(world: World) -> None:
-    """Lower surfaces that the placed objects would be sunk in: their poses are more exact than
-    recorded boxes."""
+    """Lower surfaces that placed objects would sink into: poses are exacter than boxes."""
     for item in world.objects.values():
         if not _has_surface(item.type):
             continue
@@ -115,8 +113,7 @@ class _Templates:
         self._count: dict[str, int] = defaultdict(int)
 
     def choose(self, name: str) -> SimObject | None:
-        """Return the object that a name means; the same for the same name, and in turn for
-        different ones."""
+        """Return the object that a name means: always the same; for other names, others in turn."""
         if name in self._named:
             return self._named[name]
         if name not in self._chosen:

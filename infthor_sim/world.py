@@ -251,8 +251,7 @@ class World:
         self.mark_changed(item)
 
     def move_hand(self, hand: Grip) -> None:
-        """Move the hand to a pose in the camera's frame; what it holds moves and turns as it
-        does."""
+        """Move the hand to a pose in the camera's frame, with what it holds."""
         assert self.held is not None
         item = self.objects[self.held]
         camera = self.agent.camera_matrix()
@@ -285,8 +284,7 @@ class World:
         self.mark_changed(item)
 
     def keep_templates(self) -> None:
-        """Keep copies of the loose objects, for SetObjectPoses with names of objects that were
-        removed meanwhile."""
+        """Keep copies of loose objects, for SetObjectPoses after they are removed."""
         self.templates = {}
         for item in self.objects.values():
             if item.type.pickupable:

@@ -80,8 +80,7 @@ def randomize_lighting(
     hue: list[float] | None = None,
     saturation: list[float] | None = None,
 ) -> None:
-    """Draw the brightness of the daylight and its colour from ranges; there is one light, so none
-    to synchronize."""
+    """Draw brightness and colour of the daylight; there is one light, so none to synchronize."""
     if not randomizeColor and (hue is not None or saturation is not None):
         raise ActionError(
             "Cannot pass in randomizeColor=False while also providing hue or saturation."
@@ -140,8 +139,7 @@ def _material_sets(
 
 
 def _split(scene: str) -> str:
-    """Return AI2-THOR's split of a scene: of 30 rooms of a type, 20 to train, 5 to validate, 5 to
-    test."""
+    """Return AI2-THOR's split of a scene: of 30 rooms of a type 20 train, 5 val, 5 test."""
     ithor = _ITHOR.fullmatch(scene)
     if ithor is None:
         return (

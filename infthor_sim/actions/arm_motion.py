@@ -1,5 +1,4 @@
-"""Moving the arm, or the agent with its arm, along a path; what stops it is reported in Unity's
-words."""
+"""Moving the arm, or the agent with its arm, along a path; what stops it, in Unity's words."""
 
 import math
 
@@ -18,8 +17,7 @@ Contact = tuple[int, str]  # index of a stance in a path, and id or name of what
 
 
 def agent_arm(sim: Simulation) -> Arm:
-    """Return the agent's arm; the actions that call this are only registered for modes that have
-    one."""
+    """Return the agent's arm; actions that call this are registered only for modes with one."""
     assert sim.world.arm is not None
     return sim.world.arm
 

@@ -1,6 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Walking and turning of the arm agents: in small steps, with their arm, until something is in the
-way."""
+"""Walking and turning of the arm agents, in small steps, until something is in the way."""
 
 from functools import partial
 
@@ -60,8 +59,7 @@ def move_agent(
 
 
 def _body_contact(world: World, places: list[Array]) -> Contact | None:
-    """Return the first of some places at which the agent cannot be, and what is there; None if all
-    are free."""
+    """Return the first position at which the agent cannot be, and what is there; None: all free."""
     # After a forced teleport the agent may be where it cannot stand. It may leave then: places
     # count as blocked only once it has been at a free one, and the last place in any case.
     was_free = world.nav.can_stand(world.agent.position[0], world.agent.position[2])

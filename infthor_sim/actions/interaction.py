@@ -75,8 +75,7 @@ def put(
 def _find_place(
     sim: Simulation, held: SimObject, target: SimObject, force: bool
 ) -> SimObject | None:
-    """Return the held object at the best free place; a forced put squeezes in where it is
-    crowded."""
+    """Return the held object at the best free place; a forced put squeezes in where it is full."""
     # Best first: without overlap, clear of fixed things, in view. Recorded boxes of fixed things
     # are too large, so a place within one is better than none; Unity, which has the meshes, would
     # find room there.

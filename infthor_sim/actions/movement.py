@@ -34,8 +34,7 @@ def _move(
     returnToStart: bool = True,
     disableRendering: bool = True,
 ) -> None:
-    """Walk, keeping within `maxAgentsDistance` metres of the object `objectId` if both are
-    given."""
+    """Walk, within `maxAgentsDistance` metres of the object `objectId` if both are passed."""
     size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
     if size <= 0:
         raise ActionError("moveMagnitude must be > 0")

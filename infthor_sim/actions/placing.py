@@ -1,6 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Putting objects anywhere, disabling and enabling them, and the points of a receptacle's
-surfaces."""
+"""Putting objects anywhere, disabling and enabling them, and points of receptacles' surfaces."""
 
 import numpy as np
 
@@ -80,8 +79,7 @@ def place_object_at_point(
 def get_spawn_coordinates(
     sim: Simulation, objectId: str, anywhere: bool = True
 ) -> list[dict[str, float]]:
-    """Return points on a receptacle's surfaces, all of them or those that the agent sees within its
-    reach."""
+    """Return points on a receptacle's surfaces: all, or those seen within the agent's reach."""
     receptacle = sim.world.get(objectId)
     if not receptacle.type.receptacle:
         raise ActionError(f"{objectId} is not a receptacle")
@@ -117,8 +115,7 @@ def enable_object(sim: Simulation, objectId: str) -> None:
 def _first_free(
     world: World, item: SimObject, positions: list[Vector3], turn: Array, force: bool
 ) -> SimObject:
-    """Return a copy of an object at the first of some positions with room; at the very first if
-    forced.
+    """Return a copy of an object at the first of some positions with room; if forced, at the first.
 
     Raises:
         ActionError: there is room at none.

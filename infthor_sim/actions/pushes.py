@@ -1,5 +1,4 @@
-"""Pushing and pulling loose things: each slides until friction stops it, something is in its way,
-or it falls."""
+"""Pushing and pulling: loose things slide until friction or something stops them, or they fall."""
 
 from functools import partial
 

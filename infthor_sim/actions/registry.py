@@ -167,8 +167,7 @@ def _is_structured(annotation: Any) -> bool:
 
 
 def _matches(value: Any, annotation: Any) -> bool:
-    """Return whether a JSON value is of a parameter's type; stricter than Unity: "1" is no number,
-    1 no boolean."""
+    """Return whether a JSON value fits a parameter's type; "1" is no number, 1 no boolean."""
     origin = typing.get_origin(annotation)
     inner = typing.get_args(annotation)
     if annotation is Any or annotation is types.NoneType:
@@ -194,6 +193,5 @@ def is_vector(value: Any) -> TypeGuard[dict[str, float]]:
 
 
 def _is_number(value: Any) -> bool:
-    """Return whether a value is a finite number of usable size; JSON as Python reads it has NaN and
-    infinities."""
+    """Return whether a value is a finite number of usable size; Python's JSON has NaN, too."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST

@@ -28,8 +28,7 @@ def set_object_poses(
     forceRigidbodySleep: bool = True,
     skipMoveable: bool = False,
 ) -> None:
-    """Place the listed objects by name; a name listed twice is copied, pickupable objects not
-    listed vanish."""
+    """Place the listed objects by name, copies of those listed twice; other loose ones vanish."""
     limit = _max_poses()
     if len(objectPoses) > limit:
         raise ActionError(
@@ -119,8 +118,7 @@ _ALL_AT_ONCE = {  # by `StateChange` of SetStateOfAllObjects
 
 @action("SetStateOfAllObjects")
 def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
-    """Make every capable object dirty, filled or used up with `forceAction`; clean, empty or unused
-    without it."""
+    """Make every capable object dirty, filled or used up; without `forceAction` undo that."""
     change = _ALL_AT_ONCE.get(StateChange)
     if change is None:
         raise ActionError(

@@ -42,8 +42,7 @@ def initialize(
     agentCount: int = 1,
     massThreshold: float | None = None,
 ) -> dict[str, float]:
-    """Set up the agent; arguments that only Unity knows are ignored, as Unity ignores unknown ones
-    here."""
+    """Set up the agent; arguments that only Unity knows are ignored, as Unity does here."""
     # The client does not look at the reply to Reset, but raises on the reply to Initialize that it
     # sends next.
     if sim.failed_reset:

@@ -10,8 +10,7 @@ __all__ = ["Vector3", "type_name", "unknown_arguments_text"]
 
 
 class Vector3(dict[str, float]):
-    """Annotates arguments that are a position (metres) or rotation (degrees): `{"x", "y", "z"}`,
-    any of them absent."""
+    """A position (metres) or rotation (degrees): `{"x", "y", "z"}`, any of them absent."""
 
 
 _SCALARS = {int: "int", float: "float", str: "String", bool: "Boolean", Vector3: "Vector3"}
@@ -31,8 +30,7 @@ def type_name(annotation: Any) -> str:
 def unknown_arguments_text(
     name: str, unknown: Sequence[str], parameters: Mapping[str, inspect.Parameter], given: Any
 ) -> str:
-    """Return Unity's message about arguments that an action does not take, with those that it
-    does."""
+    """Return Unity's message about unknown arguments, with those that the action takes."""
     plural = "s" if len(unknown) > 1 else ""
     expected = ", ".join(_parameter_text(parameter) for parameter in parameters.values())
     return (

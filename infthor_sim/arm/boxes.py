@@ -67,8 +67,7 @@ def join(parts: Sequence[Boxes], axis: int = 0) -> Boxes:
 
 
 def separations(first: Boxes, second: Boxes) -> Array:
-    """Return gaps (n, m) in metres between n boxes and m others, without groups; negative: depth of
-    the overlap.
+    """Return gaps (n, m) in metres between n boxes and m others, without groups.
 
     A gap is measured along the best separating direction. It is at most the true distance, and
     negative exactly where the boxes overlap. Pairs that are far apart have infinity.
@@ -85,8 +84,7 @@ def separations(first: Boxes, second: Boxes) -> Array:
 
 
 def _pair_gaps(a: Boxes, b: Boxes) -> Array:
-    """Return gaps (k,) between the boxes of two collections, pair by pair, by the separating axis
-    theorem."""
+    """Return gaps (k,) between boxes, pair by pair, by the separating axis theorem."""
     # Two boxes are apart exactly if they are along one of 15 directions: the 3 + 3 axes of the
     # boxes, and the cross products of each pair of them. `cosines` holds the dot products of the
     # axes, from which all projections follow.

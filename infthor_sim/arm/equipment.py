@@ -18,8 +18,7 @@ _EYES = {
 
 
 def equip(world: World, agent_mode: str) -> None:
-    """Give a world's agent the camera of an agent mode and its arm, at rest; what the agent held
-    falls."""
+    """Give an agent the camera and the resting arm of an agent mode; what it held falls."""
     if world.arm is not None:
         drop_all(world, world.arm)
     rig: Rig | None = _RIGS[agent_mode]() if agent_mode in _RIGS else None

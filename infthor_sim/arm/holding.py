@@ -16,8 +16,7 @@ __all__ = ["TouchedObjects", "drop_all", "pick_up", "touched_objects"]
 
 
 class TouchedObjects(NamedTuple):
-    """Objects that the hand's sphere touches and the arm does not hold, in the order of the
-    metadata.
+    """Objects that the hand's sphere touches and the arm does not hold, in the metadata's order.
 
     Attributes:
         pickupable: objects that can be picked up.

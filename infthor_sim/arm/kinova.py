@@ -1,5 +1,4 @@
-"""ManipulaTHOR's arm: a base that moves up and down, three links of equal length, and a wrist that
-turns freely.
+"""ManipulaTHOR's arm: a base that moves up and down, three equal links, a wrist that turns freely.
 
 From Unity: the reach (0.6335 m from the shoulder, 0.6325 m where restricted), the heights of the
 base, the resting pose and the order of joints. The length of a link follows: Unity's solver uses
@@ -44,8 +43,7 @@ _UPRIGHT = (
 
 
 def inverse(targets: Array, elbows: Array) -> Array:
-    """Return rotations (n, 2, 3, 3) of shoulder and elbow that bring the wrist to targets, or as
-    near as it gets.
+    """Return rotations (n, 2, 3, 3) of shoulder and elbow that bring the wrist nearest to targets.
 
     Args:
         targets: targets in the frame of the base, metres (n, 3).
@@ -76,8 +74,7 @@ def inverse(targets: Array, elbows: Array) -> Array:
 
 
 def forward(turns: Array) -> Array:
-    """Return positions (n, 4, 3) of base, shoulder, elbow and wrist for rotations (n, 2, 3, 3) of
-    the middle two."""
+    """Return positions (n, 4, 3) of base, shoulder, elbow and wrist by (n, 2, 3, 3) rotations."""
     elbows = SHOULDER + LINK * turns[:, 0, :, 2]
     shoulders = np.broadcast_to(SHOULDER, elbows.shape)
     return np.stack(
@@ -86,8 +83,7 @@ def forward(turns: Array) -> Array:
 
 
 def _look_rotations(ahead: Array, aside: Array) -> Array:
-    """Return rotations (n, 3, 3) with z `ahead` and x `aside`: unit vectors at right angles to each
-    other."""
+    """Return rotations (n, 3, 3) with z `ahead` and x `aside`, perpendicular unit vectors."""
     return np.stack([aside, cross(ahead, aside), ahead], axis=2)
 
 
@@ -122,8 +118,7 @@ class Kinova:
         return pose.base
 
     def reach(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
-        """Return poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as
-        it gets."""
+        """Return poses (n) with the wrist nearest to targets (n, 3) in the frame of the base."""
         wrists = forward(inverse(targets, np.array([p.elbow for p in poses])))[:, 3]
         return [replace(pose, wrist=wrist) for pose, wrist in zip(poses, wrists, strict=True)]
 

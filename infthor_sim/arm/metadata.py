@@ -15,8 +15,7 @@ _DIGITS = 6
 
 
 def arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
-    """Return the arm as AI2-THOR reports it; positions in metres, rotations as axis and angle (`w`,
-    degrees)."""
+    """Return the arm as AI2-THOR reports it: metres; rotations as axis and `w`, degrees."""
     near = touched_objects(world, arm)
     return {
         "joints": _joints(world, arm),

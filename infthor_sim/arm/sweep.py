@@ -49,8 +49,7 @@ def take_stance(world: World, arm: Arm, to: Stance) -> None:
 def first_contact(
     world: World, arm: Arm, path: list[Stance], around: ArmObstacles
 ) -> tuple[int, str] | None:
-    """Return the index of the first stance in which the arm or what it holds is in something, and
-    that thing's name.
+    """Return the index of the first stance in which arm or load is in something, and its name.
 
     What the arm touches already is in the way only where the same part of the arm gets deeper into
     it. A part that is stuck in an object, as after a teleport, may leave it any way: there only the
@@ -80,8 +79,7 @@ def first_contact(
 
 
 def is_free(world: World, arm: Arm, there: Stance, around: ArmObstacles) -> bool:
-    """Return whether the arm and what it holds are in nothing in a stance, wherever they are
-    now."""
+    """Return whether arm and held objects are in nothing in a stance, wherever they are now."""
     gaps = separations(moving_boxes(world, arm, [there]).flat(), around.boxes)
     return bool((gaps >= -_SKIN).all())
 

@@ -34,6 +34,5 @@ def type_named(name: str) -> ObjectType:
 
 
 def allowed_in(item: str, receptacle: str) -> bool:
-    """Return whether AI2-THOR lets an object of type `item` be put into or onto a receptacle of
-    type `receptacle`."""
+    """Return whether AI2-THOR lets an object of one type be put into or onto another."""
     return type_named(receptacle).accepts(type_named(item))

@@ -53,8 +53,7 @@ def _support(world: World, item: SimObject) -> SimObject | None:
 def _pushed(
     world: World, item: SimObject, step: Array, pushed: dict[str, SimObject]
 ) -> dict[str, SimObject] | None:
-    """Return an object and the loose things that it would take along, by id; None if something
-    stops one of them."""
+    """Return an object and the loose things it takes along, by id; None if one is stopped."""
     support = _support(world, item)
     if support is not None and world.is_hidden(item) and not is_over(support, item.center + step):
         return None  # the wall of something closed

@@ -67,8 +67,7 @@ class Wall:
 
 
 def part_boxes(item: SimObject, hollow: bool = False) -> list[Box]:
-    """Return the boxes around an object's drawn parts; with `hollow`, without the walls of
-    vessels."""
+    """Return the boxes around an object's drawn parts; `hollow`: without walls of vessels."""
     return [_box(item, part) for part in shape(item) if not (hollow and part.form in _VESSELS)]
 
 
@@ -84,8 +83,7 @@ def vessel_walls(item: SimObject) -> list[Wall]:
 
 
 def outline(item: SimObject) -> Array:
-    """Return points around an object's drawn parts seen from above, metres from the middle of its
-    box (m, 2)."""
+    """Return points around the drawn parts from above, metres from the box's middle (m, 2)."""
     middle = item.center
     corners = []
     for part in shape(item):
@@ -103,8 +101,7 @@ def outline(item: SimObject) -> Array:
 
 
 def opening_space(item: SimObject) -> Box | None:
-    """Return the box in front of an object that its door or drawer needs to open; None for one
-    without."""
+    """Return the box in front of an object that its door or drawer opens into, or None."""
     width, height, depth = item.front_size.tolist()
     if not (item.type.hinged or item.type.slides):
         return None

@@ -43,8 +43,7 @@ class Appearance:
 
 
 def apply_finishes(prims: Array, names: Sequence[str], look: Appearance) -> Array:
-    """Return the primitives (n, COLUMNS) with the looks of `look`; `names` are those of the
-    instances."""
+    """Return primitives (n, COLUMNS) with the looks of `look`; `names` are the instances'."""
     # Brightness does not count: it changes the lights and not a surface.
     if not look.finishes and np.all(look.light == 1.0):
         return prims

@@ -1,5 +1,4 @@
-"""Colours of objects and classes in the segmentation frames; the same name always has the same
-colour."""
+"""Colours of objects and classes in segmentation frames; a name always has the same colour."""
 
 import hashlib
 from functools import lru_cache
@@ -26,8 +25,7 @@ def class_color(name: str) -> tuple[int, int, int]:
 
 
 def instance_image(picture: Picture) -> NDArray[np.uint8]:
-    """Return the instance frame (h, w, 4) RGBA, bottom row first; walls have the colour of their
-    class."""
+    """Return the instance frame (h, w, 4) RGBA, bottom row first; walls in their class's colour."""
     colors = [instance_color(name) if "|" in name else class_color(name) for name in picture.names]
     return _paint(picture, colors)
 

@@ -126,8 +126,7 @@ class FifoPipes:
                 return pipe
 
     def _open_in(self) -> int | None:
-        """Open the pipe of actions and wait until the controller writes to it; return None if it
-        dies before."""
+        """Open the pipe of actions once the controller writes to it; None if it dies before."""
         pipe = os.open(self._client_path, os.O_RDONLY | os.O_NONBLOCK)
         poll = select.poll()
         poll.register(pipe, select.POLLIN)
@@ -159,8 +158,7 @@ class FifoPipes:
 
 
 def _widen(pipe: int) -> None:
-    """Give a pipe room for a whole reply, so that its writer goes on while the reader still
-    reads."""
+    """Give a pipe room for a whole reply, so that its writer goes on while the reader reads."""
     try:
         fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _ROOM)
     except PermissionError:

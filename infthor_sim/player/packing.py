@@ -1,5 +1,4 @@
-"""Metadata as msgpack, fast: the fields of an object that do not depend on the agent are packed
-once per state.
+"""Metadata as msgpack, fast: fields that do not depend on the agent are packed once per state.
 
 Packing 70 objects of 45 fields for each reply takes longer than drawing the frame. So the packed
 bytes of those fields are kept, and the few other fields are appended to the same map.

@@ -1,5 +1,4 @@
-"""The held object in the agent's own frame: whole, low and small, in a gripper that comes from the
-frame's lower edge.
+"""The held object in the agent's frame: whole, low, small, in a gripper from the lower edge.
 
 Only the picture is arranged so. In the world, for the metadata and for collisions, the object is
 somewhere else. The gripper is none of AI2-THOR's, but without it the object would seem to lie on
@@ -57,8 +56,7 @@ _RUBBER: Color = (0.95, 0.55, 0.1)
 
 
 def _outlines() -> Array:
-    """Return points on the surface of each form of primitive, scaled by its half extents (forms,
-    points, 3)."""
+    """Return surface points of each form, scaled by its half extents (forms, points, 3)."""
     angles = np.arange(8) * np.pi / 4
     ring = np.stack([np.cos(angles), np.zeros(8), np.sin(angles)], axis=1)
     up = np.array([0.0, 1.0, 0.0])
@@ -80,8 +78,7 @@ _OUTLINES = _outlines()
 
 
 def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) -> Array:
-    """Return the primitives of `item` and its contents, moved to where the picture shows them, and
-    of the gripper.
+    """Return the primitives of `item` and contents as the picture shows them, and of the gripper.
 
     Args:
         rows: the primitives in the world (n, COLUMNS).
@@ -122,8 +119,7 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
 
 
 def _gripper(left: float, right: float) -> list[ShapePart]:
-    """Return a bar at the lower edge of the picture and two jaws beside what is held, in shares of
-    its half height."""
+    """Return a bar at the lower edge and two jaws beside what is held, in half heights."""
     middle = (left + right) / 2
     half = min(max((right - left) / 2, _NARROWEST), _WIDEST)
     parts = [
@@ -144,8 +140,7 @@ def _gripper(left: float, right: float) -> list[ShapePart]:
 
 
 def _in_picture(rows: Array, away: float, scale: float, camera: PinholeCamera) -> Array:
-    """Return primitives in shares of the picture's half height as in the world, `away` metres from
-    the camera."""
+    """Return primitives in shares of the picture's half height, `away` metres from the camera."""
     at = camera.position + camera.matrix @ np.array([0.0, 0.0, away])
     rows[:, CENTER : CENTER + 3] = at + scale * rows[:, CENTER : CENTER + 3] @ camera.matrix.T
     rows[:, HALF : HALF + 3] *= scale

@@ -18,8 +18,7 @@ _HERE = Path(__file__).parent
 
 
 def drop_stale_kernels(folder: Path = _HERE) -> bool:
-    """Remove kernels that were compiled from other sources than those in `folder`; return whether
-    there were any."""
+    """Remove kernels compiled from other sources than those in `folder`; return if any were."""
     content = b"".join((folder / name).read_bytes() for name in _SOURCES)
     sources = hashlib.blake2b(content, digest_size=16).hexdigest()
     cache = folder / "__pycache__"

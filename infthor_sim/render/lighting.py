@@ -1,5 +1,4 @@
-"""The lights of a picture: one sun, the sky's ambient light, a weak light at the camera, and
-lamps."""
+"""The lights of a picture: a sun, the sky's ambient light, one at the camera, and lamps."""
 
 from dataclasses import dataclass
 

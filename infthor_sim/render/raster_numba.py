@@ -27,8 +27,7 @@ _BOWL = int(Form.BOWL)
 def cast(
     prims: Array, projection: Projection, camera: PinholeCamera
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`,
-    or -1 (h, w)."""
+    """Return depth (h, w), metres, and each pixel's nearest primitive in `projection`, or -1."""
     us, vs = camera.rays()
     depth = np.empty((len(vs), len(us)))
     nearest = np.empty((len(vs), len(us)), dtype=np.int32)
@@ -154,8 +153,7 @@ def hit(
     dz: float,
     clip: float,
 ) -> float:
-    """Return the depth at which a ray from o along d meets a primitive, in its scaled frame;
-    infinity for a miss."""
+    """Return the depth at which a ray from o along d meets a primitive (scaled frame), or inf."""
     if form == _BOX:
         return _hit_box(ox, oy, oz, dx, dy, dz)
     if form == _ELLIPSOID:

@@ -1,5 +1,4 @@
-"""A world as primitives: the rooms' shell, and every object's shape, cached until the object
-changes."""
+"""A world as primitives: the rooms' shell and objects' shapes, cached until the object changes."""
 
 import numpy as np
 
@@ -30,8 +29,7 @@ class SceneModel:
         self._held: Array = np.zeros((0, COLUMNS))
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
-        """Return the primitives of everything but the held object (n, COLUMNS), those of it, and
-        names of instances."""
+        """Return all primitives but the held object's (n, COLUMNS), its own, instances' names."""
         if self._version != self._world.version:
             self._rebuild()
         return self._all, self._held, self._names

@@ -54,8 +54,7 @@ def shade(
     factors: Array,
     lights: Lights,
 ) -> NDArray[np.uint8]:
-    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times
-    its factor."""
+    """Return RGB (h, w, 3), bottom row first, of cast pixels, each brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     table = shading_table(prims, projection, lights)
@@ -115,8 +114,7 @@ def _lamp_light(
     t: float,
     eye: Any,
 ) -> float:
-    """Return the light of the lamps at depth t on the ray (u, v), on a surface of unit normal (nx,
-    ny, nz).
+    """Return the lamps' light at depth t on the ray (u, v), on a surface of unit normal n.
 
     The normal is given along the axes of primitive `k`; the lamps are the table's rows from `first`
     on.
@@ -162,8 +160,7 @@ def brightness(
     depths: Array,
     levels: Array,
 ) -> None:
-    """Write to `levels` the brightness of primitives where rays hit them; lamps are the table's
-    rows from `first` on.
+    """Write the brightness of primitives where rays hit them to `levels`; lamps: from `first` on.
 
     Args:
         orders: the primitives (n,); -1 for none, whose level stays as it is.

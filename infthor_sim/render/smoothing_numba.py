@@ -87,8 +87,7 @@ def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
 def _candidates(
     nearest: NDArray[np.int32], y: int, x: int, orders: NDArray[np.int32], at: NDArray[np.int64]
 ) -> int:
-    """Write the primitives that a pixel and its neighbours show to `orders`, and where to `at`;
-    return how many."""
+    """Write what a pixel and its neighbours show to `orders`, where to `at`; return how many."""
     count = 0
     for j in range(len(NEIGHBOURS)):
         yy = y + NEIGHBOURS[j, 0]

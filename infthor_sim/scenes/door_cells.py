@@ -20,8 +20,7 @@ _KNEE = 0.1  # metres above the floor below which nothing stops the agent
 
 
 def add_door_cells(world: World) -> None:
-    """Add the cells beside the grid that only a door or drawer, closed now, would block if it were
-    open.
+    """Add the cells beside the grid that only a door or drawer, closed now, could block.
 
     ALFRED's layouts have no such cells, but AI2-THOR lets its agent stand there while the door is
     closed. An open door blocks them as it blocks others, see `obstacles`.
@@ -42,8 +41,7 @@ def _fringe(nav: NavGrid) -> Iterator[tuple[float, float]]:
 
 
 def _in_reach_of_a_door(world: World, places: Array) -> NDArray[np.bool_]:
-    """Return at which places (n, 2) the agent would touch a door or drawer on its way to wide
-    open."""
+    """Return at which points (n, 2) the agent would touch a door or drawer that opens wide."""
     reached = np.zeros(len(places), dtype=bool)
     for item in world.objects.values():
         if item.state.openness == 0 and (item.type.hinged or item.type.slides):
@@ -53,8 +51,7 @@ def _in_reach_of_a_door(world: World, places: Array) -> NDArray[np.bool_]:
 
 
 def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
-    """Yield the boxes (low and high corner) around an object's door or drawer on its way to wide
-    open."""
+    """Yield the corners of boxes around an object's door or drawer as it opens wide."""
     opened = item.duplicate(item.object_id)
     for opened.state.openness in _OPENNESS:
         leaf = door_leaf(opened)
@@ -63,8 +60,7 @@ def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
 
 
 def _clear(world: World, places: Array) -> NDArray[np.bool_]:
-    """Return at which places (n, 2) the agent's capsule touches neither an object nor the room's
-    walls."""
+    """Return at which points (n, 2) the agent's capsule touches neither object nor wall."""
     low, high = np.array(world.scene_bounds())[:, [0, 2]]
     floor = world.standing_height - AGENT_HEIGHT
     clear = np.minimum(places - low, high - places).min(axis=1, initial=np.inf) >= _RADIUS

@@ -86,8 +86,7 @@ def build_floor_plan(
 
 
 def _assign_recorded_parents(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
-    """Attach loose objects to the receptacles that the recording names: the innermost, which is the
-    smallest."""
+    """Attach loose objects to the innermost receptacle that the recording names, the smallest."""
     for entry in entries:
         item = world.objects.get(str(entry["objectId"]))
         if item is None or not item.type.pickupable:

@@ -1,6 +1,5 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""Procedural kitchens: a counter with sink, stove and appliances along one wall, a table with
-chairs, small things."""
+"""Procedural kitchens: a counter with sink, stove and appliances, a table with chairs."""
 
 import numpy as np
 

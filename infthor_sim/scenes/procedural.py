@@ -37,8 +37,7 @@ SCENE_TYPES = (*_FURNISH, "house")
 
 
 def build_scene(scene_type: str, seed: int) -> World:
-    """Return the world of `<scene_type>-<seed>`: the first draw of furniture that leaves every room
-    accessible.
+    """Return the world of `<scene_type>-<seed>`: the first draw with every room accessible.
 
     Raises:
         SimulatorError: no draw does.
@@ -62,8 +61,7 @@ def build_scene(scene_type: str, seed: int) -> World:
 
 
 def _is_accessible(world: World, plan: RoomPlan) -> bool:
-    """Return whether the agent gets to most of a room's free floor, and near all its
-    receptacles."""
+    """Return whether the agent gets to most free floor of a room and near all receptacles."""
     free = plan.free_cells()
     reached = [cell for cell in free if world.nav.can_stand(*cell)]
     if len(reached) < _REACHABLE_SHARE * len(free):
@@ -101,8 +99,7 @@ def _furnish(plan: RoomPlan, room_type: str) -> None:
 def _house_plans(
     random: np.random.Generator, seed: int
 ) -> tuple[list[RoomPlan], list[tuple[float, float]]]:
-    """Return the plans of four rooms, two by two with doorways between them, and the cells in the
-    doorways."""
+    """Return the plans of four rooms, two by two, and the cells in the doorways between them."""
     west = round(random.uniform(4.6, 5.2), 2)
     east = round(random.uniform(4.6, 5.2), 2)
     south = round(random.uniform(4.6, 5.2), 2)

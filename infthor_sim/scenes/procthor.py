@@ -32,8 +32,7 @@ Span = tuple[float, float, float, float]
 
 
 def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
-    """Return the bounding boxes (width, height, depth) of ProcTHOR's assets by id; empty if the
-    folder has none.
+    """Return the sizes (width, height, depth) of ProcTHOR's assets by id; empty without the file.
 
     Raises:
         DataError: the file is there but not readable.
@@ -180,8 +179,7 @@ def _base(polygon: Sequence[Mapping[str, float]]) -> Span:
 
 
 def _door_spans(house: Mapping[str, Any]) -> Iterator[tuple[str, float, float]]:
-    """Yield each doorway once per wall that it is in: the wall's id, and from and to along that
-    wall."""
+    """Yield a doorway once per wall that it is in: the wall's id, and from and to along it."""
     for door in house.get("doors", ()):
         if "holePolygon" in door:
             points = [float(p["x"]) for p in door["holePolygon"]]
@@ -212,8 +210,7 @@ def _walls(house: Mapping[str, Any], doors: Sequence[tuple[str, float, float]]) 
 
 
 def _stretch(ends: Span, length: float, low: float, high: float, bottom: float, style: int) -> Wall:
-    """Return the part of a wall of some length between two places along it, from `bottom` to the
-    ceiling."""
+    """Return a wall's part between two distances along it, from `bottom` to the ceiling."""
     x0, z0, x1, z1 = ends
     a = low / length
     b = high / length

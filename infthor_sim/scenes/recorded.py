@@ -19,8 +19,7 @@ _TILTED = 10.0
 
 
 def recorded_object(entry: Mapping[str, Any]) -> SimObject:
-    """Return an upright object from one entry of `metadata["objects"]`; a small tilt goes into its
-    box.
+    """Return an upright object from an entry of `metadata["objects"]`; its box takes a small tilt.
 
     Raises:
         DataError: a required field is missing or malformed.
@@ -66,8 +65,7 @@ def _object(entry: Mapping[str, Any]) -> SimObject:
 
 
 def _type(entry: Mapping[str, Any]) -> ObjectType:
-    """Return the record of the entry's type with the abilities that the entry has: versions of
-    AI2-THOR differ."""
+    """Return the record of the entry's type with the entry's abilities: versions differ."""
     declared = type_named(str(entry["objectType"]))
     return replace(
         declared,
@@ -103,8 +101,7 @@ def _state(entry: Mapping[str, Any]) -> SimObjectState:
 
 
 def _yaw(rotation: Mapping[str, float], points: Array) -> float:
-    """Return the yaw in degrees; of an object that lies on its side, the direction of its longest
-    level edge."""
+    """Return the yaw in degrees; for an object on its side, of its longest level edge."""
     tilt = max(abs(wrap_degrees(float(rotation["x"]))), abs(wrap_degrees(float(rotation["z"]))))
     if tilt <= _TILTED:
         return float(rotation["y"])

@@ -52,8 +52,7 @@ class RoomPlan:
         y: float = 0.0,
         size: tuple[float, float, float] | None = None,
     ) -> SimObject:
-        """Put an object with the middle of its underside at (x, y, z); the space that its door
-        needs stays free."""
+        """Put an object's underside at (x, y, z); the space of its door stays free."""
         item = self._at(object_type, x, z, yaw, y, size)
         self._add(item)
         return item
@@ -151,8 +150,7 @@ class RoomPlan:
         size: tuple[float, float, float] | None = None,
         y: float = 0.0,
     ) -> SimObject | None:
-        """Put an object at a random free place along one of the walls, tried in order; return None
-        if there is none."""
+        """Put an object at a random free place along the first wall that has one, or None."""
         width = (type_named(object_type).size if size is None else size)[0]
         for side in sides:
             start, end = self.span(side)
@@ -213,8 +211,7 @@ class RoomPlan:
 def build_world(
     name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float, float]] | None = None
 ) -> World:
-    """Return the world of furnished rooms, with the agent on the free floor and loose objects in
-    the furniture.
+    """Return the world of furnished rooms: the agent on free floor, loose objects in furniture.
 
     `doors` are the cells (x, z) in doorways.
     """
@@ -244,8 +241,7 @@ def _connected_parts(grid: NavGrid) -> list[list[tuple[float, float]]]:
 
 
 def _scatter(world: World, plan: RoomPlan) -> None:
-    """Put the plan's loose objects into or onto its furniture, at random; towels go to holders
-    first."""
+    """Put the plan's loose objects into or onto furniture at random; towels on holders first."""
     homes = [
         (o, o.type.capacity)
         for o in plan.objects

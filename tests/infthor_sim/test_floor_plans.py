@@ -1,5 +1,4 @@
-"""Floor plans from a data folder: any folder of the documented form, and what trajectories add to
-it."""
+"""Floor plans from any data folder of the documented form, and what trajectories add."""
 
 import gzip
 import json
@@ -18,8 +17,7 @@ from .harness import Bench
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A data folder with one floor plan, written from a procedural kitchen as the metadata reports
-    it."""
+    """A data folder with one floor plan: a procedural kitchen as the metadata reports it."""
     bench = Bench(size=40)
     entries = bench.reset("kitchen-1")["objects"]
     for entry in entries:  # the public form has boxes without corner points

@@ -1,5 +1,4 @@
-"""Things are put where there is room for them, by what is drawn: counted by points in solids, and
-by hand."""
+"""Things are put where there is room, by what is drawn: by points in solids, and by hand."""
 
 import numpy as np
 import pytest

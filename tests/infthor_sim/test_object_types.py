@@ -1,5 +1,4 @@
-"""A type of object is one record: what the records say holds together, and a new one needs nothing
-else."""
+"""A type of object is one record: they fit together, and a new one needs nothing else."""
 
 import numpy as np
 import pytest
@@ -36,8 +35,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 
 def lay_on_table(bench: Bench, object_type: str) -> tuple[str, str]:
-    """Puts an object of a type that the scene lacks on the table and keeps the first mug; ids of
-    both."""
+    """Puts an object of a new type on the table and keeps the first mug; ids of both."""
     mug, table = (
         bench.object(bench.first("Mug")),
         bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"],

@@ -1,5 +1,4 @@
-"""The renderer: exact depth and ids, the same picture from both implementations, lights, the held
-object."""
+"""The renderer: exact depth and ids, both implementations equal, lights, the held object."""
 
 import numpy as np
 import pytest

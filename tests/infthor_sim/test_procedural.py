@@ -1,5 +1,4 @@
-"""Procedural rooms are furnished as their type needs, connected, and different from seed to
-seed."""
+"""Procedural rooms are furnished by type, connected, and different from seed to seed."""
 
 import numpy as np
 import pytest

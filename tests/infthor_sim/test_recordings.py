@@ -1,5 +1,4 @@
-"""Expert trajectories recorded in AI2-THOR are accepted, and what they point at is where the
-recording saw it."""
+"""Expert trajectories recorded in AI2-THOR replay; objects are where the recording saw them."""
 
 import gzip
 import json

@@ -1,5 +1,4 @@
-"""The shapes of objects: within their boxes, the same outside whether open or closed, floors where
-contents stand."""
+"""The shapes of objects: within their boxes, one outside open or closed, floors for contents."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -58,8 +57,7 @@ def reach(part: ShapePart) -> Array:
 
 
 def allowed(item: SimObject) -> tuple[Array, Array]:
-    """Return the corners of the box that an object may fill in its own frame, with the way of its
-    door or drawer."""
+    """Return the corners of the box that an object may fill, with the way of its door or drawer."""
     low, high = (
         item.box_center - item.box_size / 2 - _OUT,
         item.box_center + item.box_size / 2 + _OUT,
@@ -136,8 +134,7 @@ def test_outside_looks_the_same_open_and_closed(object_type: str, style: int) ->
 def test_contents_stand_on_what_is_drawn(
     object_type: str, share_x: float, share_z: float, grown: float
 ) -> None:
-    """Under each place where contents stand is a drawn floor, at most a few millimetres above or
-    below it."""
+    """Where contents stand is a drawn floor, at most a few millimetres above or below."""
     usual = default_object(object_type, np.zeros(3)).box_size
     item = default_object(object_type, np.zeros(3), size=usual * grown)
     item.hinge = -1

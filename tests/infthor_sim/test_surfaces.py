@@ -1,5 +1,4 @@
-"""The surface on which things are put is the surface that is drawn: measured by points below each
-thing, by hand."""
+"""Things stand on what is drawn: measured by points below each thing, and by hand."""
 
 import numpy as np
 import pytest
@@ -52,8 +51,7 @@ def in_solid(row: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def parts_below(world: World, placed: SimObject, deep: float) -> np.ndarray:
-    """The drawn primitives of other things that reach into the space below a thing, `deep` metres
-    down."""
+    """Drawn primitives of others that reach into the space below a thing, `deep` metres."""
     low, high = placed.bounds()
     around = np.array([SLIDE, deep, SLIDE])
     near = []
@@ -65,8 +63,7 @@ def parts_below(world: World, placed: SimObject, deep: float) -> np.ndarray:
 
 
 def gap_below(world: World, placed: SimObject) -> float:
-    """Metres from the underside of a thing down to the first drawn solid under one of 25 points of
-    it."""
+    """Metres from a thing's underside to the first drawn solid under one of 25 points."""
     low, high = placed.bounds()
     shares = np.linspace(0.05, 0.95, 5)
     depths = np.arange(-RISE, 0.3, 0.002)

@@ -1,5 +1,4 @@
-"""What opening does to the boxes of things without doors and drawers: expectations written by
-hand."""
+"""What opening does to the boxes of things without doors or drawers, by hand."""
 
 import numpy as np
 import pytest

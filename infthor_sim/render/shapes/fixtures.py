@@ -32,8 +32,7 @@ def floor(b: Builder) -> None:
 
 @draws
 def sink(b: Builder) -> None:
-    """A rim of steel or ceramic around the basins; a hollow tub if the basins are no separate
-    objects."""
+    """A rim of steel or ceramic around the basins; a hollow tub if they are no objects."""
     color = STEEL if b.style % 2 else _CERAMIC
     if not b.item.pieces:
         b.open_top(color, Material.METAL, 0.02, b.floor, glow=0.22)

@@ -7,8 +7,7 @@ from infthor_sim.render.shapes.palette import CLOTHS, WHITE, WOODS, pick
 
 
 def _seat_level(b: Builder, usual: float) -> float:
-    """Return the height of the seat as a fraction of the half box: the object's surface height if
-    it is known."""
+    """Return the seat's height as a fraction of the half box: the surface height if known."""
     if b.item.support is None:
         return usual
     return min(0.9, max(-0.8, b.item.support / float(b.half[1]) - 1))

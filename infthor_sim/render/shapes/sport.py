@@ -20,8 +20,7 @@ def ball(b: Builder) -> None:
 
 @draws
 def bat(b: Builder) -> None:
-    """A knob, a wound grip, a slender handle that widens, and a thick barrel with a round end, on
-    its longest side."""
+    """A knob, a wound grip, a slender handle, a thick barrel with a round end; the longest side."""
     axis = b.longest
     wood: Color = (0.86, 0.66, 0.4)
     thick = min(float(b.half[i]) for i in range(3) if i != axis)
@@ -37,15 +36,13 @@ def bat(b: Builder) -> None:
 
 @draws
 def racket(b: Builder) -> None:
-    """An oval frame with a net of strings, a forked throat and a wound grip, along its longest
-    side."""
+    """An oval frame with strings, a forked throat and a wound grip, along its longest side."""
     long = b.longest
     flat = min(range(3), key=lambda i: float(b.half[i]))
     wide = 3 - long - flat
 
     def at(along: float, across: float = 0.0, up: float = 0.0) -> list[float]:
-        """A position, or half extents, in fractions along the racket, across it and away from its
-        face."""
+        """A position or half extents in fractions along the racket, across, and off its face."""
         return [along if axis == long else across if axis == wide else up for axis in range(3)]
 
     frame = pick(((0.75, 0.12, 0.12), (0.1, 0.25, 0.6), (0.12, 0.12, 0.14)), b.style)

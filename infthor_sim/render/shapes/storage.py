@@ -33,8 +33,7 @@ def _door(
     high: float = 1.0,
     grip_in: float = 0.0,
 ) -> None:
-    """Add a hinged door over the front from height fraction `low` to `high`, at the object's
-    openness.
+    """Add a hinged door over the front, from height fraction `low` to `high`, as open as it is.
 
     With `grip_in`, the grip is within the object's box, and the door so many metres behind its
     front.

@@ -20,8 +20,7 @@ def is_visible(
     own: NDArray[np.bool_],
     min_pixels: int,
 ) -> bool:
-    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked
-    in `own` (n,)."""
+    """Return whether at least `min_pixels` pixels show a primitive marked in `own` (n,)."""
     us, vs = camera.rays()
     # First the pixels that the object would show alone; then each other primitive takes away those
     # that it hides.

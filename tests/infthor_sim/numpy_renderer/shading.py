@@ -23,8 +23,7 @@ __all__ = ["brightness_at", "crease_factors", "shade"]
 
 
 def crease_factors(depth: Array) -> Array:
-    """Return factors of brightness (h, w): below 1 behind an outline and in a crease, above 1 along
-    an edge."""
+    """Return factors of brightness (h, w), see `creases_numba.crease_factors`."""
     step = max(1, depth.shape[0] // ROWS)
     # In place where possible: temporaries of a whole picture cost more than the sums.
     inverse = np.pad(1.0 / depth, step, mode="edge")
@@ -47,8 +46,7 @@ def shade(
     factors: Array,
     lights: Lights,
 ) -> NDArray[np.uint8]:
-    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times
-    its factor."""
+    """Return RGB (h, w, 3), bottom row first, of cast pixels, each brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     ys, xs = np.nonzero(nearest >= 0)
@@ -74,8 +72,7 @@ def brightness_at(
     camera: PinholeCamera,
     lights: Lights,
 ) -> Array:
-    """Return the brightness (n,) of primitives `p` (n, COLUMNS) at depth t on the rays (u, v,
-    t)."""
+    """Return the brightness (n,) of primitives (n, COLUMNS) at depth t on rays (u, v, t)."""
     u, v, t = rays
     local = [o[:, i] + t * ((s[:, 0, i] + u * s[:, 1, i]) + v * s[:, 2, i]) for i in range(3)]
     normal, a, b = surface(p, local)

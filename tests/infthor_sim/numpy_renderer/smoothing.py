@@ -88,8 +88,7 @@ def _depths(
     u: Array,
     v: Array,
 ) -> Array:
-    """Return the depth of each candidate (n, m) on the rays (u, v) (n,); infinity where it is
-    missed."""
+    """Return depths of candidates (n, m) on the rays (u, v) (n,); infinity for misses."""
     depths = np.full(orders.shape, np.inf)
     for order in np.unique(orders[orders >= 0]):
         rows, columns = np.nonzero(orders == order)
