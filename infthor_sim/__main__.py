@@ -28,9 +28,7 @@ class _Parser(ArgumentParser):
 def main(words: list[str] | None = None) -> None:
     """Run the command; misuse is one line and exit code 2."""
     parser = _Parser(
-        prog="python -m infthor_sim",
-        description=_HELP,
-        formatter_class=RawDescriptionHelpFormatter,
+        prog="python -m infthor_sim", description=_HELP, formatter_class=RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(dest="command", metavar="run")
     run = commands.add_parser("run", help="run a Python script on the simulator")

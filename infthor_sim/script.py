@@ -14,10 +14,7 @@ __all__ = ["run_script"]
 
 
 def run_script(
-    script: Path,
-    arguments: Sequence[str],
-    data: Path | None = None,
-    supplement: Path | None = None,
+    script: Path, arguments: Sequence[str], data: Path | None = None, supplement: Path | None = None
 ) -> None:
     """Run a script as `python SCRIPT ARGUMENTS` does, with this simulator's Controller.
 

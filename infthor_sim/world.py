@@ -16,9 +16,8 @@ from infthor_sim.pictures.appearance import Appearance
 __all__ = ["FLOOR_STYLES", "RoomShell", "Wall", "World"]
 
 FLOOR_STYLES = ("wood", "tiles", "carpet")
-_HAND = Grip(
-    np.array([0.0, -0.16, 0.38]), np.eye(3)
-)  # where AI2-THOR has its agent's hand, in the camera's frame
+# where AI2-THOR has its agent's hand, in the camera's frame
+_HAND = Grip(np.array([0.0, -0.16, 0.38]), np.eye(3))
 
 
 @dataclass(frozen=True)

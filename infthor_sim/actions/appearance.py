@@ -18,12 +18,8 @@ from infthor_sim.simulation import Simulation
 _DARKEST = 0.45
 _BRIGHTEST = 1.55
 _ITHOR = re.compile(r"FloorPlan\d*(\d\d)|FloorPlan(\d)")
-_ROOMS = {
-    "0": "Kitchen",
-    "2": "LivingRoom",
-    "3": "Bedroom",
-    "4": "Bathroom",
-}  # by the hundreds of the floor plan
+# by the hundreds of the floor plan
+_ROOMS = {"0": "Kitchen", "2": "LivingRoom", "3": "Bedroom", "4": "Bathroom"}
 _PROCEDURAL = {
     "kitchen": "Kitchen",
     "living-room": "LivingRoom",

@@ -24,12 +24,8 @@ from infthor_sim.world import World
 
 _TURN_STEP = 1.15  # degrees: Unity turns by a radian a second, in frames of a fiftieth of a second
 _MAX_STEPS = 2000  # of one walk, 40 m; the collision check holds all stances of a path in memory
-_DIRECTIONS = {
-    "Ahead": (1.0, 0.0),
-    "Back": (-1.0, 0.0),
-    "Right": (0.0, 1.0),
-    "Left": (0.0, -1.0),
-}  # ahead, right
+# ahead, right
+_DIRECTIONS = {"Ahead": (1.0, 0.0), "Back": (-1.0, 0.0), "Right": (0.0, 1.0), "Left": (0.0, -1.0)}
 
 
 @action("MoveAgent", modes=ARM_MODES)

@@ -13,12 +13,8 @@ from infthor_sim.geometry import Array
 from infthor_sim.physics.obstacles import blocking_object, held_object_blocks, nearest_name
 from infthor_sim.simulation import Simulation
 
-_DIRECTIONS = {
-    "Ahead": 0.0,
-    "Back": 180.0,
-    "Left": -90.0,
-    "Right": 90.0,
-}  # degrees from the agent's own
+# degrees from the agent's own
+_DIRECTIONS = {"Ahead": 0.0, "Back": 180.0, "Left": -90.0, "Right": 90.0}
 
 
 def _move(

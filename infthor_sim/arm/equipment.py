@@ -12,9 +12,8 @@ from infthor_sim.world import World
 __all__ = ["equip"]
 
 _RIGS: dict[str, type[Kinova] | type[Stretch]] = {"arm": Kinova, "stretch": Stretch}
-_EYES = {
-    "stretch": (0.00192, 0.5447, 0.06788)
-}  # metres, from Unity's sources; other modes have the usual camera
+# metres, from Unity's sources; other modes have the usual camera
+_EYES = {"stretch": (0.00192, 0.5447, 0.06788)}
 
 
 def equip(world: World, agent_mode: str) -> None:

@@ -79,9 +79,8 @@ def drop_all(world: World, arm: Arm) -> None:
         middle = item.center
         turn = matrix_euler(_level_rotation(item.matrix))
         world.set_pose(item, item.position, turn)
-        world.shift(
-            [item], middle - item.center
-        )  # it turns about its middle and not about its origin
+        # it turns about its middle and not about its origin
+        world.shift([item], middle - item.center)
         let_fall(world, item, item.center)
 
 

@@ -22,10 +22,8 @@ SHOULDER: Array = np.array([0.0, 0.0, LINK])
 _ALLOWED = 0.6325  # metres from the shoulder that restricted movements may go
 _REST = (0.0, 0.0, 0.4)
 _REST_BASE = -0.003
-_LIFTS = (
-    -0.45,
-    0.9,
-)  # of Unity's agent capsule: a quarter of its height below its middle, and its top; metres
+# of Unity's agent capsule: a quarter of its height below its middle, and its top; metres
+_LIFTS = (-0.45, 0.9)
 _THICK = (0.04, 0.035, 0.03)  # half thickness of the links from the base to the wrist, metres
 PALM = ((0.0, 0.0, -0.015), (0.04, 0.028, 0.025))  # middle and half extents in the wrist's frame
 # metres that the fingers reach ahead of the wrist; they do not collide, as they close around things
@@ -37,9 +35,8 @@ _LEVEL: Array = np.eye(3)
 # degrees of the elbow from up to the right: a forearm above the hand would hide it from the camera
 _LEAN = 50.0
 _AT_SHOULDER = 1e-9  # metres from the shoulder below which the direction to the wrist is undefined
-_UPRIGHT = (
-    1e-6  # sine of the angle from the vertical below which the line to the wrist counts as vertical
-)
+# sine of the angle from the vertical below which the line to the wrist counts as vertical
+_UPRIGHT = 1e-6
 
 
 def inverse(targets: Array, elbows: Array) -> Array:
@@ -64,9 +61,8 @@ def inverse(targets: Array, elbows: Array) -> Array:
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
     angles = np.radians(elbows - _LEAN)[:, None]
     out = np.cos(angles) * cross(ahead, aside) - np.sin(angles) * aside
-    along = np.minimum(
-        distances / 2, LINK
-    )  # beyond its reach the arm is stretched out towards the target
+    # beyond its reach the arm is stretched out towards the target
+    along = np.minimum(distances / 2, LINK)
     upper = (along * ahead + np.sqrt(np.maximum(LINK**2 - along**2, 0.0)) * out) / LINK
     fore = 2 * along * ahead / LINK - upper
     normal = cross(out, ahead)

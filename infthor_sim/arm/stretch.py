@@ -21,19 +21,11 @@ _ORIGIN = (0.1438, -0.8132, -0.0239)  # of the base, in the agent's frame
 _LIFTS = (-0.056, 1.045)
 _OUT = 0.516
 _REST = (0.0, 0.1645, 0.0)
-_MAST = (
-    0.0461,
-    0.163,
-    -0.2788,
-)  # the lift's joint relative to the wrist's height, in the frame of the base
+# the lift's joint relative to the wrist's height, in the frame of the base
+_MAST = (0.0461, 0.163, -0.2788)
 _TUBE = (0.083, 0.163, -0.0241)  # the first section of the telescope, likewise
-_SECTIONS = (
-    0.0,
-    0.0130003,
-    0.0130005,
-    0.0130003,
-    0.0117463,
-)  # each section from the one before, telescope drawn in
+# each section from the one before, telescope drawn in
+_SECTIONS = (0.0, 0.0130003, 0.0130005, 0.0130003, 0.0117463)
 # heights of the wrist's two joints above the hand
 _YAW_JOINT = 0.1494
 _HAND_JOINT = 0.0987

@@ -110,9 +110,8 @@ def find_place(
             fixed = (
                 [] if among_fixed else [o.bounds() for o in _fixed_on(world, receptacle, surface)]
             )
-            obstacles = _Obstacles(
-                [*boxes, *fixed], [], []
-            )  # recorded boxes are too large to be taken for solid
+            # recorded boxes are too large to be taken for solid
+            obstacles = _Obstacles([*boxes, *fixed], [], [])
         else:
             fixed = list(_solid_boxes(world, item, receptacle, surface))
             walls = [

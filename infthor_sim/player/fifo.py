@@ -178,9 +178,8 @@ def parse_action(field_type: int, body: bytes) -> dict[str, Any]:
         )
     try:
         action = json.loads(body)
-        if (
-            b"\\u" in body or b"\xed" in body
-        ):  # halves of characters, which no reply could repeat, become "?"
+        # halves of characters, which no reply could repeat, become "?"
+        if b"\\u" in body or b"\xed" in body:
             action = json.loads(json.dumps(action, ensure_ascii=False).encode(errors="replace"))
     except (ValueError, RecursionError) as error:
         raise SimulatorError(f"the controller sent an action that is not JSON ({error})") from error

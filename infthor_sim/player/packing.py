@@ -43,9 +43,8 @@ class MetadataPacker:
     """Packs the metadata of one simulation; keeps packed objects between replies."""
 
     def __init__(self) -> None:
-        self._packed: dict[
-            str, tuple[int, int, bytes]
-        ] = {}  # version, number of fields, their bytes, by object id
+        # version, number of fields, their bytes, by object id
+        self._packed: dict[str, tuple[int, int, bytes]] = {}
         self._colors: tuple[tuple[str, ...], bytes] | None = None
         # The world whose objects are packed. The reference keeps it alive, so that no other world
         # can get its address and be taken for it.

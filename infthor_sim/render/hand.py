@@ -29,9 +29,8 @@ from infthor_sim.render.primitives import (
 __all__ = ["HAND", "held_rows"]
 
 HAND = "Hand"  # its name in segmentation frames
-_AWAY = (
-    0.16  # metres in front of the camera: nearer than anything that the agent can stand in front of
-)
+# metres in front of the camera: nearer than anything that the agent can stand in front of
+_AWAY = 0.16
 _NEAREST = 0.115  # of the gripper: beyond the camera's clipping plane
 # of the object's lowest point below the middle of the picture, as a share of its half height
 _FOOT = 0.97
@@ -39,9 +38,8 @@ _FOOT = 0.97
 _SMALLEST = 0.105
 _GROWTH = 0.26
 _LARGEST = 0.2
-_TILT = euler_matrix(
-    (-24.0, 0.0, 0.0)
-)  # towards the camera, which so sees into bowls and the faces of flat things
+# towards the camera, which so sees into bowls and the faces of flat things
+_TILT = euler_matrix((-24.0, 0.0, 0.0))
 _TURN = 155.0  # degrees: the front, as of screens and clocks, faces the camera and a little aside
 
 # Of the gripper, in shares of the picture's half height.
@@ -63,9 +61,8 @@ def _outlines() -> Array:
     box = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     cylinder = np.concatenate([ring - up, ring + up])
     upright = ring[:, [0, 2, 1]]
-    bowl = (
-        upright * [1.0, 2.0, 1.0] * (upright[:, [1]] < 0) + up
-    )  # the lower half of a sphere, from -1 to 1
+    # the lower half of a sphere, from -1 to 1
+    bowl = upright * [1.0, 2.0, 1.0] * (upright[:, [1]] < 0) + up
     by_form = {
         Form.BOX: np.concatenate([box, box]), Form.CYLINDER: cylinder, Form.CUP: cylinder,
         Form.ELLIPSOID: np.concatenate([ring, upright]),

@@ -11,9 +11,8 @@ from infthor_sim.render.raster_numba import hit
 
 __all__ = ["is_visible"]
 
-_COARSE = (
-    8  # every eighth row and column is tried first: an object in full view shows up there already
-)
+# every eighth row and column is tried first: an object in full view shows up there already
+_COARSE = 8
 
 
 def is_visible(

@@ -66,9 +66,8 @@ class SceneModel:
         if world.held is not None:
             in_hand |= {o.object_id for o in world.descendants(world.objects[world.held])}
         for index, item in enumerate(world.objects.values(), start=len(SHELL_NAMES)):
-            if world.is_hidden(
-                item
-            ):  # nobody sees into a closed fridge, so its contents need not be drawn
+            # nobody sees into a closed fridge, so its contents need not be drawn
+            if world.is_hidden(item):
                 continue
             (held if item.object_id in in_hand else parts).append(self._object_rows(item, index))
         self._rows = {key: value for key, value in self._rows.items() if key in world.objects}

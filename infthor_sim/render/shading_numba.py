@@ -229,9 +229,8 @@ def brightness(
             nx, ny, nz, facing = nx * shrink, ny * shrink, nz * shrink, facing * shrink
             sun = nx * table[k, SUNWARD] + ny * table[k, SUNWARD + 1] + nz * table[k, SUNWARD + 2]
             up = nx * table[k, AXES + 1] + ny * table[k, AXES + 4] + nz * table[k, AXES + 7]
-        if (
-            facing > 0.0
-        ):  # the normal points away from the camera: another face, or the inside of a cup
+        # the normal points away from the camera: another face, or the inside of a cup
+        if facing > 0.0:
             nx, ny, nz, sun, up = -nx, -ny, -nz, -sun, -up
         headlight = HEADLIGHT * abs(facing) / math.sqrt(1.0 + u * u + v * v)
         light = (AMBIENT + SKY * up + SUN * max(sun, 0.0) + headlight) * daylight

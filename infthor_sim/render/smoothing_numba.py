@@ -130,9 +130,8 @@ def _smooth(
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
     # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
     parts = len(SUBPIXELS)
-    shown = np.full(
-        len(jagged) * parts, -1, dtype=np.int32
-    )  # the primitive that each ray hits; -1 for none
+    # the primitive that each ray hits; -1 for none
+    shown = np.full(len(jagged) * parts, -1, dtype=np.int32)
     ray_u = np.empty(len(shown))
     ray_v = np.empty(len(shown))
     depths = np.empty(len(shown))

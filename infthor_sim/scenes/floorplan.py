@@ -24,12 +24,8 @@ _CEILING = 2.6  # metres
 # Poses (x, z, yaw) that AI2-THOR starts its agent in, where known: recordings do not have them.
 # Others are inferred.
 _STARTS = {"FloorPlan28": (-1.5, -1.5, 180.0)}
-_STYLES = {
-    0: "tiles",
-    2: "wood",
-    3: "carpet",
-    4: "tiles",
-}  # of floors, by the hundreds of the floor plan
+# of floors, by the hundreds of the floor plan
+_STYLES = {0: "tiles", 2: "wood", 3: "carpet", 4: "tiles"}
 
 
 def build_floor_plan(

@@ -60,9 +60,8 @@ def _front(item: SimObject, nav: NavGrid) -> float:
         bonus = 100 if item.object_type == "Cabinet" and at_face else 0
         thin = float(np.abs(direction) @ half) <= min(half[0], half[2]) + 1e-6
         flat = 3 if thin and item.type.flat else 0
-        scores.append(
-            (free + bonus + flat * 10, thin, -angle)
-        )  # ties: the thin side, then the smaller angle
+        # ties: the thin side, then the smaller angle
+        scores.append((free + bonus + flat * 10, thin, -angle))
     best = max(scores)
     return (-best[2] - float(item.rotation[1])) % 360
 

@@ -102,9 +102,8 @@ def _create(object_id: str, nav: NavGrid, floor: float) -> SimObject:
     """Return a new object of an id's type and position, turned to the free floor."""
     object_type, position = parse_id(object_id)
     item = default_object(object_type, position, nav.freest_yaw(position[0], position[2]))
-    if (
-        item.type.furniture
-    ):  # the id's height is that of its top, or of its underside if near the floor
+    # the id's height is that of its top, or of its underside if near the floor
+    if item.type.furniture:
         top = position[1] if position[1] - floor > 0.3 else floor + item.type.size[1]
         item.box_size = np.array([item.box_size[0], top - floor, item.box_size[2]])
         item.box_center = np.array([0.0, (top + floor) / 2 - position[1], 0.0])

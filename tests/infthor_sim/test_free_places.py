@@ -103,14 +103,11 @@ def test_by_hand_a_thing_fits_in_a_round_vessel_by_its_corners():
     wall = Wall(
         np.array([0.0, 0.5, 0.0]), np.array([0.2, 0.5, 0.2]), np.eye(3), bottom=0.5, top=1.0
     )
-    corners = np.array(
-        [[0.07, 0.07], [0.07, -0.07], [-0.07, 0.07], [-0.07, -0.07]]
-    )  # 0.099 m from the middle
+    # 0.099 m from the middle
+    corners = np.array([[0.07, 0.07], [0.07, -0.07], [-0.07, 0.07], [-0.07, -0.07]])
     middle = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    assert wall.holds(middle, corners).tolist() == [
-        True,
-        True,
-    ]  # the radius is 0.1 m below, 0.2 m above
+    # the radius is 0.1 m below, 0.2 m above
+    assert wall.holds(middle, corners).tolist() == [True, True]
     assert wall.holds(middle + np.array([0.02, 0.0, 0.0]), corners).tolist() == [False, True]
 
 

@@ -85,11 +85,8 @@ def test_near_plane_and_things_behind_are_cut():
     assert cast_picture(one(Form.BOX, 0.0, 0.05), ("a",), camera(), COMPILED).instances.max() == -1
 
 
-FLAT = {
-    "Laptop",
-    "Shelf",
-    "ShowerGlass",
-}  # closed; the space above a board; one of the panes that its box is around
+# closed; the space above a board; one of the panes that its box is around
+FLAT = {"Laptop", "Shelf", "ShowerGlass"}
 
 
 @pytest.mark.parametrize("object_type", sorted(OBJECT_TYPES))

@@ -110,12 +110,8 @@ def test_outside_looks_the_same_open_and_closed(object_type: str, style: int) ->
     item = default_object(object_type, np.zeros(3))
     item.hinge, item.style = -1, style
     opened = as_open(item, 1.0)
-    for pitch, yaw in (
-        (80.0, 0.0),
-        (20.0, 0.0),
-        (20.0, 40.0),
-        (20.0, -40.0),
-    ):  # from above and behind
+    # from above and behind
+    for pitch, yaw in ((80.0, 0.0), (20.0, 0.0), (20.0, 40.0), (20.0, -40.0)):
         closed_look, closed_at = looks(item, pitch, yaw)
         open_look, open_at = looks(opened, pitch, yaw)
         both = closed_at & open_at

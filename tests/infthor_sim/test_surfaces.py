@@ -127,9 +127,8 @@ def test_what_is_put_somewhere_stands_on_what_is_drawn(object_type, data, grown,
     world.add(placed)
     if object_type in HANGERS:
         assert hangs_on(receptacle, placed)
-    elif (
-        object_type != "Fridge"
-    ):  # whose shelves are drawn as frames in front, as clear glass is seen through
+    # a fridge's shelves are drawn as frames in front, as clear glass is seen through
+    elif object_type != "Fridge":
         assert gap_below(world, placed) < NEAR
 
 
@@ -160,13 +159,11 @@ def test_by_hand_things_on_a_toilet_stand_on_its_tank():
 def test_by_hand_a_pan_holds_things_beside_its_handle_and_a_carton_between_its_flaps():
     pan = default_object("Pan", np.zeros(3), size=np.array([0.28, 0.05, 0.40]))
     (inside,) = surfaces(pan)
-    assert inside.center[[0, 2]] == pytest.approx(
-        [0.0, -0.06]
-    )  # its round part is 0.28 m wide, at the end of the box
+    # its round part is 0.28 m wide, at the end of the box
+    assert inside.center[[0, 2]] == pytest.approx([0.0, -0.06])
     assert inside.half == pytest.approx((0.102, 0.102))
     carton = default_object("Box", np.zeros(3), size=np.array([0.5, 0.3, 0.5]))
     assert carton.state.openness == 1.0
     (inside,) = surfaces(carton)
-    assert inside.half == pytest.approx(
-        (0.195, 0.195)
-    )  # 0.82 of its box is what is left when it is closed
+    # 0.82 of its box is what is left when it is closed
+    assert inside.half == pytest.approx((0.195, 0.195))

@@ -7,9 +7,8 @@ from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, WHITE, WOODS, pick
 
 _LEAF = 0.02  # thickness of a door, metres
-_FRIDGE_GRIP = (
-    0.022  # metres that a fridge's grips stand out within its box, as recorded in FloorPlan28
-)
+# metres that a fridge's grips stand out within its box, as recorded in FloorPlan28
+_FRIDGE_GRIP = 0.022
 _LIT = 0.2  # glow of the insides of open things: their contents would be hard to see otherwise
 # of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same
 # share.

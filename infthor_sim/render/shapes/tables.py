@@ -18,9 +18,8 @@ def counter(b: Builder) -> None:
     """A slab of stone, cut out where sinks are; a tall box has a body of wood below it."""
     height = 2 * float(b.half[1])
     color = pick(_STONES, b.style)
-    if (
-        height < 0.1 and b.item.support is not None
-    ):  # a recorded counter is a thin space above its slab
+    # a recorded counter is a thin space above its slab
+    if height < 0.1 and b.item.support is not None:
         half = 0.018 / float(b.half[1])
         cut_slab(b, b.item.support / float(b.half[1]) - 1 - half, half, color, Material.STONE)
         return
@@ -113,9 +112,8 @@ def desk(b: Builder) -> None:
     color = pick(WOODS, b.style)
     under = _top(b, color, 0.7)
     mat = min(0.8, b.thick(0.36, 0)), min(0.62, b.thick(0.22, 2))
-    level = _surface(b) - b.thick(
-        0.001, 1
-    )  # it stands out by half a millimetre: things stand on the board
+    # it stands out by half a millimetre: things stand on the board
+    level = _surface(b) - b.thick(0.001, 1)
     b.box((0, level, 0.14), (mat[0], b.thick(0.0015, 1), mat[1]), (0.13, 0.25, 0.2))
     if b.item.hollow:
         _carcass(b, color, under)
