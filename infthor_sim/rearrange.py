@@ -148,7 +148,7 @@ def spawn_randomly(
     """Put every loose object into or onto a random receptacle that takes its type and has room.
 
     Args:
-        world: the scene, changed in place.
+        world: the scene, changed in placed.
         random: random numbers that choose the order of the objects and their receptacles.
         excluded_types: types of receptacles that get nothing.
         kept: ids of objects that stay where they are.
@@ -167,8 +167,8 @@ def spawn_randomly(
             and o.object_type not in excluded_types and not (in_open_only and o.type.encloses)
         ]  # fmt: skip
         for home_index in random.permutation(len(homes)):
-            place = find_place(world, item, homes[home_index])
-            if place is not None:
-                world.set_pose(item, place.position, place.rotation)
+            placed = find_place(world, item, homes[home_index])
+            if placed is not None:
+                world.set_pose(item, placed.position, placed.rotation)
                 world.attach(item, homes[home_index])
                 break

@@ -85,9 +85,9 @@ def _reach(
     base = arm.base(sim.world.agent)
     target = base.local(point)
     if restricted and not arm.rig.allows(target):
-        place, space = requested
+        position, space = requested
         raise ActionError(
-            f"Invalid target: Position '{position_text(place)}' in space '{space}' is behind "
+            f"Invalid target: Position '{position_text(position)}' in space '{space}' is behind "
             "shoulder."
         )
     start = arm.pose.wrist
@@ -288,19 +288,23 @@ def pick_up_in_sphere(
     manualInteract: bool = False,
 ) -> None:
     """Hold everything in the hand's sphere that can be picked up, or those candidates that are."""
-    given = "objectId" if objectId is not None else "x, y" if x is not None or y is not None else ""
-    if given:
+    foreign = ""
+    if objectId is not None:
+        foreign = "objectId"
+    elif x is not None or y is not None:
+        foreign = "x, y"
+    if foreign:
         raise ActionError(
-            f"You are passing in iTHOR PickupObject parameters ({given}) to the arm agent!"
+            f"You are passing in iTHOR PickupObject parameters ({foreign}) to the arm agent!"
         )
     arm = agent_arm(sim)
-    things = touched_objects(sim.world, arm).pickupable
+    objects = touched_objects(sim.world, arm).pickupable
     if objectIdCandidates is not None:
-        things = [o for o in things if o.object_id in objectIdCandidates]
-    if not things:
+        objects = [o for o in objects if o.object_id in objectIdCandidates]
+    if not objects:
         which = "(specified by objectId) " if objectIdCandidates is not None else ""
         raise ActionError(f"No objects {which}were valid to be picked up by the arm")
-    pick_up(sim.world, arm, things)
+    pick_up(sim.world, arm, objects)
 
 
 @action("ReleaseObject", modes=ARM_MODES)

@@ -66,8 +66,8 @@ def _collision_text(sim: Simulation, name: str, target: str) -> str:
             f"Collided with static structure in scene: '{name}', could not reach target: "
             f"'{target}'."
         )
-    shown = name if item is None else item.name
-    return f"Collided with static sim object: '{shown}', could not reach target: '{target}'."
+    label = name if item is None else item.name
+    return f"Collided with static sim object: '{label}', could not reach target: '{target}'."
 
 
 def position_text(point: Array) -> str:

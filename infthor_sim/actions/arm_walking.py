@@ -54,16 +54,16 @@ def move_agent(
     follow(sim, path, position_text(now.position + way), returnToStart, contact)
 
 
-def _body_contact(world: World, places: list[Array]) -> Contact | None:
+def _body_contact(world: World, positions: list[Array]) -> Contact | None:
     """Return the first position at which the agent cannot be, and what is there; None: all free."""
-    # After a forced teleport the agent may be where it cannot stand. It may leave then: places
-    # count as blocked only once it has been at a free one, and the last place in any case.
+    # After a forced teleport the agent may be where it cannot stand. It may leave then: positions
+    # count as blocked only once it has been at a free one, and the last one in any case.
     was_free = world.nav.can_stand(world.agent.position[0], world.agent.position[2])
-    for step, place in enumerate(places):
-        obstacle = blocking_object(world, place)
-        is_free = obstacle is None and world.nav.can_stand(place[0], place[2])
-        if not is_free and (was_free or step == len(places) - 1):
-            return step, obstacle or nearest_name(world, place)
+    for step, position in enumerate(positions):
+        obstacle = blocking_object(world, position)
+        is_free = obstacle is None and world.nav.can_stand(position[0], position[2])
+        if not is_free and (was_free or step == len(positions) - 1):
+            return step, obstacle or nearest_name(world, position)
         was_free = was_free or is_free
     return None
 

@@ -70,9 +70,9 @@ def update_third_party_camera(
     )
 
 
-def _update_vector(old: Array, given: Vector3 | None) -> Array:
+def _update_vector(old: Array, new: Vector3 | None) -> Array:
     return np.array(
-        [float((given or Vector3()).get(axis, was)) for axis, was in zip("xyz", old, strict=True)]
+        [float((new or Vector3()).get(axis, was)) for axis, was in zip("xyz", old, strict=True)]
     )
 
 

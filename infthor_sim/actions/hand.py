@@ -67,7 +67,7 @@ for _name, _direction in _DIRECTIONS.items():
     action(f"MoveHeldObject{_name}", f"MoveHand{_name}")(partial(_move_along, np.array(_direction)))
 
 
-@action("RotateHeldObject", forms=((), ("rotation",)))
+@action("RotateHeldObject", overloads=((), ("rotation",)))
 def rotate_held_object(
     sim: Simulation,
     pitch: float = 0.0,

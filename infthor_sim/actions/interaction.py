@@ -19,7 +19,7 @@ from infthor_sim.simulation import Simulation
 _CROWDED = (0.12, 0.24, 0.35)
 
 
-@action("PickupObject", forms=BY_ID_OR_PIXEL)
+@action("PickupObject", overloads=BY_ID_OR_PIXEL)
 def pick_up(
     sim: Simulation,
     objectId: str | None = None,
@@ -48,7 +48,7 @@ def pick_up(
     world.carry()
 
 
-@action("PutObject", forms=BY_ID_OR_PIXEL)
+@action("PutObject", overloads=BY_ID_OR_PIXEL)
 def put(
     sim: Simulation,
     objectId: str | None = None,
@@ -108,7 +108,7 @@ def _check_receptacle(held: SimObject, target: SimObject) -> None:
         )
 
 
-@action("OpenObject", forms=BY_ID_OR_PIXEL)
+@action("OpenObject", overloads=BY_ID_OR_PIXEL)
 def open_object(
     sim: Simulation,
     objectId: str | None = None,

@@ -17,7 +17,7 @@ from infthor_sim.world import World
 _SPACING = 0.05  # metres between the points of a surface
 
 
-@action("TeleportObject", forms=(("position",), ("x", "y", "z"), ("positions",)))
+@action("TeleportObject", overloads=(("position",), ("x", "y", "z"), ("positions",)))
 def teleport_object(
     sim: Simulation,
     objectId: str,

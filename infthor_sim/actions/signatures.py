@@ -28,14 +28,14 @@ def type_name(annotation: Any) -> str:
 
 
 def unknown_arguments_text(
-    name: str, unknown: Sequence[str], parameters: Mapping[str, inspect.Parameter], given: Any
+    name: str, unknown: Sequence[str], parameters: Mapping[str, inspect.Parameter], passed: Any
 ) -> str:
     """Return Unity's message about unknown arguments, with those that the action takes."""
     plural = "s" if len(unknown) > 1 else ""
     expected = ", ".join(_parameter_text(parameter) for parameter in parameters.values())
     return (
         f'\n\tAction: "{name}" called with invalid argument{plural}: {_quote(unknown)}'
-        f"\n\tExpected arguments: {expected}\n\tYour arguments: {_quote(given)}"
+        f"\n\tExpected arguments: {expected}\n\tYour arguments: {_quote(passed)}"
     )
 
 

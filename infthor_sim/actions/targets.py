@@ -35,7 +35,7 @@ def object_action(*names: str) -> Callable[[ObjectFunction], ObjectFunction]:
         ) -> None:
             function(sim, interactable(sim, objectId, forceAction, x, y))
 
-        action(*names, forms=BY_ID_OR_PIXEL)(run)
+        action(*names, overloads=BY_ID_OR_PIXEL)(run)
         return function
 
     return register

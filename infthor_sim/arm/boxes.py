@@ -91,12 +91,12 @@ def _pair_gaps(a: Boxes, b: Boxes) -> Array:
     cosines = a.axes @ b.axes.transpose(0, 2, 1)
     size = np.abs(cosines)
     between = b.center - a.center
-    of_a = np.einsum("kij,kj->ki", a.axes, between)
-    of_b = np.einsum("kij,kj->ki", b.axes, between)
-    faces_a = np.abs(of_a) - a.half - np.einsum("kij,kj->ki", size, b.half)
-    faces_b = np.abs(of_b) - b.half - np.einsum("kji,kj->ki", size, a.half)
+    along_a = np.einsum("kij,kj->ki", a.axes, between)
+    along_b = np.einsum("kij,kj->ki", b.axes, between)
+    faces_a = np.abs(along_a) - a.half - np.einsum("kij,kj->ki", size, b.half)
+    faces_b = np.abs(along_b) - b.half - np.einsum("kji,kj->ki", size, a.half)
     away = np.abs(
-        of_a[:, _LAST, None] * cosines[:, _NEXT] - of_a[:, _NEXT, None] * cosines[:, _LAST]
+        along_a[:, _LAST, None] * cosines[:, _NEXT] - along_a[:, _NEXT, None] * cosines[:, _LAST]
     )
     reach_a = a.half[:, _NEXT, None] * size[:, _LAST] + a.half[:, _LAST, None] * size[:, _NEXT]
     reach_b = (

@@ -65,8 +65,8 @@ def first_contact(
     # Gaps by stance, part of the arm and object: an object of many primitives counts by its nearest
     # one, so that the arm may slide along it from one primitive to the next.
     gaps = separations(moving.flat(), near.boxes).reshape(len(path) + 1, -1, len(near.owner))
-    things = np.unique(near.owner)
-    gaps = np.stack([gaps[:, :, near.owner == thing].min(axis=2) for thing in things], axis=2)
+    owners = np.unique(near.owner)
+    gaps = np.stack([gaps[:, :, near.owner == owner].min(axis=2) for owner in owners], axis=2)
     # Negative where a part is deeper in an object than at the start, where `_SKIN` is always
     # allowed.
     depth = gaps[1:] - np.minimum(gaps[0], -_SKIN)
@@ -75,7 +75,7 @@ def first_contact(
     if not len(hit):
         return None
     step = int(hit[0])
-    return step, near.names[things[depth[step].min(axis=0).argmin()]]
+    return step, near.names[owners[depth[step].min(axis=0).argmin()]]
 
 
 def is_free(world: World, arm: Arm, there: Stance, around: ArmObstacles) -> bool:

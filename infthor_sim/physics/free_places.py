@@ -24,7 +24,7 @@ from infthor_sim.world import World
 
 __all__ = ["PointFilter", "find_place"]
 
-_STEP = 0.05  # metres between the places that are tried
+_STEP = 0.05  # metres between the points that are tried
 _BELOW_HAND = 0.15  # metres below the agent's own height of the surface that is tried first
 _CLEARANCE = 0.008  # metres between neighbours
 _SQUEEZE = 0.02  # metres by which recorded insides may be higher than their boxes
@@ -125,11 +125,11 @@ def find_place(
             around = (
                 _outline_with_contents(world, item, ghost) if obstacles.walls else np.zeros((0, 2))
             )
-            place = _free_point(
+            point = _free_point(
                 world, ghost, surface, obstacles, around, overlap, random, point_filter
             )
-            if place is not None:
-                ghost.place_bottom(place)
+            if point is not None:
+                ghost.place_bottom(point)
                 return ghost
     return None
 

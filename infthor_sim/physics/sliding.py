@@ -38,12 +38,12 @@ def slide(world: World, item: SimObject, direction: Array, distance: float) -> N
         support = _support(world, item)
         if support is not None and not is_over(support, item.center):
             break
-    for thing in moved.values():
-        support = _support(world, thing)
-        if support is not None and not is_over(support, thing.center):
-            let_fall(world, thing, thing.center)
-        elif thing.type.pickupable:
-            assign_parent(world, thing)
+    for other in moved.values():
+        support = _support(world, other)
+        if support is not None and not is_over(support, other.center):
+            let_fall(world, other, other.center)
+        elif other.type.pickupable:
+            assign_parent(world, other)
 
 
 def _support(world: World, item: SimObject) -> SimObject | None:

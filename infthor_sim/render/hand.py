@@ -87,17 +87,17 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
     size = float(np.max(item.box_size))
     scale = 2 * min(_SMALLEST + _GROWTH * size, _LARGEST) * reach / size
     upright = camera.matrix @ _TILT @ euler_matrix((0.0, _TURN + item.front, 0.0)) @ item.matrix.T
-    shown = rows.copy()
-    shown[:, HALF : HALF + 3] *= scale
+    moved = rows.copy()
+    moved[:, HALF : HALF + 3] *= scale
     axes = rows[:, AXES : AXES + 9].reshape(-1, 3, 3) @ upright.T
-    shown[:, AXES : AXES + 9] = axes.reshape(-1, 9)
+    moved[:, AXES : AXES + 9] = axes.reshape(-1, 9)
     centers = scale * (rows[:, CENTER : CENTER + 3] - item.center) @ upright.T
     outlines = _OUTLINES[rows[:, FORM].astype(int)].copy()
     outlines[:, :, [0, 2]] *= np.where(outlines[:, :, 1] < 0, rows[:, [BOTTOM]], rows[:, [TOP]])[
         :, :, None
     ]
     surfaces = centers[:, None] + np.einsum(
-        "nkj,nj,nji->nki", outlines, shown[:, HALF : HALF + 3], axes
+        "nkj,nj,nji->nki", outlines, moved[:, HALF : HALF + 3], axes
     )
     points = surfaces.reshape(-1, 3) @ camera.matrix  # right, up and forward of the object's middle
     low, high = points.min(axis=0), points.max(axis=0)
@@ -105,14 +105,14 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
     # be at the foot.
     height = float(np.max(-_FOOT * reach / _AWAY * (_AWAY + points[:, 2]) - points[:, 1]))
     middle = np.array([0.0, height, _AWAY])
-    shown[:, CENTER : CENTER + 3] = camera.position + centers + camera.matrix @ middle
+    moved[:, CENTER : CENTER + 3] = camera.position + centers + camera.matrix @ middle
     foot = points[points[:, 1] <= low[1] + _GRASPED * (high[1] - low[1])]
     away = max(_AWAY + float(foot[:, 2].mean()), _NEAREST)
     across = foot[:, 0] / (_AWAY + foot[:, 2]) * _AWAY / reach
     grip = primitives.rows(
         _gripper(float(across.min()), float(across.max())), np.zeros(3), np.eye(3), hand
     )
-    return np.concatenate([shown, _in_picture(grip, away, away * reach / _AWAY, camera)])
+    return np.concatenate([moved, _in_picture(grip, away, away * reach / _AWAY, camera)])
 
 
 def _gripper(left: float, right: float) -> list[ShapePart]:

@@ -72,15 +72,15 @@ def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
             jump = np.uint8(abs(total[y + 1, x] - total[y, x]) > JUMP)
             marked[y, x] |= jump
             marked[y + 1, x] |= jump
-    places = np.empty((height * width, 2), dtype=np.int64)
+    positions = np.empty((height * width, 2), dtype=np.int64)
     count = 0
     for y in range(height):
         for x in range(width):
             if marked[y, x]:
-                places[count, 0] = y
-                places[count, 1] = x
+                positions[count, 0] = y
+                positions[count, 1] = x
                 count += 1
-    return places[:count]
+    return positions[:count]
 
 
 @njit(cache=True, error_model="numpy")
@@ -131,16 +131,16 @@ def _smooth(
     # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
     parts = len(SUBPIXELS)
     # the primitive that each ray hits; -1 for none
-    shown = np.full(len(jagged) * parts, -1, dtype=np.int32)
-    ray_u = np.empty(len(shown))
-    ray_v = np.empty(len(shown))
-    depths = np.empty(len(shown))
-    crease = np.empty(len(shown))
-    levels = np.empty(len(shown))
+    hits = np.full(len(jagged) * parts, -1, dtype=np.int32)
+    ray_u = np.empty(len(hits))
+    ray_v = np.empty(len(hits))
+    depths = np.empty(len(hits))
+    crease = np.empty(len(hits))
+    levels = np.empty(len(hits))
     orders = np.empty(len(NEIGHBOURS), dtype=np.int32)
     at = np.empty((len(NEIGHBOURS), 2), dtype=np.int64)
-    for place in range(len(jagged)):
-        y, x = jagged[place, 0], jagged[place, 1]
+    for index in range(len(jagged)):
+        y, x = jagged[index, 0], jagged[index, 1]
         count = _candidates(nearest, y, x, orders, at)
         for part in range(parts):
             u, v = us[x] + SUBPIXELS[part, 0] * pixel, vs[y] + SUBPIXELS[part, 1] * pixel
@@ -176,22 +176,22 @@ def _smooth(
                     best = t
                     chosen = k
             if chosen >= 0:
-                i = place * parts + part
-                shown[i] = orders[chosen]
+                i = index * parts + part
+                hits[i] = orders[chosen]
                 ray_u[i] = u
                 ray_v[i] = v
                 depths[i] = best
                 # The crease factor is that of the pixel that showed it, as there is no depth around
                 # the ray.
                 crease[i] = factors[at[chosen, 0], at[chosen, 1]]
-    brightness(table, first, eye, daylight, shown, ray_u, ray_v, depths, levels)
-    for place in range(len(jagged)):
-        y, x = jagged[place, 0], jagged[place, 1]
+    brightness(table, first, eye, daylight, hits, ray_u, ray_v, depths, levels)
+    for index in range(len(jagged)):
+        y, x = jagged[index, 0], jagged[index, 1]
         red = 0.0
         green = 0.0
         blue = 0.0
-        for i in range(place * parts, (place + 1) * parts):
-            order = shown[i]
+        for i in range(index * parts, (index + 1) * parts):
+            order = hits[i]
             if order < 0:  # the ray misses all candidates: the pixel's own colour is taken
                 red = red + rgb[y, x, 0]
                 green = green + rgb[y, x, 1]

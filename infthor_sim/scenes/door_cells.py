@@ -25,28 +25,28 @@ def add_door_cells(world: World) -> None:
     ALFRED's layouts have no such cells, but AI2-THOR lets its agent stand there while the door is
     closed. An open door blocks them as it blocks others, see `obstacles`.
     """
-    places = np.array(sorted(set(_fringe(world.nav)))).reshape(-1, 2)
-    free = places[_in_reach_of_a_door(world, places) & _clear(world, places)]
+    points = np.array(sorted(set(_fringe(world.nav)))).reshape(-1, 2)
+    free = points[_in_reach_of_a_door(world, points) & _clear(world, points)]
     world.nav = NavGrid([*world.nav, *((float(x), float(z)) for x, z in free)])
 
 
 def _fringe(nav: NavGrid) -> Iterator[tuple[float, float]]:
-    """Yield the places one or two steps off the grid, with repetitions."""
+    """Yield the points one or two steps off the grid, with repetitions."""
     for x, z in nav:
         for i in (-2, -1, 0, 1, 2):
             for j in (-2, -1, 0, 1, 2):
-                place = (round(x + i * CELL, 4), round(z + j * CELL, 4))
-                if abs(i) + abs(j) in (1, 2) and not nav.can_stand(*place):
-                    yield place
+                point = (round(x + i * CELL, 4), round(z + j * CELL, 4))
+                if abs(i) + abs(j) in (1, 2) and not nav.can_stand(*point):
+                    yield point
 
 
-def _in_reach_of_a_door(world: World, places: Array) -> NDArray[np.bool_]:
+def _in_reach_of_a_door(world: World, points: Array) -> NDArray[np.bool_]:
     """Return at which points (n, 2) the agent would touch a door or drawer that opens wide."""
-    reached = np.zeros(len(places), dtype=bool)
+    reached = np.zeros(len(points), dtype=bool)
     for item in world.objects.values():
         if item.state.openness == 0 and (item.type.hinged or item.type.slides):
             for leaf in _leaves(item):
-                reached |= level_gaps(places, *leaf) < _RADIUS
+                reached |= level_gaps(points, *leaf) < _RADIUS
     return reached
 
 
@@ -59,14 +59,14 @@ def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
             yield leaf
 
 
-def _clear(world: World, places: Array) -> NDArray[np.bool_]:
+def _clear(world: World, points: Array) -> NDArray[np.bool_]:
     """Return at which points (n, 2) the agent's capsule touches neither object nor wall."""
     low, high = np.array(world.scene_bounds())[:, [0, 2]]
     floor = world.standing_height - AGENT_HEIGHT
-    clear = np.minimum(places - low, high - places).min(axis=1, initial=np.inf) >= _RADIUS
+    clear = np.minimum(points - low, high - points).min(axis=1, initial=np.inf) >= _RADIUS
     for item in world.objects.values():
         bottom, top = item.bounds()
         in_height = top[1] > floor + _KNEE and bottom[1] < floor + 2 * AGENT_HEIGHT
         if in_height and item.object_type != "Floor":
-            clear &= level_gaps(places, bottom, top) >= _RADIUS
+            clear &= level_gaps(points, bottom, top) >= _RADIUS
     return np.asarray(clear)

@@ -256,13 +256,13 @@ def _scatter(world: World, plan: RoomPlan) -> None:
         for home, stock in order:
             if len(home.contents) >= stock:
                 continue
-            place = find_place(world, item, home, random=plan.random)
-            if place is None:
+            tried = find_place(world, item, home, random=plan.random)
+            if tried is None:
                 continue
-            # A new object at the place, as its id names its position. Two at the same rounded one
+            # A new object at that place, as its id names its position. Two at the same rounded one
             # would share an id.
             placed = default_object(
-                object_type, np.round(place.position, 4), float(place.rotation[1])
+                object_type, np.round(tried.position, 4), float(tried.rotation[1])
             )
             placed.style = item.style
             if placed.object_id not in world.objects:

@@ -49,10 +49,10 @@ def racket(b: Builder) -> None:
     b.coin(flat, at(0.44), at(0.56, 1.0, 0.75), frame)
     b.coin(flat, at(0.44), at(0.48, 0.86, 0.8), (0.9, 0.9, 0.8))
     for index in range(5):
-        place = (index - 2) / 3
-        reach = math.sqrt(1 - place * place)
-        b.box(at(0.44 + 0.48 * place), at(0.008, 0.86 * reach, 0.86), _STRING)
-        b.box(at(0.44, 0.86 * place), at(0.48 * reach, 0.02, 0.86), _STRING)
+        offset = (index - 2) / 3
+        reach = math.sqrt(1 - offset * offset)
+        b.box(at(0.44 + 0.48 * offset), at(0.008, 0.86 * reach, 0.86), _STRING)
+        b.box(at(0.44, 0.86 * offset), at(0.48 * reach, 0.02, 0.86), _STRING)
     b.box(at(-0.2), at(0.12, 0.13, 0.6), frame)
     b.box(at(-0.66), at(0.34, 0.15, 0.9), BLACK, Material.FABRIC)
 
