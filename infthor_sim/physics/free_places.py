@@ -103,23 +103,18 @@ def find_place(
         among_fixed: in a recording, allow places within lamps, appliances and taps: their boxes are
             too large.
     """
-    boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
     ghost = item.duplicate(item.object_id)
+    neighbours = [o.bounds() for o in _neighbours(world, item, receptacle)]
     for surface in _sort_by_reach(world, surfaces(receptacle)):
-        if world.coarse:
-            fixed = (
-                [] if among_fixed else [o.bounds() for o in _fixed_on(world, receptacle, surface)]
-            )
-            # recorded boxes are too large to be taken for solid
-            obstacles = _Obstacles([*boxes, *fixed], [], [])
+        if world.coarse:  # recorded boxes are too large to be taken for solid
+            fixed = [] if among_fixed else _fixed_on(world, receptacle, surface)
+            obstacles = _Obstacles([*neighbours, *(o.bounds() for o in fixed)], [], [])
         else:
-            fixed = list(_solid_boxes(world, item, receptacle, surface))
-            walls = [
-                wall
-                for outer in (receptacle, *world.ancestors(receptacle))
-                for wall in _inner_walls(outer)
-            ]
-            obstacles = _Obstacles(boxes, fixed, walls)
+            solid = list(_solid_boxes(world, item, receptacle, surface))
+            walls = list(_inner_walls(receptacle))
+            for outer in world.ancestors(receptacle):
+                walls += _inner_walls(outer)
+            obstacles = _Obstacles(neighbours, solid, walls)
         for turn in (0.0, 90.0):
             ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
             around = (

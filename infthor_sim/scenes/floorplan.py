@@ -57,18 +57,8 @@ def build_floor_plan(
     objects = use_trajectory_ids(objects, extra.objects, nav, floor)
     room = _room(name, list(objects.values()), cells, floor)
     height = floor + AGENT_HEIGHT if extra.floor_y is None else extra.floor_y
-    start = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
-    yaw = nav.freest_yaw(*start, reach=3.0)
-    x, z, yaw = _STARTS.get(name, (*start, yaw))
-    world = World(
-        name,
-        objects,
-        (room,),
-        nav,
-        Agent(np.array([x, height, z]), yaw),
-        seed=_number(name),
-        coarse=True,
-    )
+    agent = _agent_at_start(name, nav, room, height)
+    world = World(name, objects, (room,), nav, agent, seed=_number(name), coarse=True)
     world.open_at_start = frozenset(o.object_id for o in objects.values() if o.state.openness > 0)
     infer_layout(world)
     for item in objects.values():
@@ -79,6 +69,13 @@ def build_floor_plan(
     add_door_cells(world)
     world.keep_templates()
     return world
+
+
+def _agent_at_start(name: str, nav: NavGrid, room: RoomShell, height: float) -> Agent:
+    """Return the agent as AI2-THOR starts it, or in the room's middle towards the most floor."""
+    middle = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
+    x, z, yaw = _STARTS.get(name, (*middle, nav.freest_yaw(*middle, reach=3.0)))
+    return Agent(np.array([x, height, z]), yaw)
 
 
 def _assign_recorded_parents(world: World, entries: Sequence[Mapping[str, Any]]) -> None:

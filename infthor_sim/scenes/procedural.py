@@ -115,24 +115,16 @@ def _house_plans(
     door_z = -round(south * 0.72, 2)
     upper_z = round(gap + 1.0, 2)
     openings = {
-        "living-room": (
-            ("z+", door_x - _DOOR, door_x + _DOOR),
-            ("x+", door_z - _DOOR, door_z + _DOOR),
-        ),
-        "bedroom": (("x-", door_z - _DOOR, door_z + _DOOR),),
-        "kitchen": (
-            ("z-", door_x - _DOOR, door_x + _DOOR),
-            ("x+", upper_z - _DOOR, upper_z + _DOOR),
-        ),
-        "bathroom": (("x-", upper_z - _DOOR, upper_z + _DOOR),),
+        "living-room": (_opening("z+", door_x), _opening("x+", door_z)),
+        "bedroom": (_opening("x-", door_z),),
+        "kitchen": (_opening("z-", door_x), _opening("x+", upper_z)),
+        "bathroom": (_opening("x-", upper_z),),
     }
     plans: list[RoomPlan] = []
-    for room_type, (x0, x1, z0, z1) in spans.items():
+    for room_type, span in spans.items():
         style = seed + len(plans)
         doorways = openings[room_type]
-        room = RoomShell(
-            x0, x1, z0, z1, floor_style=_FLOORS[room_type], style=style, openings=doorways
-        )
+        room = RoomShell(*span, floor_style=_FLOORS[room_type], style=style, openings=doorways)
         plan = RoomPlan(room, random)
         plan.keep_doors_free()
         _furnish(plan, room_type)
@@ -141,6 +133,11 @@ def _house_plans(
     doors += _doorway_cells(door_z, gap / 2, False)
     doors += _doorway_cells(upper_z, gap / 2, False)
     return plans, doors
+
+
+def _opening(side: str, middle: float) -> tuple[str, float, float]:
+    """Return a doorway as `RoomShell.openings` has it: its wall, and from and to along that."""
+    return side, middle - _DOOR, middle + _DOOR
 
 
 def _doorway_cells(at: float, across: float, along_x: bool) -> list[tuple[float, float]]:
