@@ -203,24 +203,23 @@ def test_a_gripper_at_the_lower_edge_holds_what_is_held(scene, object_type):
     bench = Bench(size=150)
     bench.reset(scene, renderInstanceSegmentation=True)
 
-    def shown(name: str) -> np.ndarray:
+    def mask(name: str) -> np.ndarray:
         pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(150, 150, 4)[
             ::-1, :, :3
         ]
         color = instance_color(name) if "|" in name else class_color(name)
         return (pixels == color).all(axis=2)
 
-    assert not shown(HAND).any()
+    assert not mask(HAND).any()
     held = bench.first(object_type)
     bench.ok("PickupObject", objectId=held, forceAction=True)
-    hand, thing = shown(HAND), shown(held)
+    hand = mask(HAND)
+    load = mask(held)
     assert 0.001 < hand.mean() < 0.02
     assert hand[-1].any(), "it comes from the lower edge"
-    columns, held_columns = np.nonzero(hand)[1], np.nonzero(thing)[1]
+    columns, held_columns = np.nonzero(hand)[1], np.nonzero(load)[1]
     assert columns.min() - 3 <= held_columns.mean() <= columns.max() + 3
-    assert np.nonzero(thing)[0].min() < np.nonzero(hand)[0].min(), (
-        "what is held stands out above it"
-    )
+    assert np.nonzero(load)[0].min() < np.nonzero(hand)[0].min(), "what is held stands out above it"
     assert HAND in {entry["name"] for entry in bench.metadata["colors"]}
 
 
@@ -240,9 +239,9 @@ def test_what_the_hand_holds_hides_little_of_the_room(scene, object_type):
         pixels = np.frombuffer(bench.frames[FieldType.IDS], dtype=np.uint8).reshape(150, 150, 4)[
             ::-1, :, :3
         ]
-        shown = (pixels == instance_color(held)).all(axis=2)
-        assert 0.005 < shown.mean() < 0.1
-        assert not shown[:75].any(), "it stays in the lower half"
+        mask = (pixels == instance_color(held)).all(axis=2)
+        assert 0.005 < mask.mean() < 0.1
+        assert not mask[:75].any(), "it stays in the lower half"
     assert bench.object(held)["position"] != before, (
         "the metadata tells where the hand is, not where it is drawn"
     )

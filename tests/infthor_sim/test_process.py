@@ -54,10 +54,10 @@ def test_garbage_instead_of_an_action(pipes):
             actions.write(struct.pack("!BI", 2, 3) + b"{]}" + struct.pack("!BI", 255, 0))
         while states.read(65536):
             pass
-    _, said = process.communicate(timeout=PATIENCE_S)
+    _, printed = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
-    assert "not JSON" in said
-    assert "Traceback" not in said
+    assert "not JSON" in printed
+    assert "Traceback" not in printed
 
 
 def test_it_goes_when_the_controller_hangs_up(pipes):
