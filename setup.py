@@ -8,13 +8,7 @@ from setuptools import find_packages, setup
 
 setup(
     packages=[
-        *find_packages(
-            include=[
-                pattern
-                for package in ("infthor_eval", "infthor_sim", "model_adapters")
-                for pattern in (package, f"{package}.*")
-            ]
-        ),
+        *find_packages(include=["infthor_eval*", "infthor_sim*", "model_adapters*"]),
         "infthor_eval.tasks",
         "infthor_eval.results",
     ],

@@ -13,7 +13,7 @@ from infthor_sim import Controller, player_command
 from infthor_sim.errors import SimulatorError
 
 from ..docs.blocks import ROOT, blocks_of
-from ..waiting import PATIENCE_S
+from ..waiting import PATIENCE_S, wait_until
 from .conftest import need_data
 
 EXAMPLES = [
@@ -65,6 +65,12 @@ def test_it_needs_no_display_and_leaves_nothing_behind(monkeypatch, tmp_path):
     assert not alive(controller)
     assert [path.name for path in tmp_path.rglob("*")] == ["temporary"]
     controller.stop()  # once more does nothing
+
+
+def test_its_process_ends_with_python(tmp_path):
+    code = "from infthor_sim import Controller; print(Controller(scene='bathroom-1').unity_pid)"
+    status = Path(f"/proc/{int(python('-c', code, cwd=tmp_path).stdout)}/status")
+    wait_until(lambda: not status.exists() or "(zombie)" in status.read_text())
 
 
 @pytest.mark.parametrize(
