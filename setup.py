@@ -8,16 +8,16 @@ from setuptools import find_packages, setup
 
 setup(
     packages=[
-        *find_packages(
-            include=["infthor_eval", "infthor_eval.*", "model_adapters", "model_adapters.*"]
-        ),
+        *find_packages(include=["infthor_eval*", "infthor_sim*", "model_adapters*"]),
         "infthor_eval.tasks",
         "infthor_eval.results",
     ],
     package_dir={"infthor_eval.tasks": "tasks", "infthor_eval.results": "results"},
     package_data={
         "infthor_eval": ["models/**/*", "sets/**/*"],
+        "infthor_sim": ["README.md"],
         "infthor_eval.plans": ["*.yaml"],
+        "infthor_eval.plans.published": ["*.yaml"],
         "infthor_eval.household": ["*.yaml"],
         "infthor_eval.nieh": ["*.yaml"],
         "infthor_eval.report": ["*.html", "web/*.html", "web/*.css", "web/*.js", "live/live.*"],

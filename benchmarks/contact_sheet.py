@@ -13,13 +13,12 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from infthor_sim.actions import bind
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import euler_matrix
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
 from infthor_sim.pictures.views import Display
 from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.lighting import Lights
-from infthor_sim.render.picture import cast_picture, choose_rasterizer, colour_picture
+from infthor_sim.render.picture import cast_picture, colour_picture, compiled_rasterizer
 from infthor_sim.render.primitives import Form, Material, ShapePart, rows
 from infthor_sim.render.shapes import shape
 from infthor_sim.scenes.catalogue import Catalogue
@@ -96,7 +95,7 @@ def close_up(object_type: str) -> Image.Image:
     )
     view = euler_matrix((34.0, 205.0, 0.0))
     camera = PinholeCamera(item.center - view[:, 2] * reach * 2.5, view, 28.0, _NEAR, _NEAR)
-    rasterizer = choose_rasterizer()
+    rasterizer = compiled_rasterizer()
     seen = cast_picture(prims, ("ground", object_type), camera, rasterizer)
     return Image.fromarray(
         np.ascontiguousarray(colour_picture(seen, Lights.none(), rasterizer)[::-1])

@@ -255,7 +255,7 @@ class Room:
 def open_one(world: Any, item: Any, openness: float) -> None:
     """Open or close an object as its action does, whatever stands in the way."""
     from infthor_sim.physics.receptacles import drawer_offset
-    from infthor_sim.physics.unfolding import unfold
+    from infthor_sim.physics.solids import unfold
 
     before = drawer_offset(item)
     unfold(item, openness)

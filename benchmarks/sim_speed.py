@@ -99,7 +99,7 @@ def measure(scene: str, steps: int) -> dict[str, Any]:
     result: dict[str, Any] = {"scene": scene, "steps": steps}
     for name, init in (("rgb", {}), ("rgb_ids_depth", _FULL)):
         start = time.perf_counter()
-        client = controller(f"{python} -m infthor_sim", scene, **init)
+        client = controller(f"{python} -m infthor_sim.player", scene, **init)
         result[f"{name}_seconds_to_first_frame"] = round(time.perf_counter() - start, 2)
         result["objects"] = len(client.last_event.metadata["objects"])
         result[f"{name}_megabytes_at_start"] = round(memory(client), 1)
@@ -137,7 +137,7 @@ def compare(scene: str, steps: int, other: str) -> dict[str, Any]:
             ("ours_low", here, {"quality": "Low"}),
         ):
             os.environ["PYTHONPATH"] = root
-            clients[name] = controller(f"{python} -m infthor_sim", scene, **init, **more)
+            clients[name] = controller(f"{python} -m infthor_sim.player", scene, **init, **more)
         before = {name: processor_time(client) for name, client in clients.items()}
         rates = [
             {name: rate(client, steps // 8) for name, client in clients.items()} for _ in range(8)

@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-SOURCES = ("infthor_eval", "model_adapters", "tasks", "results/published")
+SOURCES = ("infthor_eval", "infthor_sim", "model_adapters", "tasks", "results/published")
 FILES = ("results/README.md", "README.md", "LICENSE", "pyproject.toml", "setup.py")
 QUIETLY = ("--quiet", "--disable-pip-version-check", "--no-index", "--no-deps")
 

@@ -47,8 +47,7 @@ def slice_object(world: World, target: SimObject) -> list[SimObject]:
 
 
 def _slicing_axis(world: World, target: SimObject) -> int:
-    """Return the level axis of the object that lies most across the agent's view, so that no slice
-    hides the next."""
+    """Return the level axis most across the agent's view, so that no slice hides the next."""
     across = target.matrix.T @ world.agent.camera_matrix()[:, 0]
     return 0 if abs(across[0]) >= abs(across[2]) else 2
 

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Array", "aabb_gap", "aabb_overlap", "convex_hull", "corners", "cross", "euler_matrix",
-    "level_gaps",
-    "matrix_euler", "object_id", "round_vector", "round_xyz", "to_array", "to_xyz", "wrap_degrees",
-    "yaw_matrix",
+    "Array", "aabb_gap", "aabb_overlap", "axis_angle", "axis_rotation", "convex_hull", "corners",
+    "cross", "euler_matrix", "level_gaps", "matrix_euler", "object_id", "round_vector", "round_xyz",
+    "to_array", "to_xyz", "wrap_degrees", "yaw_matrix",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -34,9 +33,8 @@ _CORNERS = np.array(  # of a box, in the order of AI2-THOR's `cornerPoints`
 
 
 def euler_matrix(rotation: Sequence[float] | Array) -> Array:
-    """Return the rotation matrix (3, 3) of Unity's Euler angles (x, y, z) in degrees: first z, then
-    x, then y."""
-    x, y, z = (math.radians(float(a)) for a in rotation)
+    """Return the matrix (3, 3) of Unity's Euler angles (x, y, z) in degrees: z first, then x, y."""
+    x, y, z = map(math.radians, rotation)
     cx = math.cos(x)
     sx = math.sin(x)
     cy = math.cos(y)
@@ -53,14 +51,12 @@ def euler_matrix(rotation: Sequence[float] | Array) -> Array:
 
 
 def yaw_matrix(yaw: float) -> Array:
-    """Return the rotation matrix (3, 3) about the vertical by `yaw` degrees; 0 looks along +z, 90
-    along +x."""
+    """Return the matrix (3, 3) of a turn about the vertical, degrees; 0: along +z, 90: along +x."""
     return euler_matrix((0.0, yaw, 0.0))
 
 
 def matrix_euler(matrix: Array) -> Array:
-    """Return Unity's Euler angles (3,) of a rotation matrix, degrees within 0 to 360; straight up
-    or down, z is 0."""
+    """Return Unity's Euler angles (3,) of a matrix, degrees in [0, 360); straight up, z is 0."""
     x = math.asin(min(max(-float(matrix[1, 2]), -1.0), 1.0))  # clamped, as rounding may exceed 1
     if abs(math.cos(x)) < _VERTICAL:
         y = math.atan2(-matrix[2, 0], matrix[0, 0])
@@ -72,33 +68,52 @@ def matrix_euler(matrix: Array) -> Array:
     return angles
 
 
+def axis_angle(turn: Array) -> tuple[Array, float]:
+    """Return the unit axis (3,) and angle, 0 to 180 degrees, of a rotation (3, 3); of none, x."""
+    # The skew part is the axis times twice the sine. Near half a turn the sine vanishes and the
+    # symmetric part, whose columns lie along the axis, gives it.
+    skew = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    sine, cosine = float(np.linalg.norm(skew)), float(np.trace(turn)) - 1.0
+    if sine > 1e-6:
+        return skew / sine, math.degrees(math.atan2(sine, cosine))
+    if cosine > 0:
+        return np.array([1.0, 0.0, 0.0]), 0.0
+    columns = turn + np.eye(3)
+    column = columns[:, int(np.argmax(np.diag(columns)))]
+    return column / np.linalg.norm(column), 180.0
+
+
+def axis_rotation(axis: Array, degrees: float) -> Array:
+    """Return the rotation (3, 3) about a unit axis (3,), by Rodrigues' formula."""
+    angle = math.radians(degrees)
+    skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    matrix: Array = np.eye(3) + math.sin(angle) * skew + (1.0 - math.cos(angle)) * skew @ skew
+    return matrix
+
+
 def wrap_degrees(angle: float) -> float:
     """Return an angle in degrees as the same angle within -180 to 180."""
     return (angle + 180.0) % 360.0 - 180.0
 
 
 def corners(center: Array, size: Array, rotation: Array | None = None) -> Array:
-    """Return the 8 corners (8, 3) of a box, bottom four first, in AI2-THOR's order; `rotation` is a
-    matrix."""
+    """Return a box's corners (8, 3), bottom ones first, in AI2-THOR's order; `rotation` (3, 3)."""
     offsets = _CORNERS * (np.asarray(size) * 0.5)
     return center + (offsets if rotation is None else offsets @ rotation.T)
 
 
 def cross(first: Array, second: Array) -> Array:
-    """Return cross products (n, 3) of vectors (n, 3); for few of them much faster than numpy's
-    own."""
+    """Return cross products (n, 3) of vectors (n, 3); for few, much faster than numpy's own."""
     (ax, ay, az) = first.T
     (bx, by, bz) = second.T
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def convex_hull(points: Array) -> list[Array]:
-    """Return the corners of the convex hull of points (n, 2), in order around it; none lies between
-    two others."""
+    """Return the hull's corners of points (n, 2), in order; none is between two others."""
     # Andrew's monotone chain. Rounding merges corners of upright boxes, which coincide from above.
-    ordered = [
-        np.array(p) for p in sorted({(float(p[0]), float(p[1])) for p in np.round(points, 6)})
-    ]
+    distinct = {(x, z) for x, z in np.round(points, 6).tolist()}
+    ordered = [np.array(point) for point in sorted(distinct)]
     return _half_hull(ordered)[:-1] + _half_hull(ordered[::-1])[:-1]
 
 
@@ -133,14 +148,12 @@ def round_vector(vector: Array, digits: int = 4) -> list[float]:
 
 
 def round_xyz(vector: Array) -> dict[str, float]:
-    """Return a position or angles (3,) as the metadata has them: `{"x", "y", "z"}` with 6
-    digits."""
+    """Return a position or angles (3,) as in the metadata: `{"x", "y", "z"}`, 6 digits."""
     return to_xyz(round_vector(vector, 6))
 
 
 def object_id(object_type: str, position: Sequence[float] | Array) -> str:
-    """Return AI2-THOR's id of an object that starts at `position`, e.g.
-    `Mug|-01.90|+00.94|+00.38`."""
+    """Return AI2-THOR's id of an object by its first position: `Mug|-01.90|+00.94|+00.38`."""
     return "|".join([object_type, *(_coordinate_text(float(v)) for v in position)])
 
 
@@ -166,8 +179,7 @@ def aabb_gap(point: Array, low: Array, high: Array) -> float:
 
 
 def level_gaps(points: Array, low: Array, high: Array) -> Array:
-    """Return horizontal metres from points (x, z), (n, 2) or (2,), to a box given by its corners
-    (3,)."""
+    """Return horizontal metres from (x, z), (n, 2) or (2,), to a box by its corners (3,)."""
     nearest = np.clip(points, low[[0, 2]], high[[0, 2]])
     gaps: Array = np.hypot(*(points - nearest).T)
     return gaps

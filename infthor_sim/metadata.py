@@ -54,8 +54,7 @@ class Outcome:
 
 
 def object_metadata(item: SimObject) -> dict[str, Any]:
-    """Return all fields of one object but those that depend on the agent: `visible`,
-    `isInteractable`, `distance`."""
+    """Return an object's fields but `visible`, `isInteractable`, `distance`, the agent's."""
     abilities = item.type
     state = item.state
     movable = abilities.pickupable or abilities.moveable
@@ -108,8 +107,7 @@ def object_metadata(item: SimObject) -> dict[str, Any]:
 
 
 def agent_metadata(sim: Simulation, outcome: Outcome) -> dict[str, Any]:
-    """Return the fields of the agent, of the scene and of the last action: all but `objects` and
-    `colors`."""
+    """Return fields of agent, scene and last action: all but `objects` and `colors`."""
     world = sim.world
     agent = sim.world.agent
     held = None if world.held is None else world.objects[world.held]
@@ -163,8 +161,7 @@ def third_party_metadata(index: int, camera: ThirdPartyCamera) -> dict[str, Any]
 
 
 def _hand_pose(world: World) -> dict[str, Any]:
-    """Return the hand's pose in the world and in the camera's frame; all zeros where nothing is
-    held.
+    """Return the hand's pose in the world and the camera's frame; zeros where nothing is held.
 
     AI2-THOR calls it the held object's, but it is the hand's: 0 in the camera's frame until the
     hand is turned, however the object lies in it.
@@ -185,8 +182,7 @@ def _hand_pose(world: World) -> dict[str, Any]:
 
 
 def _corners_with_lid(item: SimObject) -> Array:
-    """Return the 8 corners (8, 3) of an object's box, turned with it, which is higher by what its
-    open lid stands up.
+    """Return the corners (8, 3) of an object's turned box, made higher by its open lid.
 
     Only the metadata has the higher box: the lid's room is above the object's back and keeps
     nothing from its top.

@@ -4,11 +4,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from infthor_sim.geometry import Array, corners, euler_matrix
-from infthor_sim.object_types import ObjectType
+from infthor_sim.geometry import Array, corners, euler_matrix, object_id
+from infthor_sim.object_types import ObjectType, type_named
 from infthor_sim.physics.footprints import Rect
 
-__all__ = ["DOOR_SWING", "DRAWER_SLIDE", "WALL", "SimObject", "SimObjectState"]
+__all__ = [
+    "DOOR_SWING",
+    "DRAWER_SLIDE",
+    "WALL",
+    "SimObject",
+    "SimObjectState",
+    "default_object",
+    "style_of",
+]
 
 DOOR_SWING = 85.0  # degrees that a door opens
 DRAWER_SLIDE = 0.8  # share of its depth that a drawer comes out
@@ -17,8 +25,7 @@ WALL = 0.02  # thickness in metres of the sides and floors of hollow things
 
 @dataclass
 class SimObjectState:
-    """What actions change about an object, besides its pose; the names follow AI2-THOR's
-    metadata."""
+    """What actions change about an object but its pose; names are as in AI2-THOR's metadata."""
 
     openness: float = 0.0
     toggled: bool = False
@@ -124,8 +131,7 @@ class SimObject:
 
     @property
     def floors(self) -> tuple[float, ...]:
-        """Heights in metres above the underside of its box at which contents stand inside it,
-        lowest first.
+        """Heights above its box's underside at which contents stand in it, metres, lowest first.
 
         Placement and drawing both take them from here. Empty if nothing stands inside.
         """
@@ -137,8 +143,7 @@ class SimObject:
         return ()
 
     def place_bottom(self, point: Array) -> None:
-        """Move the object so that the middle of the underside of its box is at `point` (world,
-        metres)."""
+        """Move the object: the middle of its box's underside to `point` (world, metres)."""
         low, high = self.bounds()
         middle = (low + high) / 2
         self.position = self.position + np.array(
@@ -146,8 +151,7 @@ class SimObject:
         )
 
     def duplicate(self, object_id: str) -> "SimObject":
-        """Return a copy of this object with a state of its own, another id, and neither parent nor
-        contents."""
+        """Return a copy with its own state, another id, and neither parent nor contents."""
         return replace(
             self,
             object_id=object_id,
@@ -157,3 +161,29 @@ class SimObject:
             contents=[],
             parent=None,
         )
+
+
+def style_of(name: str) -> int:
+    """Return a number that varies colours; always the same for the same name."""
+    return sum(ord(letter) * (index + 1) for index, letter in enumerate(name))
+
+
+def default_object(
+    object_type: str, position: Array, yaw: float = 0.0, size: Array | None = None
+) -> SimObject:
+    """Return an object of its type's usual size, or of another."""
+    declared = type_named(object_type)
+    box = np.array(declared.size if size is None else size, dtype=float)
+    new_id = object_id(object_type, position)
+    return SimObject(
+        object_id=new_id,
+        name=f"{object_type}_{style_of(new_id):08x}",
+        type=declared,
+        position=np.asarray(position, dtype=float).copy(),
+        rotation=np.array([0.0, yaw % 360.0, 0.0]),
+        box_center=np.zeros(3) if declared.centered else np.array([0.0, box[1] / 2, 0.0]),
+        box_size=box,
+        support=declared.support_height(float(box[1])),
+        style=style_of(new_id),
+        state=SimObjectState(openness=1.0 if declared.starts_open else 0.0),
+    )

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from infthor_eval.formats.object_ids import modern_type
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import Array, object_id
-from infthor_sim.object_types import ObjectType, allowed_in, type_named
-from infthor_sim.objects import SimObject
+from infthor_sim.object_types import ObjectType, allowed_in, modern_type, type_named
+from infthor_sim.objects import SimObject, default_object
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import find_parent
 from infthor_sim.world import World
@@ -36,8 +34,7 @@ class NamedPose:
 
 
 def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = False) -> None:
-    """Give the named objects new poses, and new ids made of the poses; loose objects that are not
-    named vanish.
+    """Give the named objects new poses, and ids by them; loose objects that are not named vanish.
 
     A name that the scene does not have means any object of its type: the part of a name after the
     type differs between versions of AI2-THOR.
@@ -67,8 +64,7 @@ def set_poses(world: World, poses: Iterable[NamedPose], keep_moveable: bool = Fa
 
 
 def _lower_supports(world: World) -> None:
-    """Lower surfaces that the placed objects would be sunk in: their poses are more exact than
-    recorded boxes."""
+    """Lower surfaces that placed objects would sink into: poses are exacter than boxes."""
     for item in world.objects.values():
         if not _has_surface(item.type):
             continue
@@ -117,8 +113,7 @@ class _Templates:
         self._count: dict[str, int] = defaultdict(int)
 
     def choose(self, name: str) -> SimObject | None:
-        """Return the object that a name means; the same for the same name, and in turn for
-        different ones."""
+        """Return the object that a name means: always the same; for other names, others in turn."""
         if name in self._named:
             return self._named[name]
         if name not in self._chosen:
@@ -153,7 +148,7 @@ def spawn_randomly(
     """Put every loose object into or onto a random receptacle that takes its type and has room.
 
     Args:
-        world: the scene, changed in place.
+        world: the scene, changed in placed.
         random: random numbers that choose the order of the objects and their receptacles.
         excluded_types: types of receptacles that get nothing.
         kept: ids of objects that stay where they are.
@@ -172,8 +167,8 @@ def spawn_randomly(
             and o.object_type not in excluded_types and not (in_open_only and o.type.encloses)
         ]  # fmt: skip
         for home_index in random.permutation(len(homes)):
-            place = find_place(world, item, homes[home_index])
-            if place is not None:
-                world.set_pose(item, place.position, place.rotation)
+            placed = find_place(world, item, homes[home_index])
+            if placed is not None:
+                world.set_pose(item, placed.position, placed.rotation)
                 world.attach(item, homes[home_index])
                 break

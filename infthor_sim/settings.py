@@ -14,8 +14,7 @@ SMOOTH_LEVELS = frozenset(SMOOTH_QUALITIES.values())
 
 @dataclass(frozen=True)
 class SimulatorSettings:
-    """Settings of the agent and of the pictures, with AI2-THOR 5's defaults; metres, degrees,
-    kilograms.
+    """Settings of agent and pictures, AI2-THOR 5's defaults; metres, degrees, kilograms.
 
     Attributes:
         agent_mode: one of `AGENT_MODES`.

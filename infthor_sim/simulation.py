@@ -1,5 +1,4 @@
-"""The state of a running simulator: its scene, settings, cameras, random numbers and saved
-states."""
+"""A running simulator's state: scene, settings, cameras, random numbers, saved states."""
 
 import copy
 from dataclasses import dataclass, field
@@ -65,13 +64,11 @@ class Simulation:
         equip(self.world, settings.agent_mode)
 
     def save(self, slot: int) -> None:
-        """Keep a copy of the scene's state and of the random numbers; replaces what the slot
-        held."""
+        """Keep a copy of the scene's state and random numbers, in place of what the slot held."""
         self._saved[slot] = copy.deepcopy((self.world, self.random))
 
     def restore(self, slot: int) -> bool:
-        """Bring back the state that a slot keeps, which stays kept; return False if it has none of
-        this scene."""
+        """Bring back a slot's state, which stays kept; return False if none is of this scene."""
         if slot not in self._saved:
             return False
         world, self.random = copy.deepcopy(self._saved[slot])

@@ -16,9 +16,8 @@ from infthor_sim.pictures.appearance import Appearance
 __all__ = ["FLOOR_STYLES", "RoomShell", "Wall", "World"]
 
 FLOOR_STYLES = ("wood", "tiles", "carpet")
-_HAND = Grip(
-    np.array([0.0, -0.16, 0.38]), np.eye(3)
-)  # where AI2-THOR has its agent's hand, in the camera's frame
+# where AI2-THOR has its agent's hand, in the camera's frame
+_HAND = Grip(np.array([0.0, -0.16, 0.38]), np.eye(3))
 
 
 @dataclass(frozen=True)
@@ -251,8 +250,7 @@ class World:
         self.mark_changed(item)
 
     def move_hand(self, hand: Grip) -> None:
-        """Move the hand to a pose in the camera's frame; what it holds moves and turns as it
-        does."""
+        """Move the hand to a pose in the camera's frame, with what it holds."""
         assert self.held is not None
         item = self.objects[self.held]
         camera = self.agent.camera_matrix()
@@ -285,8 +283,7 @@ class World:
         self.mark_changed(item)
 
     def keep_templates(self) -> None:
-        """Keep copies of the loose objects, for SetObjectPoses with names of objects that were
-        removed meanwhile."""
+        """Keep copies of loose objects, for SetObjectPoses after they are removed."""
         self.templates = {}
         for item in self.objects.values():
             if item.type.pickupable:

@@ -62,7 +62,8 @@ def test_all_data_of_the_packages_is_in_it(wheel):
 
 def test_what_runs_is_the_installed_code(installed, tmp_path):
     code = (
-        "import infthor_eval, model_adapters as other; print(infthor_eval.__file__, other.__file__)"
+        "import infthor_eval, infthor_sim, model_adapters as other\n"
+        "print(infthor_eval.__file__, infthor_sim.__file__, other.__file__)"
     )
     env = {**os.environ, "PYTHONPATH": str(installed)}
     found = subprocess.check_output(
@@ -87,6 +88,13 @@ def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {
         "results"
     }  # the first: $XDG_CACHE_HOME
+
+
+def test_the_simulator_runs_by_itself(installed, tmp_path):
+    code = "from infthor_sim import Controller\nwith Controller(): print('started')"
+    env = {**os.environ, "PYTHONPATH": str(installed), "HOME": str(tmp_path)}
+    printed = subprocess.check_output([sys.executable, "-c", code], cwd=tmp_path, env=env)
+    assert printed == b"started\n"
 
 
 def test_plans_and_scenes_run_too(command, tmp_path):

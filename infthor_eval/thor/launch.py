@@ -2,11 +2,11 @@
 ai2thor downloads."""
 
 import shlex
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from infthor_eval.storage.limits import ACTION_SECONDS, UNITY_ACTION_SECONDS
+from infthor_sim.launch import player_command
 
 __all__ = ["Launch", "embedded_launch", "unity_launch"]
 
@@ -35,11 +35,11 @@ class Launch:
 def embedded_launch(
     data: Path | None = None, supplement: Path | None = None, *, start_timeout: float = 300.0
 ) -> Launch:
-    """Return the launch of the simulator in this package.
+    """Return the launch of the embedded simulator.
 
     Args:
         data: folder of recorded floor plans; without it there are only procedural scenes.
-        supplement: file with additions to the floor plans from trajectories (see `supplement`).
+        supplement: file with additions to them from trajectories (see `thor.supplement`).
         start_timeout: time limit of the first message, seconds. The first start of an installation
             compiles the renderer, which takes ten seconds of a processor. Several at once on a busy
             machine take minutes, and one that is stopped in the middle would have to restart from
@@ -48,13 +48,8 @@ def embedded_launch(
     Raises:
         UsageError: the time limit of an action, `limits.ACTION_SECONDS`, is set to no number.
     """
-    words = [sys.executable, "-m", "infthor_sim.player"]
-    if data is not None:
-        words += ["--data", str(Path(data).resolve())]
-    if supplement is not None:
-        words += ["--supplement", str(Path(supplement).resolve())]
     return Launch(
-        shlex.join(words),
+        player_command(data, supplement),
         "embedded",
         timeout=ACTION_SECONDS.value,
         timeout_hint=ACTION_SECONDS.hint,

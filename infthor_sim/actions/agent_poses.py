@@ -23,8 +23,7 @@ def get_reachable_positions(
     directionsRelativeAgent: bool = False,
     gridSize: float | None = None,
 ) -> list[dict[str, float]]:
-    """Return positions that the agent can reach by steps of `gridSize` along the axes, or along its
-    own.
+    """Return positions that the agent can reach by steps of `gridSize`, along the axes or its own.
 
     Raises:
         ActionError: the grid is too fine, or there are more than `maxStepCount` positions per
@@ -52,8 +51,7 @@ def get_interactable_poses(
     maxDistance: float | None = None,
     maxPoses: int = 2**31 - 1,
 ) -> list[dict[str, Any]]:
-    """Return poses, as TeleportFull takes them, from which the agent sees an object within its
-    reach."""
+    """Return poses for TeleportFull from which the agent sees an object within its reach."""
     if maxPoses <= 0:
         raise ActionError("maxPoses must be greater than 0")
     item = sim.world.get(objectId)
@@ -73,8 +71,7 @@ def _seeing_poses(
     item: SimObject,
     poses: Iterable[tuple[Mapping[str, float], float, float, bool]],
 ) -> Iterator[dict[str, Any]]:
-    """Yield those of some poses (position, horizon, rotation, standing) from which the agent sees
-    an object."""
+    """Yield those poses (position, horizon, rotation, standing) from which an object is seen."""
     probe = sim.vision.probe(item)
     for position, tilt, turn, standing in poses:
         if sim.vision.sees_from(

@@ -10,8 +10,7 @@ import numpy as np
 from infthor_sim.actions.registry import action
 from infthor_sim.errors import ActionError
 from infthor_sim.geometry import Array
-from infthor_sim.pictures.appearance import Finish
-from infthor_sim.render.finishes import RANDOM_PATTERNS
+from infthor_sim.pictures.appearance import RANDOM_PATTERNS, Finish
 from infthor_sim.render.shell import SHELL_NAMES
 from infthor_sim.simulation import Simulation
 
@@ -19,12 +18,8 @@ from infthor_sim.simulation import Simulation
 _DARKEST = 0.45
 _BRIGHTEST = 1.55
 _ITHOR = re.compile(r"FloorPlan\d*(\d\d)|FloorPlan(\d)")
-_ROOMS = {
-    "0": "Kitchen",
-    "2": "LivingRoom",
-    "3": "Bedroom",
-    "4": "Bathroom",
-}  # by the hundreds of the floor plan
+# by the hundreds of the floor plan
+_ROOMS = {"0": "Kitchen", "2": "LivingRoom", "3": "Bedroom", "4": "Bathroom"}
 _PROCEDURAL = {
     "kitchen": "Kitchen",
     "living-room": "LivingRoom",
@@ -81,8 +76,7 @@ def randomize_lighting(
     hue: list[float] | None = None,
     saturation: list[float] | None = None,
 ) -> None:
-    """Draw the brightness of the daylight and its colour from ranges; there is one light, so none
-    to synchronize."""
+    """Draw brightness and colour of the daylight; there is one light, so none to synchronize."""
     if not randomizeColor and (hue is not None or saturation is not None):
         raise ActionError(
             "Cannot pass in randomizeColor=False while also providing hue or saturation."
@@ -141,8 +135,7 @@ def _material_sets(
 
 
 def _split(scene: str) -> str:
-    """Return AI2-THOR's split of a scene: of 30 rooms of a type, 20 to train, 5 to validate, 5 to
-    test."""
+    """Return AI2-THOR's split of a scene: of 30 rooms of a type 20 train, 5 val, 5 test."""
     ithor = _ITHOR.fullmatch(scene)
     if ithor is None:
         return (

@@ -77,8 +77,7 @@ def _reach(
     restricted: bool,
     return_to_start: bool,
 ) -> None:
-    """Move the wrist straight towards a point (3,) of the world; beyond its reach the arm is
-    stretched out towards it.
+    """Move the wrist straight to a point (3,) of the world; beyond its reach the arm is stretched.
 
     `requested` is that point as the message names it, and its space; `restricted` refuses points
     that are behind the shoulder or out of reach.
@@ -86,9 +85,9 @@ def _reach(
     base = arm.base(sim.world.agent)
     target = base.local(point)
     if restricted and not arm.rig.allows(target):
-        place, space = requested
+        position, space = requested
         raise ActionError(
-            f"Invalid target: Position '{position_text(place)}' in space '{space}' is behind "
+            f"Invalid target: Position '{position_text(position)}' in space '{space}' is behind "
             "shoulder."
         )
     start = arm.pose.wrist
@@ -170,8 +169,7 @@ def rotate_wrist_relative(
     returnToStart: bool = True,
     disableRendering: bool = True,
 ) -> None:
-    """Turn the wrist about its own axes, degrees, the shortest way; the stretch robot's about the
-    vertical alone."""
+    """Turn the wrist about its own axes, degrees, the shortest way; Stretch's: the vertical."""
     if sim.settings.agent_mode == "stretch" and (pitch or roll):
         raise ActionError("Pitch and roll are not supported for the stretch agent.")
     arm = agent_arm(sim)
@@ -220,8 +218,7 @@ def rotate_wrist_around_point(
 
 
 def _wrist_turn(pitch: float, yaw: float, roll: float) -> Array:
-    """Return the rotation (3, 3) of angles in degrees; Unity's roll is the reverse of its rotation
-    about z."""
+    """Return the rotation (3, 3) of angles in degrees; Unity's roll is about z, reversed."""
     return euler_matrix((pitch, yaw, -roll))
 
 
@@ -290,21 +287,24 @@ def pick_up_in_sphere(
     forceAction: bool = False,
     manualInteract: bool = False,
 ) -> None:
-    """Hold everything within the hand's sphere that can be picked up, or those candidates that
-    are."""
-    given = "objectId" if objectId is not None else "x, y" if x is not None or y is not None else ""
-    if given:
+    """Hold everything in the hand's sphere that can be picked up, or those candidates that are."""
+    foreign = ""
+    if objectId is not None:
+        foreign = "objectId"
+    elif x is not None or y is not None:
+        foreign = "x, y"
+    if foreign:
         raise ActionError(
-            f"You are passing in iTHOR PickupObject parameters ({given}) to the arm agent!"
+            f"You are passing in iTHOR PickupObject parameters ({foreign}) to the arm agent!"
         )
     arm = agent_arm(sim)
-    things = touched_objects(sim.world, arm).pickupable
+    objects = touched_objects(sim.world, arm).pickupable
     if objectIdCandidates is not None:
-        things = [o for o in things if o.object_id in objectIdCandidates]
-    if not things:
+        objects = [o for o in objects if o.object_id in objectIdCandidates]
+    if not objects:
         which = "(specified by objectId) " if objectIdCandidates is not None else ""
         raise ActionError(f"No objects {which}were valid to be picked up by the arm")
-    pick_up(sim.world, arm, things)
+    pick_up(sim.world, arm, objects)
 
 
 @action("ReleaseObject", modes=ARM_MODES)

@@ -1,5 +1,4 @@
-"""Moving the arm, or the agent with its arm, along a path; what stops it is reported in Unity's
-words."""
+"""Moving the arm, or the agent with its arm, along a path; what stops it, in Unity's words."""
 
 import math
 
@@ -18,8 +17,7 @@ Contact = tuple[int, str]  # index of a stance in a path, and id or name of what
 
 
 def agent_arm(sim: Simulation) -> Arm:
-    """Return the agent's arm; the actions that call this are only registered for modes that have
-    one."""
+    """Return the agent's arm; actions that call this are registered only for modes with one."""
     assert sim.world.arm is not None
     return sim.world.arm
 
@@ -68,8 +66,8 @@ def _collision_text(sim: Simulation, name: str, target: str) -> str:
             f"Collided with static structure in scene: '{name}', could not reach target: "
             f"'{target}'."
         )
-    shown = name if item is None else item.name
-    return f"Collided with static sim object: '{shown}', could not reach target: '{target}'."
+    label = name if item is None else item.name
+    return f"Collided with static sim object: '{label}', could not reach target: '{target}'."
 
 
 def position_text(point: Array) -> str:

@@ -1,6 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Actions of ManipulaTHOR scripts that control physics. Nothing moves between actions here, so most
-do nothing."""
+"""Physics actions of ManipulaTHOR scripts: most do nothing, as nothing moves between actions."""
 
 from infthor_sim.actions.registry import action
 from infthor_sim.errors import ActionError

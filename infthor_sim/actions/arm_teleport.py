@@ -6,10 +6,9 @@ import numpy as np
 
 from infthor_sim.actions.arm_motion import agent_arm, obstacles
 from infthor_sim.actions.registry import Vector3, action
-from infthor_sim.arm.rotations import rotation as axis_rotation
 from infthor_sim.arm.sweep import Stance, is_free, stance, take_stance
 from infthor_sim.errors import ActionError
-from infthor_sim.geometry import Array, to_array
+from infthor_sim.geometry import Array, axis_rotation, to_array
 from infthor_sim.simulation import Simulation
 
 

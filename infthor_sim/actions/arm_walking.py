@@ -1,6 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Walking and turning of the arm agents: in small steps, with their arm, until something is in the
-way."""
+"""Walking and turning of the arm agents, in small steps, until something is in the way."""
 
 from functools import partial
 
@@ -25,12 +24,8 @@ from infthor_sim.world import World
 
 _TURN_STEP = 1.15  # degrees: Unity turns by a radian a second, in frames of a fiftieth of a second
 _MAX_STEPS = 2000  # of one walk, 40 m; the collision check holds all stances of a path in memory
-_DIRECTIONS = {
-    "Ahead": (1.0, 0.0),
-    "Back": (-1.0, 0.0),
-    "Right": (0.0, 1.0),
-    "Left": (0.0, -1.0),
-}  # ahead, right
+# ahead, right
+_DIRECTIONS = {"Ahead": (1.0, 0.0), "Back": (-1.0, 0.0), "Right": (0.0, 1.0), "Left": (0.0, -1.0)}
 
 
 @action("MoveAgent", modes=ARM_MODES)
@@ -59,17 +54,16 @@ def move_agent(
     follow(sim, path, position_text(now.position + way), returnToStart, contact)
 
 
-def _body_contact(world: World, places: list[Array]) -> Contact | None:
-    """Return the first of some places at which the agent cannot be, and what is there; None if all
-    are free."""
-    # After a forced teleport the agent may be where it cannot stand. It may leave then: places
-    # count as blocked only once it has been at a free one, and the last place in any case.
+def _body_contact(world: World, positions: list[Array]) -> Contact | None:
+    """Return the first position at which the agent cannot be, and what is there; None: all free."""
+    # After a forced teleport the agent may be where it cannot stand. It may leave then: positions
+    # count as blocked only once it has been at a free one, and the last one in any case.
     was_free = world.nav.can_stand(world.agent.position[0], world.agent.position[2])
-    for step, place in enumerate(places):
-        obstacle = blocking_object(world, place)
-        is_free = obstacle is None and world.nav.can_stand(place[0], place[2])
-        if not is_free and (was_free or step == len(places) - 1):
-            return step, obstacle or nearest_name(world, place)
+    for step, position in enumerate(positions):
+        obstacle = blocking_object(world, position)
+        is_free = obstacle is None and world.nav.can_stand(position[0], position[2])
+        if not is_free and (was_free or step == len(positions) - 1):
+            return step, obstacle or nearest_name(world, position)
         was_free = was_free or is_free
     return None
 

@@ -58,8 +58,7 @@ def update_third_party_camera(
     orthographic: bool | None = None,
     orthographicSize: float | None = None,
 ) -> None:
-    """Move a third-party camera or change its lens; what is not given, even one component,
-    stays."""
+    """Move a third-party camera or change its lens; each component that is not passed stays."""
     if not 0 <= thirdPartyCameraId < len(sim.cameras):
         raise ActionError(f"There is no third party camera with id {thirdPartyCameraId}")
     old = sim.cameras[thirdPartyCameraId]
@@ -71,9 +70,9 @@ def update_third_party_camera(
     )
 
 
-def _update_vector(old: Array, given: Vector3 | None) -> Array:
+def _update_vector(old: Array, new: Vector3 | None) -> Array:
     return np.array(
-        [float((given or Vector3()).get(axis, was)) for axis, was in zip("xyz", old, strict=True)]
+        [float((new or Vector3()).get(axis, was)) for axis, was in zip("xyz", old, strict=True)]
     )
 
 

@@ -67,7 +67,7 @@ for _name, _direction in _DIRECTIONS.items():
     action(f"MoveHeldObject{_name}", f"MoveHand{_name}")(partial(_move_along, np.array(_direction)))
 
 
-@action("RotateHeldObject", forms=((), ("rotation",)))
+@action("RotateHeldObject", overloads=((), ("rotation",)))
 def rotate_held_object(
     sim: Simulation,
     pitch: float = 0.0,
@@ -75,8 +75,7 @@ def rotate_held_object(
     roll: float = 0.0,
     rotation: Vector3 | None = None,
 ) -> None:
-    """Turn the hand, with what it holds, by angles about the hand's own axes, or to a rotation
-    relative to the camera.
+    """Turn the hand, with what it holds, about its own axes, or to a rotation to the camera.
 
     The axes are the hand's and not the object's: an object that lies in the hand stays lying in it.
     """
@@ -90,8 +89,7 @@ def rotate_held_object(
 
 
 def _move_held(sim: Simulation, step: Array, force_visible: bool) -> None:
-    """Move the held object by `step` (right, up, ahead), unless it would leave reach or view, or go
-    into something."""
+    """Move the held object by `step` (right, up, ahead) if it stays in reach, in view and clear."""
     held = held_object(sim, "Agent can only move hand if holding an item")
     world = sim.world
     offset = world.agent.camera_matrix() @ step

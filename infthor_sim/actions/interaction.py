@@ -11,7 +11,7 @@ from infthor_sim.object_types import allowed_in
 from infthor_sim.objects import SimObject
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import drawer_offset
-from infthor_sim.physics.unfolding import unfold
+from infthor_sim.physics.solids import unfold
 from infthor_sim.simulation import Simulation
 
 # Overlaps of boxes that `forceAction` tolerates in a full receptacle of a recording, smallest
@@ -19,7 +19,7 @@ from infthor_sim.simulation import Simulation
 _CROWDED = (0.12, 0.24, 0.35)
 
 
-@action("PickupObject", forms=BY_ID_OR_PIXEL)
+@action("PickupObject", overloads=BY_ID_OR_PIXEL)
 def pick_up(
     sim: Simulation,
     objectId: str | None = None,
@@ -48,7 +48,7 @@ def pick_up(
     world.carry()
 
 
-@action("PutObject", forms=BY_ID_OR_PIXEL)
+@action("PutObject", overloads=BY_ID_OR_PIXEL)
 def put(
     sim: Simulation,
     objectId: str | None = None,
@@ -75,8 +75,7 @@ def put(
 def _find_place(
     sim: Simulation, held: SimObject, target: SimObject, force: bool
 ) -> SimObject | None:
-    """Return the held object at the best free place; a forced put squeezes in where it is
-    crowded."""
+    """Return the held object at the best free place; a forced put squeezes in where it is full."""
     # Best first: without overlap, clear of fixed things, in view. Recorded boxes of fixed things
     # are too large, so a place within one is better than none; Unity, which has the meshes, would
     # find room there.
@@ -109,7 +108,7 @@ def _check_receptacle(held: SimObject, target: SimObject) -> None:
         )
 
 
-@action("OpenObject", forms=BY_ID_OR_PIXEL)
+@action("OpenObject", overloads=BY_ID_OR_PIXEL)
 def open_object(
     sim: Simulation,
     objectId: str | None = None,

@@ -13,12 +13,8 @@ from infthor_sim.geometry import Array
 from infthor_sim.physics.obstacles import blocking_object, held_object_blocks, nearest_name
 from infthor_sim.simulation import Simulation
 
-_DIRECTIONS = {
-    "Ahead": 0.0,
-    "Back": 180.0,
-    "Left": -90.0,
-    "Right": 90.0,
-}  # degrees from the agent's own
+# degrees from the agent's own
+_DIRECTIONS = {"Ahead": 0.0, "Back": 180.0, "Left": -90.0, "Right": 90.0}
 
 
 def _move(
@@ -34,8 +30,7 @@ def _move(
     returnToStart: bool = True,
     disableRendering: bool = True,
 ) -> None:
-    """Walk, keeping within `maxAgentsDistance` metres of the object `objectId` if both are
-    given."""
+    """Walk, within `maxAgentsDistance` metres of the object `objectId` if both are passed."""
     size = sim.settings.grid_size if moveMagnitude is None else moveMagnitude
     if size <= 0:
         raise ActionError("moveMagnitude must be > 0")

@@ -1,6 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Putting objects anywhere, disabling and enabling them, and the points of a receptacle's
-surfaces."""
+"""Putting objects anywhere, disabling and enabling them, and points of receptacles' surfaces."""
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from infthor_sim.world import World
 _SPACING = 0.05  # metres between the points of a surface
 
 
-@action("TeleportObject", forms=(("position",), ("x", "y", "z"), ("positions",)))
+@action("TeleportObject", overloads=(("position",), ("x", "y", "z"), ("positions",)))
 def teleport_object(
     sim: Simulation,
     objectId: str,
@@ -80,8 +79,7 @@ def place_object_at_point(
 def get_spawn_coordinates(
     sim: Simulation, objectId: str, anywhere: bool = True
 ) -> list[dict[str, float]]:
-    """Return points on a receptacle's surfaces, all of them or those that the agent sees within its
-    reach."""
+    """Return points on a receptacle's surfaces: all, or those seen within the agent's reach."""
     receptacle = sim.world.get(objectId)
     if not receptacle.type.receptacle:
         raise ActionError(f"{objectId} is not a receptacle")
@@ -117,8 +115,7 @@ def enable_object(sim: Simulation, objectId: str) -> None:
 def _first_free(
     world: World, item: SimObject, positions: list[Vector3], turn: Array, force: bool
 ) -> SimObject:
-    """Return a copy of an object at the first of some positions with room; at the very first if
-    forced.
+    """Return a copy of an object at the first of some positions with room; if forced, at the first.
 
     Raises:
         ActionError: there is room at none.
@@ -155,7 +152,7 @@ def _set_pose(world: World, item: SimObject, pose: SimObject) -> None:
 def _surface_points(surface: Surface) -> Array:
     """Return a grid of points (n, 3) on a surface."""
     spans = [np.arange(-half + _SPACING / 2, half, _SPACING) for half in surface.half]
-    across, along = (axis.ravel() for axis in np.meshgrid(*spans, indexing="ij"))
-    flat = np.stack([across, np.zeros(len(across)), along], axis=1)
+    across, along = np.meshgrid(*spans, indexing="ij")
+    flat = np.stack([across.ravel(), np.zeros(across.size), along.ravel()], axis=1)
     points: Array = flat @ yaw_matrix(surface.yaw).T + surface.center
     return points

@@ -1,5 +1,4 @@
-"""Pushing and pulling loose things: each slides until friction stops it, something is in its way,
-or it falls."""
+"""Pushing and pulling: loose things slide until friction or something stops them, or they fall."""
 
 from functools import partial
 
@@ -31,10 +30,10 @@ def _push(
 
 
 for _name, _angle in (("PushObject", 0.0), ("PullObject", 180.0)):
-    action(_name, forms=BY_ID_OR_PIXEL)(partial(_push, _angle))
+    action(_name, overloads=BY_ID_OR_PIXEL)(partial(_push, _angle))
 
 
-@action("DirectionalPush", forms=BY_ID_OR_PIXEL)
+@action("DirectionalPush", overloads=BY_ID_OR_PIXEL)
 def directional_push(
     sim: Simulation,
     moveMagnitude: float,

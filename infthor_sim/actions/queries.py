@@ -1,5 +1,5 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Questions about the scene: what is at a pixel, outlines from above, the way to an object."""
+"""Questions about the scene (at a pixel, outlines, ways), and which objects replies list."""
 
 from typing import Any
 
@@ -14,8 +14,7 @@ from infthor_sim.simulation import Simulation
 
 @action("GetScenesInBuild", query=True)
 def get_scenes_in_build(sim: Simulation) -> list[str]:
-    """Return no names: an empty list makes the client accept every name, and procedural names are
-    unlimited."""
+    """Return no names, so that the client accepts every name: procedural ones are unlimited."""
     return []
 
 
@@ -28,8 +27,7 @@ def get_shortest_path(
     target: Vector3 | None = None,
     allowedError: float = 0.05,
 ) -> dict[str, Any]:
-    """Return the corners of a shortest way over the grid to the standing place nearest to an object
-    or point."""
+    """Return the corners of a shortest way to the standing place nearest to an object or point."""
     world = sim.world
     goal = _goal(sim, objectId, objectType, target)
     start = world.agent.position if position is None else to_array(position)
@@ -68,8 +66,7 @@ def get_object_in_frame(sim: Simulation, x: float, y: float, checkVisible: bool 
 
 @action("GetCoordinateFromRaycast", query=True)
 def get_coordinate_from_raycast(sim: Simulation, x: float, y: float) -> dict[str, float]:
-    """Return the world position of what is seen at (x, y), shares of the frame from its top
-    left."""
+    """Return the world position seen at (x, y), shares of the frame from its top left."""
     check_in_frame(x, y)
     point = sim.vision.point_at(x, 1.0 - y)
     if point is None:
@@ -126,3 +123,15 @@ def get_map_view_camera_properties(sim: Simulation) -> dict[str, Any]:
         "orthographic": True,
         "orthographicSize": camera.orthographic_size,
     }
+
+
+@action("SetObjectFilter")
+def set_object_filter(sim: Simulation, objectIds: list[str]) -> None:
+    """Leave all objects but these out of the metadata; the world stays as it is."""
+    sim.object_filter = frozenset(objectIds)
+
+
+@action("ResetObjectFilter")
+def reset_object_filter(sim: Simulation) -> None:
+    """List all objects again."""
+    sim.object_filter = None

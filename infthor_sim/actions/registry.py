@@ -9,8 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Concatenate, TypeGuard
 
-from infthor_sim.actions.signatures import type_name, unknown_arguments_text
-from infthor_sim.actions.vectors import Vector3
+from infthor_sim.actions.signatures import Vector3, type_name, unknown_arguments_text
 from infthor_sim.errors import ActionError, ErrorCode
 from infthor_sim.settings import AGENT_MODES
 from infthor_sim.simulation import Simulation
@@ -21,16 +20,14 @@ __all__ = ["Action", "Vector3", "action", "action_names", "bind", "is_vector"]
 # own arguments.
 _MESSAGE_KEYS = frozenset(
     "action sequenceId agentId renderImage renderDepthImage renderClassImage renderObjectImage "
-    "renderNormalsImage"
-    " renderFlowImage renderSemanticSegmentation renderInstanceSegmentation visibilityDistance "
-    "fixedDeltaTime"
-    " physicsSimulationParams".split()
+    "renderNormalsImage renderFlowImage renderSemanticSegmentation renderInstanceSegmentation "
+    "visibilityDistance fixedDeltaTime physicsSimulationParams".split()
 )
 _LARGEST = 1e9  # of a number; squares of larger ones would overflow in the geometry
 
 
 ActionFunction = Callable[Concatenate[Simulation, ...], Any]
-Form = tuple[str, ...]
+Overload = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -45,8 +42,7 @@ class Action:
         query: it changes nothing that is seen, so the client keeps its last frame.
         lenient: unknown arguments are ignored, as in the actions that take Unity's whole
             ServerAction.
-        forms: alternative sets of required arguments, for actions that Unity overloads; empty for a
-            single form.
+        overloads: alternative sets of required arguments, for actions that Unity overloads.
     """
 
     name: str
@@ -54,7 +50,7 @@ class Action:
     parameters: Mapping[str, inspect.Parameter]
     query: bool
     lenient: bool
-    forms: tuple[Form, ...] = ()
+    overloads: tuple[Overload, ...] = ()
 
 
 _ACTIONS: dict[str, dict[str, Action]] = {mode: {} for mode in AGENT_MODES}
@@ -64,7 +60,7 @@ def action(
     *names: str,
     query: bool = False,
     lenient: bool = False,
-    forms: tuple[Form, ...] = (),
+    overloads: tuple[Overload, ...] = (),
     modes: tuple[str, ...] = AGENT_MODES,
 ) -> Callable[[ActionFunction], ActionFunction]:
     """Register a function as the action(s) `names` of some agent modes; see `Action`."""
@@ -72,7 +68,7 @@ def action(
     def register(run: ActionFunction) -> ActionFunction:
         parameters = dict(list(inspect.signature(run).parameters.items())[1:])
         for name in names:
-            new = Action(name, run, parameters, query, lenient, forms)
+            new = Action(name, run, parameters, query, lenient, overloads)
             for mode in modes:
                 # Unity's arm agents descend from the default one and override some of its actions.
                 # An action of some modes wins over one of all modes, whichever module is imported
@@ -101,38 +97,45 @@ def bind(message: Mapping[str, Any], mode: str = "default") -> tuple[Action, dic
     called = _ACTIONS[mode].get(name) if isinstance(name, str) else None
     if called is None:
         raise ActionError(f"Invalid action: {name}", ErrorCode.INVALID_ACTION)
-    given = {
+    passed = {
         key: value
         for key, value in message.items()
         if key not in _MESSAGE_KEYS or key in called.parameters
     }
-    # Of several forms the one is meant that most of the given arguments belong to; the first if
-    # they tie.
-    form = max(
-        called.forms, key=lambda form: sum(given.get(key) is not None for key in form), default=()
-    )
-    other_forms = {key for other in called.forms for key in other if key not in form}
+    overload = _chosen_overload(called, passed)
+    other_names = set().union(*called.overloads).difference(overload)
     unknown = [
         key
-        for key in given
-        if key not in called.parameters or (key in other_forms and given[key] is not None)
+        for key in passed
+        if key not in called.parameters or (key in other_names and passed[key] is not None)
     ]
     if unknown and not called.lenient:
-        text = unknown_arguments_text(called.name, unknown, called.parameters, given)
+        text = unknown_arguments_text(called.name, unknown, called.parameters, passed)
         raise ActionError(text, ErrorCode.INVALID_ARGUMENT)
-    arguments = {key: value for key, value in given.items() if key in called.parameters}
+    arguments = {key: value for key, value in passed.items() if key in called.parameters}
     for key, value in arguments.items():
         _check_type(called, key, value)
-    required = [
-        k for k, p in called.parameters.items() if k in form or p.default is inspect.Parameter.empty
+    missing = [
+        key
+        for key, parameter in called.parameters.items()
+        if key in overload or parameter.default is inspect.Parameter.empty
+        if arguments.get(key) is None
     ]
-    missing = [key for key in required if arguments.get(key) is None]
     if missing:
         raise ActionError(
             f"action: {called.name} is missing the following arguments: {','.join(missing)}",
             ErrorCode.MISSING_ARGUMENTS,
         )
     return called, arguments
+
+
+def _chosen_overload(called: Action, passed: Mapping[str, Any]) -> Overload:
+    """Return the overload that most of the passed arguments belong to; the first if they tie."""
+    return max(
+        called.overloads,
+        key=lambda names: sum(passed.get(name) is not None for name in names),
+        default=(),
+    )
 
 
 def _check_type(called: Action, key: str, value: Any) -> None:
@@ -146,13 +149,13 @@ def _check_type(called: Action, key: str, value: Any) -> None:
     if _matches(value, annotation):
         return
     expected = type_name(annotation)
-    given = value if isinstance(value, str) else json.dumps(value)
+    text = value if isinstance(value, str) else json.dumps(value)
     # Unity's dispatcher converts scalars itself and reports a code. A scalar in place of a vector
     # or list fails earlier, in its JSON parser, without a code.
     if _is_structured(annotation) and not isinstance(value, dict | list):
-        raise ActionError(f"Error converting value {given} to type '{expected}'. Path '{key}'.")
+        raise ActionError(f"Error converting value {text} to type '{expected}'. Path '{key}'.")
     raise ActionError(
-        f"action: {called.name} has an invalid argument: {key} (=={given}). Cannot convert to: "
+        f"action: {called.name} has an invalid argument: {key} (=={text}). Cannot convert to: "
         f"{expected}",
         ErrorCode.INVALID_ARGUMENT,
     )
@@ -168,8 +171,7 @@ def _is_structured(annotation: Any) -> bool:
 
 
 def _matches(value: Any, annotation: Any) -> bool:
-    """Return whether a JSON value is of a parameter's type; stricter than Unity: "1" is no number,
-    1 no boolean."""
+    """Return whether a JSON value fits a parameter's type; "1" is no number, 1 no boolean."""
     origin = typing.get_origin(annotation)
     inner = typing.get_args(annotation)
     if annotation is Any or annotation is types.NoneType:
@@ -195,6 +197,5 @@ def is_vector(value: Any) -> TypeGuard[dict[str, float]]:
 
 
 def _is_number(value: Any) -> bool:
-    """Return whether a value is a finite number of usable size; JSON as Python reads it has NaN and
-    infinities."""
+    """Return whether a value is a finite number of usable size; Python's JSON has NaN, too."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST

@@ -1,19 +1,22 @@
 # ruff: noqa: ARG001 - the wire's arguments are accepted even where nothing depends on them
-"""Setting a scene to a recorded or random state: poses, toggles, states of objects, random
-placement."""
+"""Setting a scene to a recorded, random or saved state: poses, toggles, states, placement."""
 
+import os
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from infthor_eval.storage.limits import OBJECT_POSES
 from infthor_sim.actions.interaction import set_openness
 from infthor_sim.actions.registry import action, is_vector
-from infthor_sim.errors import ActionError
+from infthor_sim.errors import ActionError, UsageError
 from infthor_sim.geometry import to_array
 from infthor_sim.rearrange import NamedPose, set_poses, spawn_randomly
 from infthor_sim.simulation import Simulation
+
+# Poses that SetObjectPoses takes; real scenes have up to 60. The variable raises the limit.
+_MAX_POSES = 1000
+_MAX_POSES_VARIABLE = "INFTHOR_EVAL_MAX_OBJECT_POSES"
 
 
 @action("SetObjectPoses")
@@ -25,14 +28,26 @@ def set_object_poses(
     forceRigidbodySleep: bool = True,
     skipMoveable: bool = False,
 ) -> None:
-    """Place the listed objects by name; a name listed twice is copied, pickupable objects not
-    listed vanish."""
-    if len(objectPoses) > OBJECT_POSES.value:
+    """Place the listed objects by name, copies of those listed twice; other loose ones vanish."""
+    limit = _max_poses()
+    if len(objectPoses) > limit:
         raise ActionError(
             f"objectPoses has {len(objectPoses):,} entries, too many for a scene; "
-            f"{OBJECT_POSES.hint}"
+            f"if this is intended, set {_MAX_POSES_VARIABLE} to more than {limit}"
         )
     set_poses(sim.world, [_named_pose(entry) for entry in objectPoses], keep_moveable=skipMoveable)
+
+
+def _max_poses() -> int:
+    text = os.environ.get(_MAX_POSES_VARIABLE)
+    if text is None:
+        return _MAX_POSES
+    if not (text.isascii() and text.isdecimal() and len(text) <= 18 and int(text) > 0):
+        raise UsageError(
+            f"{_MAX_POSES_VARIABLE}={text[:40]}: not a whole number above 0; "
+            "set it to one, or unset it"
+        )
+    return int(text)
 
 
 def _named_pose(entry: Any) -> NamedPose:
@@ -103,8 +118,7 @@ _ALL_AT_ONCE = {  # by `StateChange` of SetStateOfAllObjects
 
 @action("SetStateOfAllObjects")
 def set_state_of_all_objects(sim: Simulation, StateChange: str, forceAction: bool = False) -> None:
-    """Make every capable object dirty, filled or used up with `forceAction`; clean, empty or unused
-    without it."""
+    """Make every capable object dirty, filled or used up; without `forceAction` undo that."""
     change = _ALL_AT_ONCE.get(StateChange)
     if change is None:
         raise ActionError(
@@ -189,3 +203,19 @@ def set_random_seed(sim: Simulation, seed: int) -> None:
 
 def _random_from_seed(seed: int) -> np.random.Generator:
     return np.random.default_rng(int(seed) % 2**32)  # Unity's seeds are signed, numpy's are not
+
+
+@action("SaveState", query=True)
+def save_state(sim: Simulation, slot: int = 0) -> None:
+    """Keep the present state in a slot, in place of an earlier one.
+
+    Unity cannot: generation undoes failed subtasks with it, without a replay.
+    """
+    sim.save(slot)
+
+
+@action("RestoreState")
+def restore_state(sim: Simulation, slot: int = 0) -> None:
+    """Bring back the state kept in a slot; it stays kept."""
+    if not sim.restore(slot):
+        raise ActionError("There is no saved state of this scene")

@@ -2,9 +2,8 @@
 
 from typing import Any
 
-from infthor_eval.errors import DataError
 from infthor_sim.actions.registry import action
-from infthor_sim.errors import ActionError, ErrorCode
+from infthor_sim.errors import ActionError, DataError, ErrorCode
 from infthor_sim.render.camera import FAR, NEAR
 from infthor_sim.settings import AGENT_MODES, SimulatorSettings
 from infthor_sim.simulation import Simulation
@@ -43,8 +42,7 @@ def initialize(
     agentCount: int = 1,
     massThreshold: float | None = None,
 ) -> dict[str, float]:
-    """Set up the agent; arguments that only Unity knows are ignored, as Unity ignores unknown ones
-    here."""
+    """Set up the agent; arguments that only Unity knows are ignored, as Unity does here."""
     # The client does not look at the reply to Reset, but raises on the reply to Initialize that it
     # sends next.
     if sim.failed_reset:

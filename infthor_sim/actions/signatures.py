@@ -1,5 +1,4 @@
-"""The words of messages about wrong arguments: parameters by the names and types that Unity
-prints."""
+"""Types of arguments, and the words in which Unity's messages about wrong ones print them."""
 
 import inspect
 import types
@@ -7,9 +6,12 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from infthor_sim.actions.vectors import Vector3
+__all__ = ["Vector3", "type_name", "unknown_arguments_text"]
 
-__all__ = ["type_name", "unknown_arguments_text"]
+
+class Vector3(dict[str, float]):
+    """A position (metres) or rotation (degrees): `{"x", "y", "z"}`, any of them absent."""
+
 
 _SCALARS = {int: "int", float: "float", str: "String", bool: "Boolean", Vector3: "Vector3"}
 
@@ -26,15 +28,14 @@ def type_name(annotation: Any) -> str:
 
 
 def unknown_arguments_text(
-    name: str, unknown: Sequence[str], parameters: Mapping[str, inspect.Parameter], given: Any
+    name: str, unknown: Sequence[str], parameters: Mapping[str, inspect.Parameter], passed: Any
 ) -> str:
-    """Return Unity's message about arguments that an action does not take, with those that it
-    does."""
+    """Return Unity's message about unknown arguments, with those that the action takes."""
     plural = "s" if len(unknown) > 1 else ""
     expected = ", ".join(_parameter_text(parameter) for parameter in parameters.values())
     return (
         f'\n\tAction: "{name}" called with invalid argument{plural}: {_quote(unknown)}'
-        f"\n\tExpected arguments: {expected}\n\tYour arguments: {_quote(given)}"
+        f"\n\tExpected arguments: {expected}\n\tYour arguments: {_quote(passed)}"
     )
 
 

@@ -62,7 +62,7 @@ for _spec in _ACTIONS:
     object_action(_spec.name)(partial(_set_state, spec=_spec))
 
 
-@action("FillObjectWithLiquid", forms=BY_ID_OR_PIXEL)
+@action("FillObjectWithLiquid", overloads=BY_ID_OR_PIXEL)
 def fill(
     sim: Simulation,
     fillLiquid: str,

@@ -1,5 +1,4 @@
-"""The object that an action names by its id or by a pixel, resolved as AI2-THOR's default agent
-does."""
+"""The object that an action names by id or pixel, resolved as AI2-THOR's default agent does."""
 
 from collections.abc import Callable
 
@@ -36,7 +35,7 @@ def object_action(*names: str) -> Callable[[ObjectFunction], ObjectFunction]:
         ) -> None:
             function(sim, interactable(sim, objectId, forceAction, x, y))
 
-        action(*names, forms=BY_ID_OR_PIXEL)(run)
+        action(*names, overloads=BY_ID_OR_PIXEL)(run)
         return function
 
     return register
@@ -45,8 +44,7 @@ def object_action(*names: str) -> Callable[[ObjectFunction], ObjectFunction]:
 def interactable(
     sim: Simulation, object_id: str | None, force: bool, x: float | None, y: float | None
 ) -> SimObject:
-    """Return the object with this id, or the one shown at (x, y), shares of the frame from its top
-    left.
+    """Return the object with this id, or that at (x, y), shares of the frame from its top left.
 
     Raises:
         ActionError: there is no such object, or the agent does not see it within reach.
@@ -91,8 +89,7 @@ def check_in_frame(x: float, y: float) -> None:
 
 
 def object_at(sim: Simulation, x: float, y: float) -> str | None:
-    """Return the id of the object shown at (x, y), shares of the frame from its top left; None for
-    walls and the void.
+    """Return the id of the object at (x, y), shares of the frame from its top left, or None.
 
     Raises:
         ActionError: the point is outside the frame.

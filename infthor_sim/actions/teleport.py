@@ -13,7 +13,7 @@ from infthor_sim.world import World
 _STEP_HEIGHT = 0.05  # metres that a teleport's y may be off the floor
 
 
-@action("Teleport", forms=((), ("x", "y", "z")))
+@action("Teleport", overloads=((), ("x", "y", "z")))
 def teleport(
     sim: Simulation,
     position: Vector3 | None = None,
@@ -27,11 +27,11 @@ def teleport(
 ) -> None:
     """Put the agent elsewhere; what is not given stays as it is."""
     agent = sim.world.agent
-    given = position or {
+    components = position or {
         axis: value for axis, value in (("x", x), ("y", y), ("z", z)) if value is not None
     }
     target = np.array(
-        [float(given.get(axis, now)) for axis, now in zip("xyz", agent.position, strict=True)]
+        [float(components.get(axis, now)) for axis, now in zip("xyz", agent.position, strict=True)]
     )
     turn = agent.yaw if rotation is None else float(rotation.get("y", 0.0))
     tilt = agent.horizon if horizon is None else float(horizon)
@@ -44,7 +44,7 @@ def teleport(
     sim.world.carry()
 
 
-@action("TeleportFull", forms=(("position",), ("x", "y", "z")))
+@action("TeleportFull", overloads=(("position",), ("x", "y", "z")))
 def teleport_full(
     sim: Simulation,
     rotation: Vector3,

@@ -1,2 +1,1 @@
-"""The robot arms of agent modes `arm` (ManipulaTHOR) and `stretch`: geometry, collisions, and what
-they hold."""
+"""Arms of the modes `arm` (ManipulaTHOR) and `stretch`: geometry, collisions, held objects."""

@@ -107,8 +107,7 @@ class Arm:
         self.version += 1
 
     def grips(self) -> Iterator[tuple[str, Grip]]:
-        """Yield ids and poses in the wrist's frame of all that moves with the hand: held objects,
-        then contents."""
+        """Yield ids and poses in the wrist's frame of held objects, then of their contents."""
         yield from self.held.items()
         yield from self.held_contents.items()
 

@@ -58,16 +58,16 @@ class Boxes:
 
 
 def join(parts: Sequence[Boxes], axis: int = 0) -> Boxes:
-    """Return all boxes of some collections, in order; with `axis` 1, join their groups one by
-    one."""
-    return Boxes(
-        *(np.concatenate([getattr(p, f.name) for p in parts], axis=axis) for f in fields(Boxes))
-    )
+    """Return all boxes of collections, in order; with `axis` 1, join their groups one by one."""
+    columns = []
+    for field in fields(Boxes):
+        values = [getattr(part, field.name) for part in parts]
+        columns.append(np.concatenate(values, axis=axis))
+    return Boxes(*columns)
 
 
 def separations(first: Boxes, second: Boxes) -> Array:
-    """Return gaps (n, m) in metres between n boxes and m others, without groups; negative: depth of
-    the overlap.
+    """Return gaps (n, m) in metres between n boxes and m others, without groups.
 
     A gap is measured along the best separating direction. It is at most the true distance, and
     negative exactly where the boxes overlap. Pairs that are far apart have infinity.
@@ -84,20 +84,19 @@ def separations(first: Boxes, second: Boxes) -> Array:
 
 
 def _pair_gaps(a: Boxes, b: Boxes) -> Array:
-    """Return gaps (k,) between the boxes of two collections, pair by pair, by the separating axis
-    theorem."""
+    """Return gaps (k,) between boxes, pair by pair, by the separating axis theorem."""
     # Two boxes are apart exactly if they are along one of 15 directions: the 3 + 3 axes of the
     # boxes, and the cross products of each pair of them. `cosines` holds the dot products of the
     # axes, from which all projections follow.
     cosines = a.axes @ b.axes.transpose(0, 2, 1)
     size = np.abs(cosines)
     between = b.center - a.center
-    of_a = np.einsum("kij,kj->ki", a.axes, between)
-    of_b = np.einsum("kij,kj->ki", b.axes, between)
-    faces_a = np.abs(of_a) - a.half - np.einsum("kij,kj->ki", size, b.half)
-    faces_b = np.abs(of_b) - b.half - np.einsum("kji,kj->ki", size, a.half)
+    along_a = np.einsum("kij,kj->ki", a.axes, between)
+    along_b = np.einsum("kij,kj->ki", b.axes, between)
+    faces_a = np.abs(along_a) - a.half - np.einsum("kij,kj->ki", size, b.half)
+    faces_b = np.abs(along_b) - b.half - np.einsum("kji,kj->ki", size, a.half)
     away = np.abs(
-        of_a[:, _LAST, None] * cosines[:, _NEXT] - of_a[:, _NEXT, None] * cosines[:, _LAST]
+        along_a[:, _LAST, None] * cosines[:, _NEXT] - along_a[:, _NEXT, None] * cosines[:, _LAST]
     )
     reach_a = a.half[:, _NEXT, None] * size[:, _LAST] + a.half[:, _LAST, None] * size[:, _NEXT]
     reach_b = (

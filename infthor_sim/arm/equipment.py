@@ -12,14 +12,12 @@ from infthor_sim.world import World
 __all__ = ["equip"]
 
 _RIGS: dict[str, type[Kinova] | type[Stretch]] = {"arm": Kinova, "stretch": Stretch}
-_EYES = {
-    "stretch": (0.00192, 0.5447, 0.06788)
-}  # metres, from Unity's sources; other modes have the usual camera
+# metres, from Unity's sources; other modes have the usual camera
+_EYES = {"stretch": (0.00192, 0.5447, 0.06788)}
 
 
 def equip(world: World, agent_mode: str) -> None:
-    """Give a world's agent the camera of an agent mode and its arm, at rest; what the agent held
-    falls."""
+    """Give an agent the camera and the resting arm of an agent mode; what it held falls."""
     if world.arm is not None:
         drop_all(world, world.arm)
     rig: Rig | None = _RIGS[agent_mode]() if agent_mode in _RIGS else None

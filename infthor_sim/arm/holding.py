@@ -16,8 +16,7 @@ __all__ = ["TouchedObjects", "drop_all", "pick_up", "touched_objects"]
 
 
 class TouchedObjects(NamedTuple):
-    """Objects that the hand's sphere touches and the arm does not hold, in the order of the
-    metadata.
+    """Objects that the hand's sphere touches and the arm does not hold, in the metadata's order.
 
     Attributes:
         pickupable: objects that can be picked up.
@@ -80,9 +79,8 @@ def drop_all(world: World, arm: Arm) -> None:
         middle = item.center
         turn = matrix_euler(_level_rotation(item.matrix))
         world.set_pose(item, item.position, turn)
-        world.shift(
-            [item], middle - item.center
-        )  # it turns about its middle and not about its origin
+        # it turns about its middle and not about its origin
+        world.shift([item], middle - item.center)
         let_fall(world, item, item.center)
 
 

@@ -1,5 +1,4 @@
-"""ManipulaTHOR's arm: a base that moves up and down, three links of equal length, and a wrist that
-turns freely.
+"""ManipulaTHOR's arm: a base that moves up and down, three equal links, a wrist that turns freely.
 
 From Unity: the reach (0.6335 m from the shoulder, 0.6325 m where restricted), the heights of the
 base, the resting pose and the order of joints. The length of a link follows: Unity's solver uses
@@ -23,10 +22,8 @@ SHOULDER: Array = np.array([0.0, 0.0, LINK])
 _ALLOWED = 0.6325  # metres from the shoulder that restricted movements may go
 _REST = (0.0, 0.0, 0.4)
 _REST_BASE = -0.003
-_LIFTS = (
-    -0.45,
-    0.9,
-)  # of Unity's agent capsule: a quarter of its height below its middle, and its top; metres
+# of Unity's agent capsule: a quarter of its height below its middle, and its top; metres
+_LIFTS = (-0.45, 0.9)
 _THICK = (0.04, 0.035, 0.03)  # half thickness of the links from the base to the wrist, metres
 PALM = ((0.0, 0.0, -0.015), (0.04, 0.028, 0.025))  # middle and half extents in the wrist's frame
 # metres that the fingers reach ahead of the wrist; they do not collide, as they close around things
@@ -38,14 +35,12 @@ _LEVEL: Array = np.eye(3)
 # degrees of the elbow from up to the right: a forearm above the hand would hide it from the camera
 _LEAN = 50.0
 _AT_SHOULDER = 1e-9  # metres from the shoulder below which the direction to the wrist is undefined
-_UPRIGHT = (
-    1e-6  # sine of the angle from the vertical below which the line to the wrist counts as vertical
-)
+# sine of the angle from the vertical below which the line to the wrist counts as vertical
+_UPRIGHT = 1e-6
 
 
 def inverse(targets: Array, elbows: Array) -> Array:
-    """Return rotations (n, 2, 3, 3) of shoulder and elbow that bring the wrist to targets, or as
-    near as it gets.
+    """Return rotations (n, 2, 3, 3) of shoulder and elbow that bring the wrist nearest to targets.
 
     Args:
         targets: targets in the frame of the base, metres (n, 3).
@@ -66,9 +61,8 @@ def inverse(targets: Array, elbows: Array) -> Array:
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
     angles = np.radians(elbows - _LEAN)[:, None]
     out = np.cos(angles) * cross(ahead, aside) - np.sin(angles) * aside
-    along = np.minimum(
-        distances / 2, LINK
-    )  # beyond its reach the arm is stretched out towards the target
+    # beyond its reach the arm is stretched out towards the target
+    along = np.minimum(distances / 2, LINK)
     upper = (along * ahead + np.sqrt(np.maximum(LINK**2 - along**2, 0.0)) * out) / LINK
     fore = 2 * along * ahead / LINK - upper
     normal = cross(out, ahead)
@@ -76,8 +70,7 @@ def inverse(targets: Array, elbows: Array) -> Array:
 
 
 def forward(turns: Array) -> Array:
-    """Return positions (n, 4, 3) of base, shoulder, elbow and wrist for rotations (n, 2, 3, 3) of
-    the middle two."""
+    """Return positions (n, 4, 3) of base, shoulder, elbow and wrist by (n, 2, 3, 3) rotations."""
     elbows = SHOULDER + LINK * turns[:, 0, :, 2]
     shoulders = np.broadcast_to(SHOULDER, elbows.shape)
     return np.stack(
@@ -86,8 +79,7 @@ def forward(turns: Array) -> Array:
 
 
 def _look_rotations(ahead: Array, aside: Array) -> Array:
-    """Return rotations (n, 3, 3) with z `ahead` and x `aside`: unit vectors at right angles to each
-    other."""
+    """Return rotations (n, 3, 3) with z `ahead` and x `aside`, perpendicular unit vectors."""
     return np.stack([aside, cross(ahead, aside), ahead], axis=2)
 
 
@@ -122,8 +114,7 @@ class Kinova:
         return pose.base
 
     def reach(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
-        """Return poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as
-        it gets."""
+        """Return poses (n) with the wrist nearest to targets (n, 3) in the frame of the base."""
         wrists = forward(inverse(targets, np.array([p.elbow for p in poses])))[:, 3]
         return [replace(pose, wrist=wrist) for pose, wrist in zip(poses, wrists, strict=True)]
 

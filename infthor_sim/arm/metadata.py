@@ -6,8 +6,7 @@ import numpy as np
 
 from infthor_sim.arm.arm import Arm
 from infthor_sim.arm.holding import touched_objects
-from infthor_sim.arm.rotations import axis_angle
-from infthor_sim.geometry import Array, round_xyz
+from infthor_sim.geometry import Array, axis_angle, round_xyz
 from infthor_sim.world import World
 
 __all__ = ["arm_metadata"]
@@ -16,8 +15,7 @@ _DIGITS = 6
 
 
 def arm_metadata(world: World, arm: Arm) -> dict[str, Any]:
-    """Return the arm as AI2-THOR reports it; positions in metres, rotations as axis and angle (`w`,
-    degrees)."""
+    """Return the arm as AI2-THOR reports it: metres; rotations as axis and `w`, degrees."""
     near = touched_objects(world, arm)
     return {
         "joints": _joints(world, arm),

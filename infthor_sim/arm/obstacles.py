@@ -16,9 +16,8 @@ from infthor_sim.world import World
 __all__ = ["ArmObstacles", "arm_obstacles"]
 
 _WALL = 0.08  # thickness of the sides and the floor of a hollow primitive, as a share of its width
-_SIDES: Array = np.array(
-    [(0, -1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)], dtype=float
-)  # of a hollow box
+# of a hollow box
+_SIDES: Array = np.array([(0, -1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1)], dtype=float)
 _HOLLOW = (Form.CUP, Form.BOWL)
 
 

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from infthor_sim.arm.rotations import axis_angle, rotation
-from infthor_sim.geometry import Array
+from infthor_sim.geometry import Array, axis_angle, axis_rotation
 
 __all__ = ["STEP", "path_distances", "rotation_steps", "shares"]
 
@@ -16,15 +15,13 @@ _GROWTH = 1.1  # factor by which steps grow beyond
 
 
 def shares(length: float, step: float) -> Array:
-    """Return the shares of a path, of some length in metres or degrees, at which to check it; at
-    least its end, 1."""
+    """Return shares of a path at which to check it, at least its end, 1; same unit for both."""
     count = max(1, math.ceil(length / step - 1e-9))  # without the margin, rounding could add a step
     return np.arange(1, count + 1) / count
 
 
 def path_distances(distance: float) -> Array:
-    """Return distances at which to check a path that may be much longer than an arm, metres; the
-    last is its end."""
+    """Return metres at which to check a path, maybe longer than the arm; the last is its end."""
     if distance <= _FINE:
         return shares(distance, STEP) * distance
     fine = shares(_FINE, STEP) * _FINE
@@ -33,8 +30,7 @@ def path_distances(distance: float) -> Array:
 
 
 def rotation_steps(turn: Array, step: float) -> list[Array]:
-    """Return rotations (3, 3) on the shortest way from none to `turn`, at most `step` degrees
-    apart."""
+    """Return rotations (3, 3) on the shortest way to `turn`, at most `step` degrees apart."""
     axis, angle = axis_angle(turn)
     # `turn` itself ends the list, as the last part of the way differs from it by rounding.
-    return [*(rotation(axis, angle * share) for share in shares(angle, step)[:-1]), turn]
+    return [*(axis_rotation(axis, angle * share) for share in shares(angle, step)[:-1]), turn]

@@ -58,13 +58,11 @@ class Rig(Protocol):
 
     @property
     def palm(self) -> Array:
-        """Point of the wrist's frame at which the hand's sphere begins, metres (3,); the sphere
-        lies along its z."""
+        """Point of the wrist's frame where the hand's sphere begins, along z, metres (3,)."""
 
     @property
     def lifts(self) -> tuple[float, float]:
-        """Lowest and highest height of the base, or of the lift, above the agent's position,
-        metres."""
+        """Lowest and highest height of the base or lift above the agent's position, metres."""
 
     def rest(self) -> ArmPose:
         """Return the resting pose."""
@@ -73,23 +71,19 @@ class Rig(Protocol):
         """Return the position of the base in the agent's frame (right, up, ahead), metres (3,)."""
 
     def with_lift(self, pose: ArmPose, height: float) -> ArmPose:
-        """Return the pose with its base, or its lift, at a height above the agent's position,
-        metres."""
+        """Return the pose with base or lift at a height above the agent's position, metres."""
 
     def lift(self, pose: ArmPose) -> float:
         """Return the height above the agent's position of the base, or of the lift, metres."""
 
     def reach(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
-        """Return poses (n) with the wrist at targets (n, 3) in the frame of the base, or as near as
-        it gets."""
+        """Return poses (n) with the wrist nearest to targets (n, 3) in the frame of the base."""
 
     def joints(self, poses: Sequence[ArmPose]) -> Joints:
         """Return the joints of some poses (n)."""
 
     def boxes(self, poses: Sequence[ArmPose]) -> Boxes:
-        """Return the links and the hand of some poses (n, m), the hand last, in the frame of the
-        base."""
+        """Return links and hand of poses (n, m), the hand last, in the frame of the base."""
 
     def allows(self, target: Array) -> bool:
-        """Return whether `restrictMovement` allows a target (3,) of the wrist in the frame of the
-        base."""
+        """Return whether `restrictMovement` allows a wrist target (3,) in the base's frame."""

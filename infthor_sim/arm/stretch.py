@@ -1,5 +1,4 @@
-"""The stretch robot's arm: a lift, a telescope that goes out to the agent's right, and a wrist that
-turns about the vertical.
+"""Stretch's arm: a lift, a telescope to the agent's right, a wrist that turns about the vertical.
 
 The positions of the joints are from published metadata of a Unity build, the limits from Unity's
 solver. Thicknesses are ours.
@@ -22,19 +21,11 @@ _ORIGIN = (0.1438, -0.8132, -0.0239)  # of the base, in the agent's frame
 _LIFTS = (-0.056, 1.045)
 _OUT = 0.516
 _REST = (0.0, 0.1645, 0.0)
-_MAST = (
-    0.0461,
-    0.163,
-    -0.2788,
-)  # the lift's joint relative to the wrist's height, in the frame of the base
+# the lift's joint relative to the wrist's height, in the frame of the base
+_MAST = (0.0461, 0.163, -0.2788)
 _TUBE = (0.083, 0.163, -0.0241)  # the first section of the telescope, likewise
-_SECTIONS = (
-    0.0,
-    0.0130003,
-    0.0130005,
-    0.0130003,
-    0.0117463,
-)  # each section from the one before, telescope drawn in
+# each section from the one before, telescope drawn in
+_SECTIONS = (0.0, 0.0130003, 0.0130005, 0.0130003, 0.0117463)
 # heights of the wrist's two joints above the hand
 _YAW_JOINT = 0.1494
 _HAND_JOINT = 0.0987
@@ -63,8 +54,7 @@ class Stretch:
         return np.array([0.0, 0.0, _PALM])
 
     def rest(self) -> ArmPose:
-        """Return the resting pose: the telescope drawn in, the gripper pointing back across the
-        robot."""
+        """Return the resting pose: telescope in, gripper pointing back across the robot."""
         return ArmPose(np.array(_REST), yaw_matrix(180.0))
 
     def origin(self, pose: ArmPose) -> Array:
@@ -80,8 +70,7 @@ class Stretch:
         return float(_ORIGIN[1] + pose.wrist[1])
 
     def reach(self, poses: Sequence[ArmPose], targets: Array) -> list[ArmPose]:
-        """Return poses (n) with the wrist as near to targets (n, 3) as lift and telescope bring
-        it."""
+        """Return poses (n) with the wrist as near to targets (n, 3) as lift and telescope allow."""
         wrists = np.zeros_like(targets)
         wrists[:, 1], wrists[:, 2] = (
             np.clip(targets[:, 1], *_LIFTS),
@@ -105,8 +94,7 @@ class Stretch:
         return Joints(positions, turns)
 
     def boxes(self, poses: Sequence[ArmPose]) -> Boxes:
-        """Return the telescope, the wrist and the gripper of each pose (n, 3), in the frame of the
-        base."""
+        """Return telescope, wrist and gripper of poses (n, 3), in the frame of the base."""
         joints = self.joints(poses)
         mast = joints.positions[:, 0]
         out = joints.positions[:, 5]

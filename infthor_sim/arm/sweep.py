@@ -49,8 +49,7 @@ def take_stance(world: World, arm: Arm, to: Stance) -> None:
 def first_contact(
     world: World, arm: Arm, path: list[Stance], around: ArmObstacles
 ) -> tuple[int, str] | None:
-    """Return the index of the first stance in which the arm or what it holds is in something, and
-    that thing's name.
+    """Return the index of the first stance in which arm or load is in something, and its name.
 
     What the arm touches already is in the way only where the same part of the arm gets deeper into
     it. A part that is stuck in an object, as after a teleport, may leave it any way: there only the
@@ -66,8 +65,8 @@ def first_contact(
     # Gaps by stance, part of the arm and object: an object of many primitives counts by its nearest
     # one, so that the arm may slide along it from one primitive to the next.
     gaps = separations(moving.flat(), near.boxes).reshape(len(path) + 1, -1, len(near.owner))
-    things = np.unique(near.owner)
-    gaps = np.stack([gaps[:, :, near.owner == thing].min(axis=2) for thing in things], axis=2)
+    owners = np.unique(near.owner)
+    gaps = np.stack([gaps[:, :, near.owner == owner].min(axis=2) for owner in owners], axis=2)
     # Negative where a part is deeper in an object than at the start, where `_SKIN` is always
     # allowed.
     depth = gaps[1:] - np.minimum(gaps[0], -_SKIN)
@@ -76,12 +75,11 @@ def first_contact(
     if not len(hit):
         return None
     step = int(hit[0])
-    return step, near.names[things[depth[step].min(axis=0).argmin()]]
+    return step, near.names[owners[depth[step].min(axis=0).argmin()]]
 
 
 def is_free(world: World, arm: Arm, there: Stance, around: ArmObstacles) -> bool:
-    """Return whether the arm and what it holds are in nothing in a stance, wherever they are
-    now."""
+    """Return whether arm and held objects are in nothing in a stance, wherever they are now."""
     gaps = separations(moving_boxes(world, arm, [there]).flat(), around.boxes)
     return bool((gaps >= -_SKIN).all())
 

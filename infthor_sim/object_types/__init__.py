@@ -4,7 +4,35 @@ To add a type, add a record. A type without a `shape` is drawn as a plain box. A
 function in `render/shapes` with `@draws`, whose name the record gives.
 """
 
-from infthor_sim.object_types.catalogue import OBJECT_TYPES, allowed_in, type_named
+from infthor_sim.object_types import appliances, fixtures, food, furniture, household, kitchenware
 from infthor_sim.object_types.record import ObjectType
 
-__all__ = ["OBJECT_TYPES", "ObjectType", "allowed_in", "type_named"]
+__all__ = ["FORMER_NAMES", "OBJECT_TYPES", "ObjectType", "allowed_in", "modern_type", "type_named"]
+
+OBJECT_TYPES: dict[str, ObjectType] = {
+    declared.name: declared
+    for theme in (appliances, fixtures, food, furniture, household, kitchenware)
+    for declared in theme.TYPES
+}
+
+FORMER_NAMES = {
+    "Glassbottle": "Bottle",
+    "PaperTowel": "PaperTowelRoll",
+    "ToiletPaperRoll": "ToiletPaper",
+}
+"""Types of AI2-THOR 2.1.0, as in ALFRED, that 5.x calls otherwise; the names in 5.x."""
+
+
+def modern_type(name: str) -> str:
+    """Return the name in AI2-THOR 5.x of a type that 2.1.0 may have called otherwise."""
+    return FORMER_NAMES.get(name, name)
+
+
+def type_named(name: str) -> ObjectType:
+    """Return the record of a type; a type without one has no abilities and is a plain box."""
+    return OBJECT_TYPES.get(name) or ObjectType(name)
+
+
+def allowed_in(item: str, receptacle: str) -> bool:
+    """Return whether AI2-THOR lets an object of one type be put into or onto another."""
+    return type_named(receptacle).accepts(type_named(item))

@@ -17,8 +17,7 @@ PLAIN_BOX = "box"
 
 @dataclass(frozen=True)
 class Unfolding:
-    """A change of an object's box along one of its axes with opening, in proportion to the
-    openness.
+    """A change of an object's box along one of its axes, in proportion to the openness.
 
     Attributes:
         axis: 0, 1 or 2: across, up, or towards the front.
@@ -33,8 +32,7 @@ class Unfolding:
     reach: float = 0.0
 
     def extent(self, size: float, before: float, after: float) -> float:
-        """Return the extent in metres at openness `after` of what measures `size` at openness
-        `before`."""
+        """Return metres at openness `after` of what measures `size` at openness `before`."""
         share = (self.closed + (1 - self.closed) * after) / (
             self.closed + (1 - self.closed) * before
         )
@@ -161,8 +159,7 @@ class ObjectType:
         return self
 
     def support_height(self, height: float) -> float | None:
-        """Return the height above the underside of a box `height` metres high at which things
-        stand; None: its top."""
+        """Return the height at which things stand above a box's underside; None: its top."""
         if height < self.space_below:
             return 0.0
         return None if self.support is None else self.support * height
@@ -172,8 +169,7 @@ class ObjectType:
         return self.name in words or any(category in words for category in self.categories)
 
     def accepts(self, item: "ObjectType") -> bool:
-        """Return whether AI2-THOR lets an object of type `item` be put into or onto one of this
-        type."""
+        """Return whether AI2-THOR lets a type `item` be put into or onto this one."""
         if not (self.receptacle and item.pickupable) or item.counts_as(self.refuses):
             return False
         return self.takes is None or item.counts_as(self.takes)

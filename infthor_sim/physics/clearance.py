@@ -15,8 +15,7 @@ _SKIN = 0.005  # metres by which boxes may overlap: things that touch do
 
 
 def obstacle_at(world: World, item: SimObject, offset: Array) -> str | None:
-    """Return the name of what an object would run into if it were moved by `offset` (3,); None for
-    nothing.
+    """Return the name of what an object would hit if moved by `offset` (3,); None: nothing.
 
     What it touches already does not count, as the object could not be moved away from it otherwise.
     """
@@ -24,8 +23,7 @@ def obstacle_at(world: World, item: SimObject, offset: Array) -> str | None:
 
 
 def obstacles_at(world: World, item: SimObject, offset: Array) -> Iterator[str]:
-    """Yield the names of all that an object would run into if it were moved by `offset` (3,), see
-    `obstacle_at`."""
+    """Yield the names of all that an object would hit if moved by `offset` (3,)."""
     low, high = item.bounds()
     for name, box in _collisions(world, item, low + offset, high + offset):
         if not _overlaps(low, high, box):
@@ -33,8 +31,7 @@ def obstacles_at(world: World, item: SimObject, offset: Array) -> Iterator[str]:
 
 
 def occupant(world: World, pose: SimObject) -> str | None:
-    """Return the name of what is in the way of a copy of an object in another pose; None for
-    nothing."""
+    """Return the name of what is in the way of an object's copy in another pose, or None."""
     return next((name for name, _ in _collisions(world, pose, *pose.bounds())), None)
 
 
@@ -57,8 +54,7 @@ def _overlaps(low: Array, high: Array, box: tuple[Array, Array]) -> bool:
 
 
 def _obstacles(world: World, item: SimObject) -> Iterator[SimObject]:
-    """Yield what may be in the way of an object: not its contents, what is held, or furniture with
-    room inside."""
+    """Yield what may be in an object's way: not contents, held things, furniture with room."""
     own = {o.object_id for o in world.descendants(item)} | {item.object_id}
     for held in world.held_ids():
         own |= {held, *(o.object_id for o in world.descendants(world.objects[held]))}
@@ -73,8 +69,7 @@ def _obstacles(world: World, item: SimObject) -> Iterator[SimObject]:
 
 
 def _has_room(other: SimObject) -> bool:
-    """Return whether there may be room within the box of a piece of furniture, which then stops
-    nothing."""
+    """Return whether a piece of furniture may have room in its box, and so stops nothing."""
     if other.type.pickupable:
         return False
     if other.type.encloses and other.type.openable:
@@ -83,8 +78,7 @@ def _has_room(other: SimObject) -> bool:
 
 
 def _solid_box(other: SimObject) -> tuple[Array, Array]:
-    """Return the low and high corner of an object; for a seat or desk, only of the part below its
-    surface."""
+    """Return the corners of an object's box; of a seat or desk the part below its surface."""
     low, high = other.bounds()
     if other.type.receptacle and other.support is not None:
         high = np.array([high[0], other.surface_height(), high[2]])

@@ -1,5 +1,4 @@
-"""Falling: an object that nothing holds drops straight down onto what is below it, and may
-break."""
+"""Falling: an object that nothing holds drops straight down onto what is below, and may break."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -32,8 +31,7 @@ class _Landing(NamedTuple):
 
 
 def let_fall(world: World, item: SimObject, point: Array) -> None:
-    """Drop a released object to what is below `point` (3,), which is moved into the room if it is
-    outside.
+    """Drop a released object to what is below `point` (3,), which is first moved into the room.
 
     The object then belongs to the receptacle that it fell into or onto; on another loose object, to
     that one's receptacle.
@@ -90,8 +88,7 @@ def _landings(world: World, item: SimObject, point: Array) -> Iterator[_Landing]
 
 
 def _rank(landing: _Landing) -> float:
-    """Return the height of a landing; a dish ranks above what it stands on, even if its bottom is
-    slightly lower."""
+    """Return a landing's height; a dish ranks above what it stands on, even if a bit lower."""
     dish = landing.parent is not None and landing.parent.type.pickupable
     return landing.height + (_SUNK if dish else 0.0)
 
@@ -99,8 +96,7 @@ def _rank(landing: _Landing) -> float:
 def _landings_on(
     world: World, item: SimObject, other: SimObject, point: Array, bottom: float, *, has_top: bool
 ) -> Iterator[_Landing]:
-    """Yield the places on and in `other` for an object that falls above `point` (3,), its underside
-    at height `bottom`.
+    """Yield landings on and in `other` below `point` (3,), for an underside at height `bottom`.
 
     `has_top`: `other` has an upper side at `point`, and not the hole for a basin.
     """

@@ -1,5 +1,4 @@
-"""Outlines from above that are no rectangles, as rectangles: counters around corners, tops with
-sinks cut out."""
+"""Outlines from above as rectangles: counters around corners, tops with sinks cut out."""
 
 from collections.abc import Sequence
 
@@ -39,15 +38,14 @@ def polygon_rects(points: Sequence[tuple[float, float]]) -> tuple[Rect, ...]:
     zs = np.unique(np.round(outline[:, 1], 4))
     mid_x = (xs[1:] + xs[:-1]) / 2
     mid_z = (zs[1:] + zs[:-1]) / 2
-    solid = np.array(
-        [[_contains(outline, x, z) for z in mid_z] for x in mid_x], dtype=bool
-    ).reshape(len(mid_x), len(mid_z))
+    solid = np.zeros((len(mid_x), len(mid_z)), dtype=bool)
+    for i, x in enumerate(mid_x):
+        solid[i] = [_contains(outline, x, z) for z in mid_z]
     return tuple(_cover(solid, xs, zs))
 
 
 def _contains(outline: np.ndarray, x: float, z: float) -> bool:
-    """Return whether a point is inside an outline: a ray from it along +x crosses its edges an odd
-    number of times."""
+    """Return whether a point is in an outline: a ray along +x crosses its edges an odd number."""
     inside = False
     for (x0, z0), (x1, z1) in zip(outline, np.roll(outline, -1, axis=0), strict=True):
         if (z0 > z) != (z1 > z) and x < x0 + (z - z0) * (x1 - x0) / (z1 - z0):
@@ -60,8 +58,7 @@ def _edges(low: float, high: float, cuts: list[float]) -> np.ndarray:
 
 
 def _cover(solid: np.ndarray, xs: np.ndarray, zs: np.ndarray) -> list[Rect]:
-    """Return rectangles that cover the solid cells of an uneven grid: greedily, the largest from
-    each free cell."""
+    """Return rectangles over the solid cells of an uneven grid, greedily the largest each time."""
     left = solid.copy()
     rects = []
     for i, j in np.argwhere(solid):

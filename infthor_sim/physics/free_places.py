@@ -1,5 +1,4 @@
-"""Free places in and on receptacles: clear of other things, of what the furniture is drawn of, and
-of its doors."""
+"""Free places in and on receptacles: clear of things, of drawn parts, and of doors."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -25,7 +24,7 @@ from infthor_sim.world import World
 
 __all__ = ["PointFilter", "find_place"]
 
-_STEP = 0.05  # metres between the places that are tried
+_STEP = 0.05  # metres between the points that are tried
 _BELOW_HAND = 0.15  # metres below the agent's own height of the surface that is tried first
 _CLEARANCE = 0.008  # metres between neighbours
 _SQUEEZE = 0.02  # metres by which recorded insides may be higher than their boxes
@@ -67,8 +66,7 @@ class _Obstacles:
 
 
 def _apart(points: Array, size: Array, boxes: list[Box], overlap: float) -> NDArray[np.bool_]:
-    """Return at which points (n, 3) the middle of the underside of a box of a size (3,) is clear of
-    all of `boxes`."""
+    """Return at which points (n, 3) a box of a size (3,), by its underside, is clear of all."""
     free = np.ones(len(points), dtype=bool)
     if not len(points):
         return free
@@ -105,41 +103,34 @@ def find_place(
         among_fixed: in a recording, allow places within lamps, appliances and taps: their boxes are
             too large.
     """
-    boxes = [o.bounds() for o in _neighbours(world, item, receptacle)]
     ghost = item.duplicate(item.object_id)
+    neighbours = [o.bounds() for o in _neighbours(world, item, receptacle)]
     for surface in _sort_by_reach(world, surfaces(receptacle)):
-        if world.coarse:
-            fixed = (
-                [] if among_fixed else [o.bounds() for o in _fixed_on(world, receptacle, surface)]
-            )
-            obstacles = _Obstacles(
-                [*boxes, *fixed], [], []
-            )  # recorded boxes are too large to be taken for solid
+        if world.coarse:  # recorded boxes are too large to be taken for solid
+            fixed = [] if among_fixed else _fixed_on(world, receptacle, surface)
+            obstacles = _Obstacles([*neighbours, *(o.bounds() for o in fixed)], [], [])
         else:
-            fixed = list(_solid_boxes(world, item, receptacle, surface))
-            walls = [
-                wall
-                for outer in (receptacle, *world.ancestors(receptacle))
-                for wall in _inner_walls(outer)
-            ]
-            obstacles = _Obstacles(boxes, fixed, walls)
+            solid = list(_solid_boxes(world, item, receptacle, surface))
+            walls = list(_inner_walls(receptacle))
+            for outer in world.ancestors(receptacle):
+                walls += _inner_walls(outer)
+            obstacles = _Obstacles(neighbours, solid, walls)
         for turn in (0.0, 90.0):
             ghost.rotation = np.array([0.0, (surface.yaw + turn) % 360, 0.0])
             around = (
                 _outline_with_contents(world, item, ghost) if obstacles.walls else np.zeros((0, 2))
             )
-            place = _free_point(
+            point = _free_point(
                 world, ghost, surface, obstacles, around, overlap, random, point_filter
             )
-            if place is not None:
-                ghost.place_bottom(place)
+            if point is not None:
+                ghost.place_bottom(point)
                 return ghost
     return None
 
 
 def _outline_with_contents(world: World, item: SimObject, ghost: SimObject) -> Array:
-    """Return points of a thing's outline and of that of what it holds, turned as `ghost` is; see
-    `outline`."""
+    """Return outline points of a thing and its contents, turned as `ghost`; see `outline`."""
     turn = yaw_matrix(float(ghost.rotation[1] - item.rotation[1]))
     parts = [outline(ghost)]
     for content in world.descendants(item):
@@ -149,8 +140,7 @@ def _outline_with_contents(world: World, item: SimObject, ghost: SimObject) -> A
 
 
 def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterator[SimObject]:
-    """Yield the loose objects that could be in the way: those in this receptacle, and those of
-    other receptacles."""
+    """Yield loose objects that could be in the way, in this receptacle and in others."""
     inside = {o.object_id for o in world.descendants(item)} | {item.object_id}
     for other in world.objects.values():
         if other.object_id in inside or other is receptacle or not other.type.pickupable:
@@ -164,8 +154,7 @@ def _neighbours(world: World, item: SimObject, receptacle: SimObject) -> Iterato
 
 
 def _fixed_on(world: World, receptacle: SimObject, surface: Surface) -> Iterator[SimObject]:
-    """Yield what stands on the surface and cannot be picked up: lamps, screens, appliances, taps,
-    burners."""
+    """Yield what is fixed on the surface: lamps, screens, appliances, taps, burners."""
     for other in world.objects.values():
         if (
             other.type.pickupable
@@ -181,8 +170,7 @@ def _fixed_on(world: World, receptacle: SimObject, surface: Surface) -> Iterator
 def _solid_boxes(
     world: World, item: SimObject, receptacle: SimObject, surface: Surface
 ) -> Iterator[Box]:
-    """Yield the boxes of what stands on a surface or sticks out of it, of doors that swing over it,
-    and of walls.
+    """Yield boxes of what stands on a surface or sticks out of it, of doors over it, of walls.
 
     Rooms whose furniture is known by its shape are measured by that, and not by boxes.
     """
@@ -202,8 +190,7 @@ def _solid_boxes(
 
 
 def _inner_boxes(receptacle: SimObject) -> list[Box]:
-    """Return the boxes of a receptacle's own parts, as if it were open; none where things hang over
-    or stick out."""
+    """Return boxes of a receptacle's parts as if open; none where things hang or stick out."""
     if receptacle.type.overhang or receptacle.type.shape == PLAIN_BOX:
         return []
     opened = _opened(receptacle)
@@ -212,14 +199,12 @@ def _inner_boxes(receptacle: SimObject) -> list[Box]:
 
 
 def _opened(receptacle: SimObject) -> SimObject:
-    """Return a receptacle as it is drawn open, which shows its inside; one that hides nothing as it
-    is."""
+    """Return a receptacle as drawn open, inside shown; as it is if it hides nothing."""
     return as_open(receptacle, 1.0) if receptacle.type.encloses else receptacle
 
 
 def _outer_boxes(other: SimObject, low: Array, high: Array) -> Iterator[Box]:
-    """Yield the boxes of another object's parts, of the whole of what hides its inside, and of the
-    room for its door.
+    """Yield boxes of another object's parts, of what hides its inside, and of its door's room.
 
     So there is room around the foot of a lamp, as in AI2-THOR, whose colliders are parts too.
     """
@@ -255,8 +240,7 @@ def _inner_walls(receptacle: SimObject) -> list[Wall]:
 
 
 def _sort_by_reach(world: World, listed: list[Surface]) -> list[Surface]:
-    """Return surfaces, the easiest for the agent to reach first: near its hand's height, then near
-    it, then low."""
+    """Return surfaces by ease of reach: near the hand's height, then near the agent, then low."""
     agent = world.agent.position
 
     def cost(surface: Surface) -> tuple[float, float, float]:
@@ -281,8 +265,7 @@ def _free_point(
     random: np.random.Generator | None,
     point_filter: PointFilter | None,
 ) -> Array | None:
-    """Return the point (3,) of a surface for the underside of `ghost`, clear of obstacles; None if
-    there is none."""
+    """Return a surface's point (3,) for the underside of `ghost`, clear of obstacles, or None."""
     low, high = ghost.bounds()
     height = high[1] - low[1]
     if height > surface.headroom + (_SQUEEZE if world.coarse else 0.0):
@@ -301,8 +284,7 @@ def _free_point(
 
 
 def _grid(world: World, surface: Surface, half: tuple[float, float], turn: Array) -> Array:
-    """Return points (n, 3) of the surface at which something of this half size fits on it, nearest
-    first."""
+    """Return a surface's points (n, 3) where something of this half size fits, nearest first."""
     spans = [surface.half[i] - half[i] for i in range(2)]
     if min(spans) < -surface.overhang:
         return np.zeros((0, 3))

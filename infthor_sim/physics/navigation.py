@@ -1,5 +1,4 @@
-"""The cells of 0.25 m that the agent can stand on, from recordings or from the free floor of a
-procedural room."""
+"""The cells of 0.25 m that the agent can stand on, recorded or a procedural room's free floor."""
 
 import math
 from collections import deque
@@ -39,8 +38,7 @@ class NavGrid:
         return iter(self._cells.values())
 
     def can_stand(self, x: float, z: float) -> bool:
-        """Return whether the agent can stand at (x, z): its cell is one of the grid's, and its
-        centre near enough."""
+        """Return whether the agent can stand at (x, z), near enough to a cell's centre."""
         cell = self._cells.get(self._key(x, z))
         return cell is not None and max(abs(cell[0] - x), abs(cell[1] - z)) <= CELL / 2 + _TOLERANCE
 
@@ -52,8 +50,7 @@ class NavGrid:
         )
 
     def can_walk(self, start: tuple[float, float], end: tuple[float, float]) -> bool:
-        """Return whether the agent can stand all along the straight way from `start` to `end`,
-        checked each 0.1 m."""
+        """Return whether the agent can stand all along a straight way, checked each 0.1 m."""
         steps = max(1, math.ceil(math.dist(start, end) / 0.1))
         return all(
             self.can_stand(
@@ -70,8 +67,7 @@ class NavGrid:
     def reachable_points(
         self, x: float, z: float, size: float, yaw: float
     ) -> list[tuple[float, float]]:
-        """Return the points reachable from (x, z) by steps of `size` metres along axes turned by
-        `yaw`, sorted."""
+        """Return points reachable by steps of `size` metres along axes at `yaw`, sorted."""
         # Steps of one cell from a cell reach cells: quicker, and the points are those of the grid
         # to the last bit.
         start = self._cells.get(self._key(x, z))
@@ -100,8 +96,7 @@ class NavGrid:
     def path(
         self, start: tuple[float, float], end: tuple[float, float]
     ) -> list[tuple[float, float]] | None:
-        """Return a shortest path of cells from `start` to the cell of `end`; None if there is
-        none."""
+        """Return a shortest path of cells from `start` to that of `end`; None if there is none."""
         distances = self._distances(*end)
         key = self._key(*start)
         if key not in distances:
@@ -115,8 +110,7 @@ class NavGrid:
         return [self._cells[k] for k in cells]
 
     def count_free_ahead(self, x: float, z: float, yaw: float, reach: float = 1.25) -> int:
-        """Return the number of cells within `reach` metres ahead of (x, z), in a cone towards `yaw`
-        (degrees)."""
+        """Return the cells within `reach` metres of (x, z), in a cone to `yaw` (degrees)."""
         if not self._cells:
             return 0
         cells: Array = np.array(list(self._cells.values()))
@@ -127,8 +121,7 @@ class NavGrid:
         return int(np.sum((ahead > 0.05) & (ahead <= reach) & (aside <= 0.3 + ahead * 0.4)))
 
     def freest_yaw(self, x: float, z: float, reach: float = 1.25) -> float:
-        """Return the yaw (0, 90, 180 or 270 degrees) with the most cells ahead of (x, z); see
-        `count_free_ahead`."""
+        """Return the yaw (0, 90, 180, 270) with the most cells ahead; see `count_free_ahead`."""
         return max(
             (0.0, 90.0, 180.0, 270.0), key=lambda yaw: self.count_free_ahead(x, z, yaw, reach)
         )

@@ -1,5 +1,4 @@
-"""Obstacles for the agent that the navigation grid does not know: open doors and drawers, and what
-it holds."""
+"""Obstacles that the navigation grid does not know: open doors and drawers, held objects."""
 
 import numpy as np
 
@@ -16,8 +15,7 @@ _HEAD = 1.5
 
 
 def blocking_object(world: World, target: Array) -> str | None:
-    """Return the name of the open door or drawer that keeps the agent from standing at `target`
-    (3,), or None.
+    """Return the name of the open door or drawer that keeps the agent from `target` (3,), or None.
 
     One that already touches the agent does not count, as the agent could not get away from it
     otherwise.
@@ -34,8 +32,7 @@ def blocking_object(world: World, target: Array) -> str | None:
 
 
 def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
-    """Return the low and high corner of the axis-aligned box around an open door or drawer; None
-    for other objects."""
+    """Return the corners of the box around an open door or drawer; None for other objects."""
     if not (item.type.hinged or item.type.slides):
         return None
     width, height, depth = item.front_size
@@ -56,8 +53,7 @@ def door_leaf(item: SimObject) -> tuple[Array, Array] | None:
 
 
 def held_object_blocks(world: World, target: Array) -> bool:
-    """Return whether what the agent holds would be outside the outer walls if the agent stood at
-    `target`."""
+    """Return whether the held object would be outside the outer walls with the agent there."""
     if world.held is None:
         return False
     held = world.objects[world.held]
@@ -68,8 +64,7 @@ def held_object_blocks(world: World, target: Array) -> bool:
 
 
 def nearest_name(world: World, point: Array) -> str:
-    """Return the name of the furniture nearest to `point`, for messages about what stopped the
-    agent."""
+    """Return the name of the furniture nearest to `point`, for messages about a stopped agent."""
     # The grid knows only that a cell is not free, and not what stands there.
     best = ("Wall", 0.6)  # beyond so many metres a wall is the likelier obstacle
     for item in world.objects.values():

@@ -76,12 +76,11 @@ def surfaces(receptacle: SimObject) -> list[Surface]:
 
 
 def _standing_area(receptacle: SimObject) -> tuple[Array, tuple[float, float]]:
-    """Return the middle (3,) in the world of the part of a box on or in which things stand, and its
-    half extents (2,).
+    """Return middle (3,), in the world, and half extents (2,) of where things stand in a box.
 
     Its height is that of the box's middle.
     """
-    half_x, _, half_z = (float(side) / 2 for side in receptacle.box_size)
+    half_x, _, half_z = (receptacle.box_size / 2).tolist()
     x0, z0, x1, z1 = receptacle.type.area or _body(receptacle)
     offset = np.array([(x0 + x1) / 2 * half_x, 0.0, (z0 + z1) / 2 * half_z])
     return receptacle.center + receptacle.matrix @ offset, (
@@ -91,12 +90,12 @@ def _standing_area(receptacle: SimObject) -> tuple[Array, tuple[float, float]]:
 
 
 def _body(receptacle: SimObject) -> Rect:
-    """Return the part of a box that neither a handle nor the flaps of an open carton take up, as
-    shares of its half."""
-    width, _, depth = (float(side) for side in receptacle.box_size)
+    """Return the part of a box without handle or carton flaps, as shares of its half."""
+    width, _, depth = receptacle.box_size.tolist()
     if receptacle.type.handled:
         return (-1.0, -1.0, min(1.0, 2 * depth / width - 1), min(1.0, 2 * width / depth - 1))
-    x, z = (_closed_share(receptacle, axis) for axis in (0, 2))
+    x = _closed_share(receptacle, axis=0)
+    z = _closed_share(receptacle, axis=2)
     return (-x, -z, x, z)
 
 
@@ -110,8 +109,7 @@ def _closed_share(receptacle: SimObject, axis: int) -> float:
 
 
 def _shelves(receptacle: SimObject) -> list[Surface]:
-    """Return the floor and shelves inside a cabinet, fridge or the like, or the floor of a drawer
-    where it is now."""
+    """Return floor and shelves in a cabinet, fridge or the like, or a drawer's moved floor."""
     low, high = receptacle.bounds()
     inner = (
         max(receptacle.box_size[0] / 2 - WALL, 0.02),
@@ -128,8 +126,7 @@ def _shelves(receptacle: SimObject) -> list[Surface]:
 
 
 def drawer_offset(receptacle: SimObject) -> Array:
-    """Return how far an open drawer has come out of its box, metres (3,); zeros for other
-    objects."""
+    """Return how far an open drawer is out of its box, metres (3,); zeros for other objects."""
     if not receptacle.type.slides or receptacle.state.openness == 0:
         return np.zeros(3)
     matrix = yaw_matrix(float(receptacle.rotation[1]) + receptacle.front)
@@ -139,8 +136,7 @@ def drawer_offset(receptacle: SimObject) -> Array:
 
 
 def contains_box(vessel: SimObject, low: Array, high: Array) -> bool:
-    """Return whether a box, given by its corners, is within the walls of an open vessel and above
-    its floor."""
+    """Return whether a box, by its corners, is within an open vessel and above its floor."""
     if not vessel.type.open_top or (vessel.type.encloses and vessel.state.openness == 0):
         return False
     (cavity,) = surfaces(vessel)
@@ -155,8 +151,7 @@ def contains_box(vessel: SimObject, low: Array, high: Array) -> bool:
 
 
 def find_parent(world: World, item: SimObject) -> SimObject | None:
-    """Return the receptacle that an object is in or on, judged by its position alone; None in
-    mid-air."""
+    """Return the receptacle that an object is in or on, by position alone; None in mid-air."""
     low, high = item.bounds()
     point = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     best: tuple[float, SimObject] | None = None
@@ -171,8 +166,7 @@ def find_parent(world: World, item: SimObject) -> SimObject | None:
 
 
 def _parent_cost(receptacle: SimObject, point: Array, item: SimObject) -> float | None:
-    """Return how unlikely it is that an object whose underside is at `point` is in a receptacle;
-    None: it is not.
+    """Return how unlikely it is that the object above `point` is in a receptacle; None: it is not.
 
     Hollow receptacles come before surfaces, small before large ones, and the floor last.
     """
@@ -199,8 +193,7 @@ def _parent_cost(receptacle: SimObject, point: Array, item: SimObject) -> float 
 
 
 def _depth_below(receptacle: SimObject) -> float:
-    """Return metres below the box of a hollow receptacle at which the underside of its contents may
-    be recorded."""
+    """Return metres that contents may be recorded below the box of a hollow receptacle."""
     if receptacle.type.encloses:
         return 0.12
     return 0.03 if receptacle.type.pickupable else 0.08

@@ -38,12 +38,12 @@ def slide(world: World, item: SimObject, direction: Array, distance: float) -> N
         support = _support(world, item)
         if support is not None and not is_over(support, item.center):
             break
-    for thing in moved.values():
-        support = _support(world, thing)
-        if support is not None and not is_over(support, thing.center):
-            let_fall(world, thing, thing.center)
-        elif thing.type.pickupable:
-            assign_parent(world, thing)
+    for other in moved.values():
+        support = _support(world, other)
+        if support is not None and not is_over(support, other.center):
+            let_fall(world, other, other.center)
+        elif other.type.pickupable:
+            assign_parent(world, other)
 
 
 def _support(world: World, item: SimObject) -> SimObject | None:
@@ -53,8 +53,7 @@ def _support(world: World, item: SimObject) -> SimObject | None:
 def _pushed(
     world: World, item: SimObject, step: Array, pushed: dict[str, SimObject]
 ) -> dict[str, SimObject] | None:
-    """Return an object and the loose things that it would take along, by id; None if something
-    stops one of them."""
+    """Return an object and the loose things it takes along, by id; None if one is stopped."""
     support = _support(world, item)
     if support is not None and world.is_hidden(item) and not is_over(support, item.center + step):
         return None  # the wall of something closed

@@ -1,5 +1,4 @@
-"""What of an object is solid, as its drawing has it: parts, the walls of vessels, and the space
-that its door needs.
+"""What of an object is solid: its drawn parts, walls of vessels, the space of its door.
 
 The metadata's box of a sofa has its back and arms, that of a drawer its sides: what is put down
 must stay clear of those. So room for things is measured against what is drawn, and the two cannot
@@ -16,7 +15,16 @@ from infthor_sim.objects import DRAWER_SLIDE, SimObject
 from infthor_sim.render.primitives import Form, ShapePart
 from infthor_sim.render.shapes import shape
 
-__all__ = ["Box", "Wall", "as_open", "opening_space", "outline", "part_boxes", "vessel_walls"]
+__all__ = [
+    "Box",
+    "Wall",
+    "as_open",
+    "opening_space",
+    "outline",
+    "part_boxes",
+    "unfold",
+    "vessel_walls",
+]
 
 Box = tuple[Array, Array]
 """Low and high corner of an axis-aligned box in the world, metres (3,)."""
@@ -59,8 +67,7 @@ class Wall:
 
 
 def part_boxes(item: SimObject, hollow: bool = False) -> list[Box]:
-    """Return the boxes around an object's drawn parts; with `hollow`, without the walls of
-    vessels."""
+    """Return the boxes around an object's drawn parts; `hollow`: without walls of vessels."""
     return [_box(item, part) for part in shape(item) if not (hollow and part.form in _VESSELS)]
 
 
@@ -76,8 +83,7 @@ def vessel_walls(item: SimObject) -> list[Wall]:
 
 
 def outline(item: SimObject) -> Array:
-    """Return points around an object's drawn parts seen from above, metres from the middle of its
-    box (m, 2)."""
+    """Return points around the drawn parts from above, metres from the box's middle (m, 2)."""
     middle = item.center
     corners = []
     for part in shape(item):
@@ -95,9 +101,8 @@ def outline(item: SimObject) -> Array:
 
 
 def opening_space(item: SimObject) -> Box | None:
-    """Return the box in front of an object that its door or drawer needs to open; None for one
-    without."""
-    width, height, depth = (float(v) for v in item.front_size)
+    """Return the box in front of an object that its door or drawer opens into, or None."""
+    width, height, depth = item.front_size.tolist()
     if not (item.type.hinged or item.type.slides):
         return None
     reach = width if item.type.hinged else DRAWER_SLIDE * depth
@@ -110,6 +115,24 @@ def opening_space(item: SimObject) -> Box | None:
 def as_open(item: SimObject, openness: float) -> SimObject:
     """Return a copy of an object that is open so far."""
     return replace(item, state=replace(item.state, openness=openness))
+
+
+def unfold(item: SimObject, openness: float) -> None:
+    """Change an object's box from that at its present openness to that at `openness`.
+
+    It changes for objects without door or drawer: lids rise, flaps spread, blinds come down.
+    """
+    turn = yaw_matrix(item.front)
+    before = item.state.openness
+    for way in item.type.unfolds:
+        # The axis is given as seen from the front; `step` is its direction in the object's own
+        # frame.
+        step = turn @ np.eye(3)[way.axis]
+        own = int(np.argmax(np.abs(step)))
+        size = way.extent(float(item.box_size[own]), before, openness)
+        grown = size - item.box_size[own]
+        item.box_center = item.box_center - way.stays * grown / 2 * step
+        item.box_size = np.where(np.arange(3) == own, size, item.box_size)
 
 
 def _own_matrix(part: ShapePart) -> Array:

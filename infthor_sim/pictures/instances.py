@@ -1,12 +1,11 @@
-"""Colours of objects and classes in the segmentation frames; the same name always has the same
-colour."""
+"""Colours of objects and classes in segmentation frames; a name always has the same colour."""
 
+import hashlib
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from infthor_eval.storage.digests import digest
 from infthor_sim.render.picture import Picture
 from infthor_sim.world import World
 
@@ -26,8 +25,7 @@ def class_color(name: str) -> tuple[int, int, int]:
 
 
 def instance_image(picture: Picture) -> NDArray[np.uint8]:
-    """Return the instance frame (h, w, 4) RGBA, bottom row first; walls have the colour of their
-    class."""
+    """Return the instance frame (h, w, 4) RGBA, bottom row first; walls in their class's colour."""
     colors = [instance_color(name) if "|" in name else class_color(name) for name in picture.names]
     return _paint(picture, colors)
 
@@ -50,5 +48,5 @@ def _paint(picture: Picture, colors: list[tuple[int, int, int]]) -> NDArray[np.u
 
 
 def _color(namespace: str, name: str) -> tuple[int, int, int]:
-    red, green, blue = bytes.fromhex(digest(f"{namespace}:{name}", 3))
+    red, green, blue = hashlib.blake2b(f"{namespace}:{name}".encode(), digest_size=3).digest()
     return red, green, max(blue, 1)  # never black, which is the void

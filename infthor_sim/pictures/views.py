@@ -1,5 +1,4 @@
-"""Pictures of one world: the agent's view, the frame that the client gets, and those of third-party
-cameras."""
+"""Pictures of one world: the agent's view, the client's frame, third-party cameras."""
 
 from dataclasses import dataclass, field
 
@@ -15,8 +14,8 @@ from infthor_sim.render.picture import (
     Picture,
     Rasterizer,
     cast_picture,
-    choose_rasterizer,
     colour_picture,
+    compiled_rasterizer,
 )
 from infthor_sim.render.scene import SceneModel
 from infthor_sim.settings import SimulatorSettings
@@ -40,7 +39,7 @@ class Display:
     height: int = 300
     antialias: bool = True
     map_view: bool = False
-    rasterizer: Rasterizer = field(default_factory=choose_rasterizer)
+    rasterizer: Rasterizer = field(default_factory=compiled_rasterizer)
 
 
 class Views:
@@ -63,8 +62,7 @@ class Views:
         self._frame_arm_version = -1
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
-        """Return the scene's primitives, those of what the hand holds, and the names of the
-        instances."""
+        """Return the scene's primitives, those of what the hand holds, and the instances' names."""
         return self._model.primitives()
 
     def cast(self, rows: Array, camera: PinholeCamera) -> Picture:
@@ -72,8 +70,7 @@ class Views:
         return cast_picture(rows, self.primitives()[2], camera, self._display.rasterizer)
 
     def agent_view(self) -> Picture:
-        """Return the agent's view without what it holds: that hides nothing from its sight, as in
-        AI2-THOR."""
+        """Return the agent's view without what it holds, which hides nothing, as in AI2-THOR."""
         agent = self._world.agent
         display = self._display
         # Walking changes the agent without a new version of the world, so its pose is part of the
@@ -89,8 +86,7 @@ class Views:
         return self._view
 
     def agent_frame(self) -> Picture:
-        """Return what the agent's frame shows: its view with held object or arm, or the map in map
-        view."""
+        """Return the agent's frame: its view with held object or arm, or the map in map view."""
         return (
             self.third_party(map_camera(self._world))
             if self._display.map_view
@@ -115,8 +111,7 @@ class Views:
         return self._frame
 
     def _list_held(self) -> tuple[Array, tuple[str, ...]]:
-        """Return the primitives of the agent's arm, or of what its hand holds, and the names of all
-        instances."""
+        """Return the primitives of the agent's arm or held object, and all instances' names."""
         _, held, names = self.primitives()
         if self._world.arm is None:
             return held, (*names, HAND)

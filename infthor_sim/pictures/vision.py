@@ -1,5 +1,4 @@
-"""What the agent sees: which objects, which point at a pixel, and whether it would see an object
-from elsewhere."""
+"""What the agent sees: which objects, which point at a pixel, and an object from elsewhere."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +45,7 @@ class AgentVision:
         self._visible: tuple[Picture, float, frozenset[str]] | None = None
 
     def visible_ids(self) -> frozenset[str]:
-        """Return the ids of the objects that AI2-THOR would report as visible: shown, and near
-        enough."""
+        """Return the ids of objects that AI2-THOR would call visible: shown and near enough."""
         view = self._views.agent_view()
         distance = self.settings.visibility_distance
         if self._visible is None or self._visible[0] is not view or self._visible[1] != distance:
@@ -97,14 +95,12 @@ class AgentVision:
         return [o for o in containers if o.object_type != "Floor" and o is not item]
 
     def probe(self, item: SimObject) -> VisibilityProbe:
-        """Return a probe that looks for an object from many poses; valid until the world
-        changes."""
+        """Return a probe for an object from many poses; valid until the world changes."""
         rows, _, names = self._views.primitives()
         return VisibilityProbe(rows, names.index(item.object_id), self._display.rasterizer)
 
     def sees_from(self, agent: Agent, probe: VisibilityProbe) -> bool:
-        """Return whether the agent would see the probe's object well, at any distance, in the pose
-        of `agent`.
+        """Return whether the agent would see the probe's object well in a pose, at any distance.
 
         A sliver at the edge of the frame does not count: AI2-THOR looks for points inside an
         object's outline.
@@ -115,8 +111,7 @@ class AgentVision:
         return probe.is_seen_by(camera, _least_pixels(camera))
 
     def point_at(self, x: float, y: float) -> Array | None:
-        """Return the point (3,) seen at (x, y), shares of the frame from its bottom left; None for
-        the void."""
+        """Return the point (3,) at (x, y), shares of the frame from its bottom left, or None."""
         camera = self._views.agent_view().camera
         slope = np.tan(np.radians(camera.field_of_view) / 2)
         ray = np.array(
@@ -137,8 +132,7 @@ class AgentVision:
         return point
 
     def in_frame(self, points: Array) -> NDArray[np.bool_]:
-        """Return which of some points (n, 3) lie well within the agent's frame, whatever may hide
-        them."""
+        """Return which points (n, 3) lie well within the agent's frame, hidden or not."""
         camera = self._views.agent_view().camera
         local = (points - camera.position) @ camera.matrix
         limit = _INNER_FRAME * np.tan(np.radians(camera.field_of_view) / 2)

@@ -10,6 +10,8 @@ from argparse import ArgumentParser
 from contextlib import closing
 from pathlib import Path
 
+from infthor_sim.errors import SimulatorError, UsageError
+
 __all__ = ["main"]
 
 
@@ -20,7 +22,6 @@ def main(arguments: list[str] | None = None) -> int:
     # simulators often share a machine.
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     os.environ.setdefault("NUMBA_NUM_THREADS", str(min(4, os.cpu_count() or 1)))
-    from infthor_eval.errors import InfthorError
     from infthor_sim.pictures.views import Display
     from infthor_sim.player.fifo import FifoPipes
     from infthor_sim.player.server import SimulatorServer
@@ -49,21 +50,18 @@ def main(arguments: list[str] | None = None) -> int:
             SimulatorServer(sim).serve(pipes)
     except BrokenPipeError:
         return 0  # the controller went away while a reply was under way
-    except InfthorError as error:
+    except SimulatorError as error:
         print(f"infthor_sim.player: {error}", file=sys.stderr)
         return error.exit_code
     return 0
 
 
 def _pipe(variable: str) -> Path:
-    from infthor_eval.errors import UsageError
-
     path = os.environ.get(variable)
     if not path:
         raise UsageError(
             f"{variable} is not set: ai2thor's Controller starts this process "
-            "(local_executable_path, FIFO server);"
-            " it cannot be started by hand"
+            "(local_executable_path, FIFO server); it cannot be started by hand"
         )
     return Path(path)
 

@@ -16,7 +16,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import SimulatorError
+from infthor_sim.errors import SimulatorError
 
 __all__ = ["FieldType", "FifoPipes", "parse_action"]
 
@@ -126,8 +126,7 @@ class FifoPipes:
                 return pipe
 
     def _open_in(self) -> int | None:
-        """Open the pipe of actions and wait until the controller writes to it; return None if it
-        dies before."""
+        """Open the pipe of actions once the controller writes to it; None if it dies before."""
         pipe = os.open(self._client_path, os.O_RDONLY | os.O_NONBLOCK)
         poll = select.poll()
         poll.register(pipe, select.POLLIN)
@@ -159,8 +158,7 @@ class FifoPipes:
 
 
 def _widen(pipe: int) -> None:
-    """Give a pipe room for a whole reply, so that its writer goes on while the reader still
-    reads."""
+    """Give a pipe room for a whole reply, so that its writer goes on while the reader reads."""
     try:
         fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _ROOM)
     except PermissionError:
@@ -180,9 +178,8 @@ def parse_action(field_type: int, body: bytes) -> dict[str, Any]:
         )
     try:
         action = json.loads(body)
-        if (
-            b"\\u" in body or b"\xed" in body
-        ):  # halves of characters, which no reply could repeat, become "?"
+        # halves of characters, which no reply could repeat, become "?"
+        if b"\\u" in body or b"\xed" in body:
             action = json.loads(json.dumps(action, ensure_ascii=False).encode(errors="replace"))
     except (ValueError, RecursionError) as error:
         raise SimulatorError(f"the controller sent an action that is not JSON ({error})") from error

@@ -1,5 +1,4 @@
-"""Metadata as msgpack, fast: the fields of an object that do not depend on the agent are packed
-once per state.
+"""Metadata as msgpack, fast: fields that do not depend on the agent are packed once per state.
 
 Packing 70 objects of 45 fields for each reply takes longer than drawing the frame. So the packed
 bytes of those fields are kept, and the few other fields are appended to the same map.
@@ -44,9 +43,8 @@ class MetadataPacker:
     """Packs the metadata of one simulation; keeps packed objects between replies."""
 
     def __init__(self) -> None:
-        self._packed: dict[
-            str, tuple[int, int, bytes]
-        ] = {}  # version, number of fields, their bytes, by object id
+        # version, number of fields, their bytes, by object id
+        self._packed: dict[str, tuple[int, int, bytes]] = {}
         self._colors: tuple[tuple[str, ...], bytes] | None = None
         # The world whose objects are packed. The reference keeps it alive, so that no other world
         # can get its address and be taken for it.

@@ -1,5 +1,4 @@
-"""The process's loop: receive an action, run it, reply with the metadata and the requested
-pictures."""
+"""The process's loop: receive an action, run it, reply with metadata and requested pictures."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any

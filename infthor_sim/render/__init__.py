@@ -1,2 +1,1 @@
-"""The renderer: primitives, a ray caster with a depth buffer, shading, and the shapes of object
-types."""
+"""The renderer: primitives, a ray caster with a depth buffer, shading, shapes of object types."""

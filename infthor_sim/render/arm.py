@@ -19,8 +19,7 @@ _ALONG = euler_matrix((90.0, 0.0, 0.0))  # turns a cylinder, whose axis is y, al
 
 
 def arm_rows(arm: Arm, agent: Agent, instance: int) -> Array:
-    """Return the primitives (n, COLUMNS) of the agent's arm in the world, without the hand's
-    sphere.
+    """Return the primitives (n, COLUMNS) of the agent's arm in the world, without its sphere.
 
     `instance` is the arm's index in the picture's table of instances.
     """

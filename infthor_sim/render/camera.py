@@ -44,8 +44,7 @@ class PinholeCamera:
     far: float = FAR
 
     def rays(self) -> tuple[Array, Array]:
-        """Return the horizontal (width,) and vertical (height,) components of the rays; row 0 is
-        the bottom one."""
+        """Return horizontal (width,) and vertical (height,) components of rays, bottom first."""
         focal = self.height / 2 / math.tan(math.radians(self.field_of_view) / 2)
         us: Array = (np.arange(self.width, dtype=np.float64) + 0.5 - self.width / 2) / focal
         vs: Array = (np.arange(self.height, dtype=np.float64) + 0.5 - self.height / 2) / focal
@@ -114,8 +113,7 @@ def project(prims: Array, camera: PinholeCamera) -> Projection:
 
 
 def _screen_bounds(points: Array, limit: float) -> tuple[Array, Array]:
-    """Return the low and high (u, v) of boxes, by their corners (n, 8, 3) in the camera's frame,
-    clipped at `limit`."""
+    """Return low and high (u, v) of boxes by their corners (n, 8, 3), clipped at `limit`."""
     depth = points[:, :, 2]
     front = depth >= limit
     safe = np.where(front, depth, 1.0)

@@ -1,5 +1,4 @@
-"""The held object in the agent's own frame: whole, low and small, in a gripper that comes from the
-frame's lower edge.
+"""The held object in the agent's frame: whole, low, small, in a gripper from the lower edge.
 
 Only the picture is arranged so. In the world, for the metadata and for collisions, the object is
 somewhere else. The gripper is none of AI2-THOR's, but without it the object would seem to lie on
@@ -30,9 +29,8 @@ from infthor_sim.render.primitives import (
 __all__ = ["HAND", "held_rows"]
 
 HAND = "Hand"  # its name in segmentation frames
-_AWAY = (
-    0.16  # metres in front of the camera: nearer than anything that the agent can stand in front of
-)
+# metres in front of the camera: nearer than anything that the agent can stand in front of
+_AWAY = 0.16
 _NEAREST = 0.115  # of the gripper: beyond the camera's clipping plane
 # of the object's lowest point below the middle of the picture, as a share of its half height
 _FOOT = 0.97
@@ -40,9 +38,8 @@ _FOOT = 0.97
 _SMALLEST = 0.105
 _GROWTH = 0.26
 _LARGEST = 0.2
-_TILT = euler_matrix(
-    (-24.0, 0.0, 0.0)
-)  # towards the camera, which so sees into bowls and the faces of flat things
+# towards the camera, which so sees into bowls and the faces of flat things
+_TILT = euler_matrix((-24.0, 0.0, 0.0))
 _TURN = 155.0  # degrees: the front, as of screens and clocks, faces the camera and a little aside
 
 # Of the gripper, in shares of the picture's half height.
@@ -57,17 +54,15 @@ _RUBBER: Color = (0.95, 0.55, 0.1)
 
 
 def _outlines() -> Array:
-    """Return points on the surface of each form of primitive, scaled by its half extents (forms,
-    points, 3)."""
+    """Return surface points of each form, scaled by its half extents (forms, points, 3)."""
     angles = np.arange(8) * np.pi / 4
     ring = np.stack([np.cos(angles), np.zeros(8), np.sin(angles)], axis=1)
     up = np.array([0.0, 1.0, 0.0])
     box = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     cylinder = np.concatenate([ring - up, ring + up])
     upright = ring[:, [0, 2, 1]]
-    bowl = (
-        upright * [1.0, 2.0, 1.0] * (upright[:, [1]] < 0) + up
-    )  # the lower half of a sphere, from -1 to 1
+    # the lower half of a sphere, from -1 to 1
+    bowl = upright * [1.0, 2.0, 1.0] * (upright[:, [1]] < 0) + up
     by_form = {
         Form.BOX: np.concatenate([box, box]), Form.CYLINDER: cylinder, Form.CUP: cylinder,
         Form.ELLIPSOID: np.concatenate([ring, upright]),
@@ -80,8 +75,7 @@ _OUTLINES = _outlines()
 
 
 def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) -> Array:
-    """Return the primitives of `item` and its contents, moved to where the picture shows them, and
-    of the gripper.
+    """Return the primitives of `item` and contents as the picture shows them, and of the gripper.
 
     Args:
         rows: the primitives in the world (n, COLUMNS).
@@ -93,17 +87,17 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
     size = float(np.max(item.box_size))
     scale = 2 * min(_SMALLEST + _GROWTH * size, _LARGEST) * reach / size
     upright = camera.matrix @ _TILT @ euler_matrix((0.0, _TURN + item.front, 0.0)) @ item.matrix.T
-    shown = rows.copy()
-    shown[:, HALF : HALF + 3] *= scale
+    moved = rows.copy()
+    moved[:, HALF : HALF + 3] *= scale
     axes = rows[:, AXES : AXES + 9].reshape(-1, 3, 3) @ upright.T
-    shown[:, AXES : AXES + 9] = axes.reshape(-1, 9)
+    moved[:, AXES : AXES + 9] = axes.reshape(-1, 9)
     centers = scale * (rows[:, CENTER : CENTER + 3] - item.center) @ upright.T
     outlines = _OUTLINES[rows[:, FORM].astype(int)].copy()
     outlines[:, :, [0, 2]] *= np.where(outlines[:, :, 1] < 0, rows[:, [BOTTOM]], rows[:, [TOP]])[
         :, :, None
     ]
     surfaces = centers[:, None] + np.einsum(
-        "nkj,nj,nji->nki", outlines, shown[:, HALF : HALF + 3], axes
+        "nkj,nj,nji->nki", outlines, moved[:, HALF : HALF + 3], axes
     )
     points = surfaces.reshape(-1, 3) @ camera.matrix  # right, up and forward of the object's middle
     low, high = points.min(axis=0), points.max(axis=0)
@@ -111,19 +105,18 @@ def held_rows(rows: Array, item: SimObject, camera: PinholeCamera, hand: int) ->
     # be at the foot.
     height = float(np.max(-_FOOT * reach / _AWAY * (_AWAY + points[:, 2]) - points[:, 1]))
     middle = np.array([0.0, height, _AWAY])
-    shown[:, CENTER : CENTER + 3] = camera.position + centers + camera.matrix @ middle
+    moved[:, CENTER : CENTER + 3] = camera.position + centers + camera.matrix @ middle
     foot = points[points[:, 1] <= low[1] + _GRASPED * (high[1] - low[1])]
     away = max(_AWAY + float(foot[:, 2].mean()), _NEAREST)
     across = foot[:, 0] / (_AWAY + foot[:, 2]) * _AWAY / reach
     grip = primitives.rows(
         _gripper(float(across.min()), float(across.max())), np.zeros(3), np.eye(3), hand
     )
-    return np.concatenate([shown, _in_picture(grip, away, away * reach / _AWAY, camera)])
+    return np.concatenate([moved, _in_picture(grip, away, away * reach / _AWAY, camera)])
 
 
 def _gripper(left: float, right: float) -> list[ShapePart]:
-    """Return a bar at the lower edge of the picture and two jaws beside what is held, in shares of
-    its half height."""
+    """Return a bar at the lower edge and two jaws beside what is held, in half heights."""
     middle = (left + right) / 2
     half = min(max((right - left) / 2, _NARROWEST), _WIDEST)
     parts = [
@@ -144,8 +137,7 @@ def _gripper(left: float, right: float) -> list[ShapePart]:
 
 
 def _in_picture(rows: Array, away: float, scale: float, camera: PinholeCamera) -> Array:
-    """Return primitives in shares of the picture's half height as in the world, `away` metres from
-    the camera."""
+    """Return primitives in shares of the picture's half height, `away` metres from the camera."""
     at = camera.position + camera.matrix @ np.array([0.0, 0.0, away])
     rows[:, CENTER : CENTER + 3] = at + scale * rows[:, CENTER : CENTER + 3] @ camera.matrix.T
     rows[:, HALF : HALF + 3] *= scale

@@ -5,24 +5,22 @@ that it takes from another file. A digest of all the kernels' sources beside the
 the cache is stale.
 """
 
+import hashlib
 from pathlib import Path
-
-from infthor_eval.storage.digests import digest
 
 __all__ = ["drop_stale_kernels"]
 
 _SOURCES = (  # every file that compiled code comes from
-    "camera.py", "creases.py", "creases_numba.py", "probe_numba.py", "lighting.py", "patterns.py",
-    "primitives.py",
-    "raster_numba.py", "shading_numba.py", "smoothing.py", "smoothing_numba.py", "table.py",
+    "camera.py", "creases_numba.py", "lighting.py", "patterns.py", "primitives.py",
+    "probe_numba.py", "raster_numba.py", "shading_numba.py", "smoothing_numba.py", "table.py",
 )  # fmt: skip
 _HERE = Path(__file__).parent
 
 
 def drop_stale_kernels(folder: Path = _HERE) -> bool:
-    """Remove kernels that were compiled from other sources than those in `folder`; return whether
-    there were any."""
-    sources = digest(b"".join((folder / name).read_bytes() for name in _SOURCES))
+    """Remove kernels compiled from other sources than those in `folder`; return if any were."""
+    content = b"".join((folder / name).read_bytes() for name in _SOURCES)
+    sources = hashlib.blake2b(content, digest_size=16).hexdigest()
     cache = folder / "__pycache__"
     stamp = cache / "kernels.stamp"
     if stamp.exists() and stamp.read_text(encoding="ascii") == sources:

@@ -1,5 +1,4 @@
-"""The lights of a picture: one sun, the sky's ambient light, a weak light at the camera, and
-lamps."""
+"""The lights of a picture: a sun, the sky's ambient light, one at the camera, and lamps."""
 
 from dataclasses import dataclass
 
@@ -14,11 +13,8 @@ AMBIENT = 0.46
 SKY = 0.12
 SUN = 0.3
 HEADLIGHT = 0.16
-SUN_DIRECTION = (
-    0.40824829046386296,
-    0.8164965809277259,
-    -0.40824829046386313,
-)  # towards the sun, unit length
+# towards the sun, unit length
+SUN_DIRECTION = (0.40824829046386296, 0.8164965809277259, -0.40824829046386313)
 LAMP_REACH = 0.35  # squared metres at which a lamp's light has fallen to half
 
 

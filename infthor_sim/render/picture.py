@@ -1,6 +1,5 @@
 """Pictures from a camera: colours, depth, and the object that each pixel shows."""
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -13,7 +12,7 @@ from infthor_sim.render.kernel_cache import drop_stale_kernels
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import INSTANCE
 
-__all__ = ["Picture", "Rasterizer", "cast_picture", "choose_rasterizer", "colour_picture"]
+__all__ = ["Picture", "Rasterizer", "cast_picture", "colour_picture", "compiled_rasterizer"]
 
 Cast = Callable[[Array, Projection, PinholeCamera], tuple[Array, NDArray[np.int32]]]
 Pixels = NDArray[np.uint8]
@@ -29,10 +28,9 @@ Smooth = Callable[
 
 @dataclass(frozen=True)
 class Rasterizer:
-    """One implementation of the renderer.
+    """The renderer's functions: compiled ones, or those in numpy that tests hold them to.
 
     Attributes:
-        name: `numba` or `numpy`.
         cast: function that returns depth and nearest primitive of each pixel.
         creases: function that returns factors of brightness from the depth.
         shade: function that returns the colours of cast pixels.
@@ -40,7 +38,6 @@ class Rasterizer:
         is_visible: function that returns whether enough pixels show some of the primitives.
     """
 
-    name: str
     cast: Cast
     creases: Creases
     shade: Shade
@@ -71,42 +68,16 @@ class Picture:
     names: tuple[str, ...]
 
 
-def choose_rasterizer(name: str | None = None) -> Rasterizer:
-    """Return the rasterizer: `numba`, or `numpy` if numba is not installed or INFTHOR_SIM_RENDERER
-    asks for it."""
-    chosen = name or os.environ.get("INFTHOR_SIM_RENDERER", "")
-    if chosen != "numpy":
-        drop_stale_kernels()  # before the imports, which load cached kernels
-        try:
-            from infthor_sim.render import (
-                creases_numba,
-                probe_numba,
-                raster_numba,
-                shading_numba,
-                smoothing_numba,
-            )
-        except ModuleNotFoundError:
-            if chosen == "numba":
-                raise
-        else:
-            return Rasterizer(
-                "numba", raster_numba.cast, creases_numba.crease_factors, shading_numba.shade,
-                smoothing_numba.smooth,
-                probe_numba.is_visible,
-            )  # fmt: skip
-    from infthor_sim.render import (
-        creases,
-        probe_numpy,
-        raster_numpy,
-        shading_numpy,
-        smoothing_numpy,
-    )
+def compiled_rasterizer() -> Rasterizer:
+    """Return the rasterizer compiled by numba."""
+    drop_stale_kernels()  # before the imports, which load cached kernels
+    from infthor_sim.render.creases_numba import crease_factors
+    from infthor_sim.render.probe_numba import is_visible
+    from infthor_sim.render.raster_numba import cast
+    from infthor_sim.render.shading_numba import shade
+    from infthor_sim.render.smoothing_numba import smooth
 
-    return Rasterizer(
-        "numpy", raster_numpy.cast, creases.crease_factors, shading_numpy.shade,
-        smoothing_numpy.smooth,
-        probe_numpy.is_visible,
-    )  # fmt: skip
+    return Rasterizer(cast, crease_factors, shade, smooth, is_visible)
 
 
 def cast_picture(

@@ -1,5 +1,4 @@
-"""The primitives of the ray caster: boxes, ellipsoids, (tapered) cylinders and bowls, a row of
-numbers each.
+"""The ray caster's primitives: boxes, ellipsoids, (tapered) cylinders, bowls; one a row.
 
 A row holds the primitive's world pose, half extents, colour and material; see the column constants.
 Plain arrays, as numba compiles loops over them and one numpy call transforms them all.

@@ -1,5 +1,4 @@
-"""Checking whether an object is visible, compiled by numba: it stops as soon as enough pixels show
-the object."""
+"""Whether an object is visible, compiled by numba: it stops at enough pixels."""
 
 import numpy as np
 from numba import njit
@@ -12,9 +11,8 @@ from infthor_sim.render.raster_numba import hit
 
 __all__ = ["is_visible"]
 
-_COARSE = (
-    8  # every eighth row and column is tried first: an object in full view shows up there already
-)
+# every eighth row and column is tried first: an object in full view shows up there already
+_COARSE = 8
 
 
 def is_visible(
@@ -24,8 +22,7 @@ def is_visible(
     own: NDArray[np.bool_],
     min_pixels: int,
 ) -> bool:
-    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked
-    in `own` (n,)."""
+    """Return whether at least `min_pixels` pixels show a primitive marked in `own` (n,)."""
     us, vs = camera.rays()
     profiles = prims[projection.index][:, [FORM, BOTTOM, TOP]]
     enough = _is_visible(

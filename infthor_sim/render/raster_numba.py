@@ -1,9 +1,8 @@
-"""The ray caster compiled by numba: for each primitive, nearest first, the pixels of its box on the
-screen.
+"""The ray caster, compiled by numba: for each primitive the pixels of its box on the screen.
 
-`raster_numpy` computes the same picture to the last bit. So all numbers are float64, sums are in
-the same order (hence some parentheses), and numba's `fastmath`, which would reorder them, stays
-off.
+The nearest primitive comes first. The tests' renderer in numpy computes the same picture to the
+last bit. So all numbers are float64, sums are in the same order (hence some parentheses), and
+numba's `fastmath`, which would reorder them, stays off.
 """
 
 import math
@@ -28,8 +27,7 @@ _BOWL = int(Form.BOWL)
 def cast(
     prims: Array, projection: Projection, camera: PinholeCamera
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`,
-    or -1 (h, w)."""
+    """Return depth (h, w), metres, and each pixel's nearest primitive in `projection`, or -1."""
     us, vs = camera.rays()
     depth = np.empty((len(vs), len(us)))
     nearest = np.empty((len(vs), len(us)), dtype=np.int32)
@@ -155,8 +153,7 @@ def hit(
     dz: float,
     clip: float,
 ) -> float:
-    """Return the depth at which a ray from o along d meets a primitive, in its scaled frame;
-    infinity for a miss."""
+    """Return the depth at which a ray from o along d meets a primitive (scaled frame), or inf."""
     if form == _BOX:
         return _hit_box(ox, oy, oz, dx, dy, dz)
     if form == _ELLIPSOID:

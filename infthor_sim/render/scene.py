@@ -1,11 +1,10 @@
-"""A world as primitives: the rooms' shell, and every object's shape, cached until the object
-changes."""
+"""A world as primitives: the rooms' shell and objects' shapes, cached until the object changes."""
 
 import numpy as np
 
 from infthor_sim.geometry import Array
 from infthor_sim.objects import SimObject
-from infthor_sim.render.finishes import apply_finishes
+from infthor_sim.pictures.appearance import apply_finishes
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import COLUMNS, rows
 from infthor_sim.render.shapes import shape
@@ -30,8 +29,7 @@ class SceneModel:
         self._held: Array = np.zeros((0, COLUMNS))
 
     def primitives(self) -> tuple[Array, Array, tuple[str, ...]]:
-        """Return the primitives of everything but the held object (n, COLUMNS), those of it, and
-        names of instances."""
+        """Return all primitives but the held object's (n, COLUMNS), its own, instances' names."""
         if self._version != self._world.version:
             self._rebuild()
         return self._all, self._held, self._names
@@ -68,9 +66,8 @@ class SceneModel:
         if world.held is not None:
             in_hand |= {o.object_id for o in world.descendants(world.objects[world.held])}
         for index, item in enumerate(world.objects.values(), start=len(SHELL_NAMES)):
-            if world.is_hidden(
-                item
-            ):  # nobody sees into a closed fridge, so its contents need not be drawn
+            # nobody sees into a closed fridge, so its contents need not be drawn
+            if world.is_hidden(item):
                 continue
             (held if item.object_id in in_hand else parts).append(self._object_rows(item, index))
         self._rows = {key: value for key, value in self._rows.items() if key in world.objects}

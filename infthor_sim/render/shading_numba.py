@@ -32,19 +32,17 @@ _BOX, _ELLIPSOID, _CUP, _BOWL = int(Form.BOX), int(Form.ELLIPSOID), int(Form.CUP
 _WOOD, _PLANKS, _TILES = int(Material.WOOD), int(Material.PLANKS), int(Material.TILES)
 _FABRIC, _STONE, _METAL = int(Material.FABRIC), int(Material.STONE), int(Material.METAL)
 _GLASS, _PAPER, _CARPET = int(Material.GLASS), int(Material.PAPER), int(Material.CARPET)
-# Compiled here and not in `patterns`, which must work without numba.
-_wood, _planks, _tiles = (
-    njit(cache=True, error_model="numpy")(f)
-    for f in (patterns.wood, patterns.planks, patterns.tiles)
-)
-_fabric, _stone, _metal = (
-    njit(cache=True, error_model="numpy")(f)
-    for f in (patterns.fabric, patterns.stone, patterns.metal)
-)
-_glass, _paper, _carpet = (
-    njit(cache=True, error_model="numpy")(f)
-    for f in (patterns.glass, patterns.paper, patterns.carpet)
-)
+# Compiled here: the tests' renderer in numpy calls the plain functions with arrays.
+_compiled = njit(cache=True, error_model="numpy")
+_wood = _compiled(patterns.wood)
+_planks = _compiled(patterns.planks)
+_tiles = _compiled(patterns.tiles)
+_fabric = _compiled(patterns.fabric)
+_stone = _compiled(patterns.stone)
+_metal = _compiled(patterns.metal)
+_glass = _compiled(patterns.glass)
+_paper = _compiled(patterns.paper)
+_carpet = _compiled(patterns.carpet)
 
 
 def shade(
@@ -56,8 +54,7 @@ def shade(
     factors: Array,
     lights: Lights,
 ) -> NDArray[np.uint8]:
-    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times
-    its factor."""
+    """Return RGB (h, w, 3), bottom row first, of cast pixels, each brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     table = shading_table(prims, projection, lights)
@@ -117,8 +114,7 @@ def _lamp_light(
     t: float,
     eye: Any,
 ) -> float:
-    """Return the light of the lamps at depth t on the ray (u, v), on a surface of unit normal (nx,
-    ny, nz).
+    """Return the lamps' light at depth t on the ray (u, v), on a surface of unit normal n.
 
     The normal is given along the axes of primitive `k`; the lamps are the table's rows from `first`
     on.
@@ -164,8 +160,7 @@ def brightness(
     depths: Array,
     levels: Array,
 ) -> None:
-    """Write to `levels` the brightness of primitives where rays hit them; lamps are the table's
-    rows from `first` on.
+    """Write the brightness of primitives where rays hit them to `levels`; lamps: from `first` on.
 
     Args:
         orders: the primitives (n,); -1 for none, whose level stays as it is.
@@ -234,9 +229,8 @@ def brightness(
             nx, ny, nz, facing = nx * shrink, ny * shrink, nz * shrink, facing * shrink
             sun = nx * table[k, SUNWARD] + ny * table[k, SUNWARD + 1] + nz * table[k, SUNWARD + 2]
             up = nx * table[k, AXES + 1] + ny * table[k, AXES + 4] + nz * table[k, AXES + 7]
-        if (
-            facing > 0.0
-        ):  # the normal points away from the camera: another face, or the inside of a cup
+        # the normal points away from the camera: another face, or the inside of a cup
+        if facing > 0.0:
             nx, ny, nz, sun, up = -nx, -ny, -nz, -sun, -up
         headlight = HEADLIGHT * abs(facing) / math.sqrt(1.0 + u * u + v * v)
         light = (AMBIENT + SKY * up + SUN * max(sun, 0.0) + headlight) * daylight

@@ -123,8 +123,7 @@ def _thresholds(room: RoomShell, color: Color, material: Material) -> list[Shape
 def _pieces(
     start: float, end: float, doors: list[tuple[float, float]], floor: float
 ) -> list[tuple[float, float, float]]:
-    """Return the stretches of a wall as (from, to, bottom): whole ones between doorways, and those
-    above them."""
+    """Return a wall's stretches (from, to, bottom): whole ones, and those above doorways."""
     stretches = []
     at = start
     for low, high in doors:

@@ -1,4 +1,9 @@
-"""Smoothing of jagged pixels, compiled by numba."""
+"""Anti-aliasing: which pixels are jagged, and the rays that smooth them; compiled by numba.
+
+Only pixels at a jump of brightness are smoothed. Four rays through such a pixel are tested against
+the primitives that the pixel and its neighbours show, and no others. That misses what no pixel near
+shows, but costs little.
+"""
 
 import math
 from typing import Any
@@ -13,13 +18,20 @@ from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import BOTTOM, COLOR, FORM, TOP
 from infthor_sim.render.raster_numba import hit
 from infthor_sim.render.shading_numba import brightness, eye_of
-from infthor_sim.render.smoothing import JUMP, NEIGHBOURS, SUBPIXELS
 from infthor_sim.render.table import ORIGIN, STEPS, shading_table
 
-__all__ = ["smooth"]
+__all__ = ["JUMP", "NEIGHBOURS", "SUBPIXELS", "smooth"]
 
-_NEIGHBOURS = np.array(NEIGHBOURS)
-_SUBPIXELS = np.array(SUBPIXELS)
+JUMP = 48  # of brightness between neighbours, as the sum of three channels (of 765)
+# A rotated grid: no two rays share a row or column, so that nearly level and nearly upright edges
+# get all four steps.
+SUBPIXELS = np.array([(-0.125, -0.375), (0.375, -0.125), (-0.375, 0.125), (0.125, 0.375)])
+"""Points of a pixel that the rays go through, from its middle, as shares of its width and
+height."""
+NEIGHBOURS = np.array(
+    [(0, 0), (0, -1), (0, 1), (-1, 0), (1, 0), (-1, -1), (-1, 1), (1, -1), (1, 1)]
+)
+"""The pixel and its neighbours, as offsets of row and column."""
 
 
 def smooth(
@@ -60,27 +72,26 @@ def _find_jagged(rgb: NDArray[np.uint8]) -> NDArray[np.int64]:
             jump = np.uint8(abs(total[y + 1, x] - total[y, x]) > JUMP)
             marked[y, x] |= jump
             marked[y + 1, x] |= jump
-    places = np.empty((height * width, 2), dtype=np.int64)
+    positions = np.empty((height * width, 2), dtype=np.int64)
     count = 0
     for y in range(height):
         for x in range(width):
             if marked[y, x]:
-                places[count, 0] = y
-                places[count, 1] = x
+                positions[count, 0] = y
+                positions[count, 1] = x
                 count += 1
-    return places[:count]
+    return positions[:count]
 
 
 @njit(cache=True, error_model="numpy")
 def _candidates(
     nearest: NDArray[np.int32], y: int, x: int, orders: NDArray[np.int32], at: NDArray[np.int64]
 ) -> int:
-    """Write the primitives that a pixel and its neighbours show to `orders`, and where to `at`;
-    return how many."""
+    """Write what a pixel and its neighbours show to `orders`, where to `at`; return how many."""
     count = 0
-    for j in range(len(_NEIGHBOURS)):
-        yy = y + _NEIGHBOURS[j, 0]
-        xx = x + _NEIGHBOURS[j, 1]
+    for j in range(len(NEIGHBOURS)):
+        yy = y + NEIGHBOURS[j, 0]
+        xx = x + NEIGHBOURS[j, 1]
         if (
             yy < 0
             or xx < 0
@@ -118,22 +129,21 @@ def _smooth(
 ) -> None:
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
     # Each pixel reads and writes only its own colour: smoothing in place needs no copy.
-    parts = len(_SUBPIXELS)
-    shown = np.full(
-        len(jagged) * parts, -1, dtype=np.int32
-    )  # the primitive that each ray hits; -1 for none
-    ray_u = np.empty(len(shown))
-    ray_v = np.empty(len(shown))
-    depths = np.empty(len(shown))
-    crease = np.empty(len(shown))
-    levels = np.empty(len(shown))
-    orders = np.empty(len(_NEIGHBOURS), dtype=np.int32)
-    at = np.empty((len(_NEIGHBOURS), 2), dtype=np.int64)
-    for place in range(len(jagged)):
-        y, x = jagged[place, 0], jagged[place, 1]
+    parts = len(SUBPIXELS)
+    # the primitive that each ray hits; -1 for none
+    hits = np.full(len(jagged) * parts, -1, dtype=np.int32)
+    ray_u = np.empty(len(hits))
+    ray_v = np.empty(len(hits))
+    depths = np.empty(len(hits))
+    crease = np.empty(len(hits))
+    levels = np.empty(len(hits))
+    orders = np.empty(len(NEIGHBOURS), dtype=np.int32)
+    at = np.empty((len(NEIGHBOURS), 2), dtype=np.int64)
+    for index in range(len(jagged)):
+        y, x = jagged[index, 0], jagged[index, 1]
         count = _candidates(nearest, y, x, orders, at)
         for part in range(parts):
-            u, v = us[x] + _SUBPIXELS[part, 0] * pixel, vs[y] + _SUBPIXELS[part, 1] * pixel
+            u, v = us[x] + SUBPIXELS[part, 0] * pixel, vs[y] + SUBPIXELS[part, 1] * pixel
             best = math.inf
             chosen = -1
             for k in range(count):
@@ -166,22 +176,22 @@ def _smooth(
                     best = t
                     chosen = k
             if chosen >= 0:
-                i = place * parts + part
-                shown[i] = orders[chosen]
+                i = index * parts + part
+                hits[i] = orders[chosen]
                 ray_u[i] = u
                 ray_v[i] = v
                 depths[i] = best
                 # The crease factor is that of the pixel that showed it, as there is no depth around
                 # the ray.
                 crease[i] = factors[at[chosen, 0], at[chosen, 1]]
-    brightness(table, first, eye, daylight, shown, ray_u, ray_v, depths, levels)
-    for place in range(len(jagged)):
-        y, x = jagged[place, 0], jagged[place, 1]
+    brightness(table, first, eye, daylight, hits, ray_u, ray_v, depths, levels)
+    for index in range(len(jagged)):
+        y, x = jagged[index, 0], jagged[index, 1]
         red = 0.0
         green = 0.0
         blue = 0.0
-        for i in range(place * parts, (place + 1) * parts):
-            order = shown[i]
+        for i in range(index * parts, (index + 1) * parts):
+            order = hits[i]
             if order < 0:  # the ray misses all candidates: the pixel's own colour is taken
                 red = red + rgb[y, x, 0]
                 green = green + rgb[y, x, 1]

@@ -1,8 +1,7 @@
 # ruff: noqa: SIM905 - tables of names read best as words
 """Procedural bathrooms: a washstand, a toilet, a tub, towel rails and small things."""
 
-from infthor_sim.scenes.basins import name_after, rim_pieces
-from infthor_sim.scenes.roomplan import RoomPlan
+from infthor_sim.scenes.roomplan import RoomPlan, name_after, rim_pieces
 
 __all__ = ["furnish_bathroom"]
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import DataError, wrap_errors
 from infthor_sim.agent import AGENT_HEIGHT, Agent
+from infthor_sim.errors import DataError, in_one_line
 from infthor_sim.physics.navigation import NavGrid
 from infthor_sim.scenes.dataset import FloorPlanData
 from infthor_sim.scenes.floorplan import build_floor_plan
@@ -20,6 +20,8 @@ __all__ = ["Catalogue"]
 
 _PROCEDURAL = re.compile(r"([a-z-]+)-(\d+)")
 _FLOOR_PLAN = re.compile(r"FloorPlan(_[A-Za-z0-9_]+|\d+)")
+# What a floor plan whose fields are missing or of other types raises.
+_MALFORMED = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
 
 
 class Catalogue:
@@ -87,6 +89,9 @@ class Catalogue:
         extra = self._supplement.get(name, Supplement())
         objects = self._data.objects(name)
         cells = self._data.cells(name)
-        malformed = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError)
-        with wrap_errors(f"{name}: its recording is malformed", "record it again", catch=malformed):
+        try:
             return build_floor_plan(name, objects, cells, extra)
+        except _MALFORMED as error:
+            raise DataError(
+                f"{name}: its recording is malformed ({in_one_line(error)}); record it again"
+            ) from error

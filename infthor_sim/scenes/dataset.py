@@ -1,5 +1,4 @@
-"""Recorded floor plans on disk: objects as AI2-THOR 5 reported them, and cells that the agent
-reached.
+"""Recorded floor plans on disk: objects as AI2-THOR 5 reported them, and cells of the agent.
 
 A data folder holds `thor_scenes/objects.jsonl.gz` (one `{"scene", "objects"}` a line) and
 `alfred/layouts/FloorPlan<N>-layout.npy` (reachable (x, z), metres).
@@ -15,7 +14,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from infthor_eval.errors import DataError, in_one_line
+from infthor_sim.errors import DataError, in_one_line
 from infthor_sim.geometry import Array
 
 __all__ = ["FloorPlanData"]
@@ -65,8 +64,7 @@ class FloorPlanData:
         return objects
 
     def cells(self, scene: str) -> Array | None:
-        """Return the reachable (x, z) of a floor plan, metres (n, 2); None if the folder has no
-        layout of it.
+        """Return a floor plan's reachable (x, z), metres (n, 2); None without a layout of it.
 
         Raises:
             DataError: the layout is not an array of that form.

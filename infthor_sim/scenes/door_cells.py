@@ -20,41 +20,38 @@ _KNEE = 0.1  # metres above the floor below which nothing stops the agent
 
 
 def add_door_cells(world: World) -> None:
-    """Add the cells beside the grid that only a door or drawer, closed now, would block if it were
-    open.
+    """Add the cells beside the grid that only a door or drawer, closed now, could block.
 
     ALFRED's layouts have no such cells, but AI2-THOR lets its agent stand there while the door is
     closed. An open door blocks them as it blocks others, see `obstacles`.
     """
-    places = np.array(sorted(set(_fringe(world.nav)))).reshape(-1, 2)
-    free = places[_in_reach_of_a_door(world, places) & _clear(world, places)]
+    points = np.array(sorted(set(_fringe(world.nav)))).reshape(-1, 2)
+    free = points[_in_reach_of_a_door(world, points) & _clear(world, points)]
     world.nav = NavGrid([*world.nav, *((float(x), float(z)) for x, z in free)])
 
 
 def _fringe(nav: NavGrid) -> Iterator[tuple[float, float]]:
-    """Yield the places one or two steps off the grid, with repetitions."""
+    """Yield the points one or two steps off the grid, with repetitions."""
     for x, z in nav:
         for i in (-2, -1, 0, 1, 2):
             for j in (-2, -1, 0, 1, 2):
-                place = (round(x + i * CELL, 4), round(z + j * CELL, 4))
-                if abs(i) + abs(j) in (1, 2) and not nav.can_stand(*place):
-                    yield place
+                point = (round(x + i * CELL, 4), round(z + j * CELL, 4))
+                if abs(i) + abs(j) in (1, 2) and not nav.can_stand(*point):
+                    yield point
 
 
-def _in_reach_of_a_door(world: World, places: Array) -> NDArray[np.bool_]:
-    """Return at which places (n, 2) the agent would touch a door or drawer on its way to wide
-    open."""
-    reached = np.zeros(len(places), dtype=bool)
+def _in_reach_of_a_door(world: World, points: Array) -> NDArray[np.bool_]:
+    """Return at which points (n, 2) the agent would touch a door or drawer that opens wide."""
+    reached = np.zeros(len(points), dtype=bool)
     for item in world.objects.values():
         if item.state.openness == 0 and (item.type.hinged or item.type.slides):
             for leaf in _leaves(item):
-                reached |= level_gaps(places, *leaf) < _RADIUS
+                reached |= level_gaps(points, *leaf) < _RADIUS
     return reached
 
 
 def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
-    """Yield the boxes (low and high corner) around an object's door or drawer on its way to wide
-    open."""
+    """Yield the corners of boxes around an object's door or drawer as it opens wide."""
     opened = item.duplicate(item.object_id)
     for opened.state.openness in _OPENNESS:
         leaf = door_leaf(opened)
@@ -62,15 +59,14 @@ def _leaves(item: SimObject) -> Iterator[tuple[Array, Array]]:
             yield leaf
 
 
-def _clear(world: World, places: Array) -> NDArray[np.bool_]:
-    """Return at which places (n, 2) the agent's capsule touches neither an object nor the room's
-    walls."""
-    low, high = (corner[[0, 2]] for corner in world.scene_bounds())
+def _clear(world: World, points: Array) -> NDArray[np.bool_]:
+    """Return at which points (n, 2) the agent's capsule touches neither object nor wall."""
+    low, high = np.array(world.scene_bounds())[:, [0, 2]]
     floor = world.standing_height - AGENT_HEIGHT
-    clear = np.minimum(places - low, high - places).min(axis=1, initial=np.inf) >= _RADIUS
+    clear = np.minimum(points - low, high - points).min(axis=1, initial=np.inf) >= _RADIUS
     for item in world.objects.values():
         bottom, top = item.bounds()
         in_height = top[1] > floor + _KNEE and bottom[1] < floor + 2 * AGENT_HEIGHT
         if in_height and item.object_type != "Floor":
-            clear &= level_gaps(places, bottom, top) >= _RADIUS
+            clear &= level_gaps(points, bottom, top) >= _RADIUS
     return np.asarray(clear)

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import DataError
 from infthor_sim.agent import AGENT_HEIGHT, Agent
+from infthor_sim.errors import DataError
 from infthor_sim.geometry import Array
 from infthor_sim.objects import SimObject
 from infthor_sim.physics.navigation import NavGrid
@@ -24,12 +24,8 @@ _CEILING = 2.6  # metres
 # Poses (x, z, yaw) that AI2-THOR starts its agent in, where known: recordings do not have them.
 # Others are inferred.
 _STARTS = {"FloorPlan28": (-1.5, -1.5, 180.0)}
-_STYLES = {
-    0: "tiles",
-    2: "wood",
-    3: "carpet",
-    4: "tiles",
-}  # of floors, by the hundreds of the floor plan
+# of floors, by the hundreds of the floor plan
+_STYLES = {0: "tiles", 2: "wood", 3: "carpet", 4: "tiles"}
 
 
 def build_floor_plan(
@@ -61,18 +57,8 @@ def build_floor_plan(
     objects = use_trajectory_ids(objects, extra.objects, nav, floor)
     room = _room(name, list(objects.values()), cells, floor)
     height = floor + AGENT_HEIGHT if extra.floor_y is None else extra.floor_y
-    start = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
-    yaw = nav.freest_yaw(*start, reach=3.0)
-    x, z, yaw = _STARTS.get(name, (*start, yaw))
-    world = World(
-        name,
-        objects,
-        (room,),
-        nav,
-        Agent(np.array([x, height, z]), yaw),
-        seed=_number(name),
-        coarse=True,
-    )
+    agent = _agent_at_start(name, nav, room, height)
+    world = World(name, objects, (room,), nav, agent, seed=_number(name), coarse=True)
     world.open_at_start = frozenset(o.object_id for o in objects.values() if o.state.openness > 0)
     infer_layout(world)
     for item in objects.values():
@@ -85,9 +71,15 @@ def build_floor_plan(
     return world
 
 
+def _agent_at_start(name: str, nav: NavGrid, room: RoomShell, height: float) -> Agent:
+    """Return the agent as AI2-THOR starts it, or in the room's middle towards the most floor."""
+    middle = nav.nearest((room.x_min + room.x_max) / 2, (room.z_min + room.z_max) / 2)
+    x, z, yaw = _STARTS.get(name, (*middle, nav.freest_yaw(*middle, reach=3.0)))
+    return Agent(np.array([x, height, z]), yaw)
+
+
 def _assign_recorded_parents(world: World, entries: Sequence[Mapping[str, Any]]) -> None:
-    """Attach loose objects to the receptacles that the recording names: the innermost, which is the
-    smallest."""
+    """Attach loose objects to the innermost receptacle that the recording names, the smallest."""
     for entry in entries:
         item = world.objects.get(str(entry["objectId"]))
         if item is None or not item.type.pickupable:

@@ -1,12 +1,10 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""Procedural kitchens: a counter with sink, stove and appliances along one wall, a table with
-chairs, small things."""
+"""Procedural kitchens: a counter with sink, stove and appliances, a table with chairs."""
 
 import numpy as np
 
 from infthor_sim.objects import SimObject
-from infthor_sim.scenes.basins import name_after, rim_pieces
-from infthor_sim.scenes.roomplan import RoomPlan
+from infthor_sim.scenes.roomplan import RoomPlan, name_after, rim_pieces
 
 __all__ = ["furnish_kitchen"]
 

@@ -1,5 +1,4 @@
-"""Inference of what recorded boxes do not say: fronts, hinges, drawers in desks, sinks in counters,
-burners' knobs."""
+"""What recorded boxes do not say: fronts, hinges, drawers in desks, sinks in counters, knobs."""
 
 from collections.abc import Iterator
 
@@ -20,8 +19,7 @@ _BEFORE = 0.6
 
 
 def infer_layout(world: World) -> None:
-    """Set fronts, hinges, outlines, hollow furniture, knobs and surface heights of a world's
-    objects, in place."""
+    """Set fronts, hinges, outlines, hollows, knobs and surface heights of objects, in place."""
     items = list(world.objects.values())
     fixed = [o for o in items if not o.type.pickupable]
     for item in fixed:
@@ -46,8 +44,7 @@ def infer_layout(world: World) -> None:
 
 
 def _front(item: SimObject, nav: NavGrid) -> float:
-    """Return the yaw of the front in the object's own frame, degrees: towards the most free
-    floor."""
+    """Return the front's yaw in the object's own frame, degrees: towards the most free floor."""
     low, high = item.bounds()
     center = (low + high) / 2
     half = (high - low) / 2
@@ -63,16 +60,14 @@ def _front(item: SimObject, nav: NavGrid) -> float:
         bonus = 100 if item.object_type == "Cabinet" and at_face else 0
         thin = float(np.abs(direction) @ half) <= min(half[0], half[2]) + 1e-6
         flat = 3 if thin and item.type.flat else 0
-        scores.append(
-            (free + bonus + flat * 10, thin, -angle)
-        )  # ties: the thin side, then the smaller angle
+        # ties: the thin side, then the smaller angle
+        scores.append((free + bonus + flat * 10, thin, -angle))
     best = max(scores)
     return (-best[2] - float(item.rotation[1])) % 360
 
 
 def _hinge(item: SimObject) -> int:
-    """Return the side of the hinge, -1 or 1, seen from the front: where a cabinet's origin is; 1
-    for other doors."""
+    """Return the hinge's side from the front, -1 or 1: a cabinet's at its origin; others 1."""
     if item.object_type != "Cabinet":
         return 1
     angle = np.radians(float(item.rotation[1]) + item.front)
@@ -94,8 +89,7 @@ def _is_inside(inner: SimObject, outer: SimObject) -> bool:
 
 
 def _outline(item: SimObject, fixed: list[SimObject], nav: NavGrid) -> tuple[Rect, ...]:
-    """Return an object's outline from above without sinks and, for counters, without the floor;
-    empty: the whole box.
+    """Return an outline from above without sinks and, for counters, floor; empty: the whole box.
 
     A counter around a corner is recorded as one box. The agent's cells in it, and what its cabinets
     open on, are floor.
@@ -134,8 +128,7 @@ def _sink_boxes(item: SimObject, fixed: list[SimObject]) -> Iterator[tuple[Array
 
 
 def _fronts_below(counter: SimObject, fixed: list[SimObject]) -> Iterator[tuple[Array, Array]]:
-    """Yield the corners of boxes over the floor in front of the cabinets and drawers below a
-    counter."""
+    """Yield the corners of boxes over the floor before cabinets and drawers below a counter."""
     high = counter.bounds()[1]
     for other in fixed:
         if other.object_type not in {"Cabinet", "Drawer"}:
@@ -177,8 +170,7 @@ def _connect_knobs(items: list[SimObject]) -> None:
 
 
 def _infer_supports(world: World) -> None:
-    """Set the surface height of tables and seats to where things lie on them, as their boxes
-    include backs and rims."""
+    """Set surface heights of tables and seats to where things lie; boxes have backs and rims."""
     lying: dict[str, list[float]] = {}
     for item in world.objects.values():
         if item.type.pickupable:

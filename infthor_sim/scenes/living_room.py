@@ -1,6 +1,5 @@
 # ruff: noqa: SIM905 - tables of names read best as words
-"""Procedural living rooms: a sofa before a television, a low table between, shelves and lamps along
-the walls."""
+"""Procedural living rooms: sofa, low table, television, shelves and lamps along the walls."""
 
 from infthor_sim.scenes.roomplan import RoomPlan
 
@@ -66,8 +65,7 @@ def place_lamp(plan: RoomPlan, x: float, z: float, y: float) -> None:
 def place_drawers(
     plan: RoomPlan, owner_id: str, side: str, at: float, size: tuple[float, float, float], rows: int
 ) -> None:
-    """Fill the front of a chest with two columns of drawers; the chest itself is drawn without a
-    front."""
+    """Fill a chest's front with two columns of drawers; the chest is drawn without a front."""
     owner = next(o for o in plan.objects if o.object_id == owner_id)
     owner.hollow = True
     width, height, depth = size

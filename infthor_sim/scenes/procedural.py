@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from infthor_eval.errors import SimulatorError
+from infthor_sim.errors import SimulatorError
 from infthor_sim.geometry import level_gaps
 from infthor_sim.scenes.bathroom import furnish_bathroom
 from infthor_sim.scenes.bedroom import furnish_bedroom
@@ -37,8 +37,7 @@ SCENE_TYPES = (*_FURNISH, "house")
 
 
 def build_scene(scene_type: str, seed: int) -> World:
-    """Return the world of `<scene_type>-<seed>`: the first draw of furniture that leaves every room
-    accessible.
+    """Return the world of `<scene_type>-<seed>`: the first draw with every room accessible.
 
     Raises:
         SimulatorError: no draw does.
@@ -62,8 +61,7 @@ def build_scene(scene_type: str, seed: int) -> World:
 
 
 def _is_accessible(world: World, plan: RoomPlan) -> bool:
-    """Return whether the agent gets to most of a room's free floor, and near all its
-    receptacles."""
+    """Return whether the agent gets to most free floor of a room and near all receptacles."""
     free = plan.free_cells()
     reached = [cell for cell in free if world.nav.can_stand(*cell)]
     if len(reached) < _REACHABLE_SHARE * len(free):
@@ -101,8 +99,7 @@ def _furnish(plan: RoomPlan, room_type: str) -> None:
 def _house_plans(
     random: np.random.Generator, seed: int
 ) -> tuple[list[RoomPlan], list[tuple[float, float]]]:
-    """Return the plans of four rooms, two by two with doorways between them, and the cells in the
-    doorways."""
+    """Return the plans of four rooms, two by two, and the cells in the doorways between them."""
     west = round(random.uniform(4.6, 5.2), 2)
     east = round(random.uniform(4.6, 5.2), 2)
     south = round(random.uniform(4.6, 5.2), 2)
@@ -118,24 +115,16 @@ def _house_plans(
     door_z = -round(south * 0.72, 2)
     upper_z = round(gap + 1.0, 2)
     openings = {
-        "living-room": (
-            ("z+", door_x - _DOOR, door_x + _DOOR),
-            ("x+", door_z - _DOOR, door_z + _DOOR),
-        ),
-        "bedroom": (("x-", door_z - _DOOR, door_z + _DOOR),),
-        "kitchen": (
-            ("z-", door_x - _DOOR, door_x + _DOOR),
-            ("x+", upper_z - _DOOR, upper_z + _DOOR),
-        ),
-        "bathroom": (("x-", upper_z - _DOOR, upper_z + _DOOR),),
+        "living-room": (_opening("z+", door_x), _opening("x+", door_z)),
+        "bedroom": (_opening("x-", door_z),),
+        "kitchen": (_opening("z-", door_x), _opening("x+", upper_z)),
+        "bathroom": (_opening("x-", upper_z),),
     }
     plans: list[RoomPlan] = []
-    for room_type, (x0, x1, z0, z1) in spans.items():
+    for room_type, span in spans.items():
         style = seed + len(plans)
         doorways = openings[room_type]
-        room = RoomShell(
-            x0, x1, z0, z1, floor_style=_FLOORS[room_type], style=style, openings=doorways
-        )
+        room = RoomShell(*span, floor_style=_FLOORS[room_type], style=style, openings=doorways)
         plan = RoomPlan(room, random)
         plan.keep_doors_free()
         _furnish(plan, room_type)
@@ -144,6 +133,11 @@ def _house_plans(
     doors += _doorway_cells(door_z, gap / 2, False)
     doors += _doorway_cells(upper_z, gap / 2, False)
     return plans, doors
+
+
+def _opening(side: str, middle: float) -> tuple[str, float, float]:
+    """Return a doorway as `RoomShell.openings` has it: its wall, and from and to along that."""
+    return side, middle - _DOOR, middle + _DOOR
 
 
 def _doorway_cells(at: float, across: float, along_x: bool) -> list[tuple[float, float]]:

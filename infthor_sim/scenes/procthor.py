@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import DataError
 from infthor_sim.agent import AGENT_HEIGHT, Agent
-from infthor_sim.default_objects import style_of
+from infthor_sim.errors import DataError
 from infthor_sim.geometry import Array, level_gaps, to_array
 from infthor_sim.object_types import type_named
-from infthor_sim.objects import SimObject, SimObjectState
+from infthor_sim.objects import SimObject, SimObjectState, style_of
 from infthor_sim.physics.footprints import Rect, polygon_rects
 from infthor_sim.physics.navigation import CELL, NavGrid
 from infthor_sim.rearrange import assign_parents
@@ -33,8 +32,7 @@ Span = tuple[float, float, float, float]
 
 
 def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
-    """Return the bounding boxes (width, height, depth) of ProcTHOR's assets by id; empty if the
-    folder has none.
+    """Return the sizes (width, height, depth) of ProcTHOR's assets by id; empty without the file.
 
     Raises:
         DataError: the file is there but not readable.
@@ -52,8 +50,7 @@ def read_asset_sizes(root: Path) -> dict[str, tuple[float, float, float]]:
 
 
 def _extents(box: Mapping[str, float]) -> tuple[float, float, float]:
-    x, y, z = (max(float(box[axis]), 0.002) for axis in "xyz")
-    return x, y, z
+    return max(float(box["x"]), 0.002), max(float(box["y"]), 0.002), max(float(box["z"]), 0.002)
 
 
 def build_house(
@@ -75,12 +72,10 @@ def build_house(
 
 
 def _build(house: Mapping[str, Any], assets: Mapping[str, tuple[float, float, float]]) -> World:
-    outlines = [[(float(p["x"]), float(p["z"])) for p in r["floorPolygon"]] for r in house["rooms"]]
-    types = [str(r.get("roomType", "")) for r in house["rooms"]]
-    floors = [
-        (room_type, polygon_rects(outline))
-        for room_type, outline in zip(types, outlines, strict=True)
-    ]
+    floors = []
+    for room in house["rooms"]:
+        outline = [(float(point["x"]), float(point["z"])) for point in room["floorPolygon"]]
+        floors.append((str(room.get("roomType", "")), polygon_rects(outline)))
     ids = [str(r.get("id", f"room|{index}")) for index, r in enumerate(house["rooms"])]
     doors = list(_door_spans(house))
     walls = tuple(_walls(house, doors))
@@ -176,16 +171,15 @@ def _window(entry: Mapping[str, Any], house: Mapping[str, Any]) -> SimObject:
 
 
 def _base(polygon: Sequence[Mapping[str, float]]) -> Span:
-    """Return the two lower corners of a wall, in the order of its polygon: places along a wall
-    count from the first."""
-    lower = sorted(polygon, key=lambda p: float(p["y"]))[:2]
-    first, second = [p for p in polygon if any(p is q for q in lower)]
-    return float(first["x"]), float(first["z"]), float(second["x"]), float(second["z"])
+    """Return a wall's lower corners in the order of its polygon; distances count from the first."""
+    by_height = sorted(range(len(polygon)), key=lambda index: float(polygon[index]["y"]))
+    first, second = sorted(by_height[:2])
+    start, end = polygon[first], polygon[second]
+    return float(start["x"]), float(start["z"]), float(end["x"]), float(end["z"])
 
 
 def _door_spans(house: Mapping[str, Any]) -> Iterator[tuple[str, float, float]]:
-    """Yield each doorway once per wall that it is in: the wall's id, and from and to along that
-    wall."""
+    """Yield a doorway once per wall that it is in: the wall's id, and from and to along it."""
     for door in house.get("doors", ()):
         if "holePolygon" in door:
             points = [float(p["x"]) for p in door["holePolygon"]]
@@ -216,8 +210,7 @@ def _walls(house: Mapping[str, Any], doors: Sequence[tuple[str, float, float]]) 
 
 
 def _stretch(ends: Span, length: float, low: float, high: float, bottom: float, style: int) -> Wall:
-    """Return the part of a wall of some length between two places along it, from `bottom` to the
-    ceiling."""
+    """Return a wall's part between two distances along it, from `bottom` to the ceiling."""
     x0, z0, x1, z1 = ends
     a = low / length
     b = high / length

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.errors import DataError
-from infthor_sim.default_objects import style_of
+from infthor_sim.errors import DataError
 from infthor_sim.geometry import Array, to_array, wrap_degrees, yaw_matrix
 from infthor_sim.object_types import ObjectType, type_named
-from infthor_sim.objects import SimObject, SimObjectState
+from infthor_sim.objects import SimObject, SimObjectState, style_of
 
 __all__ = ["recorded_object"]
 
@@ -20,8 +19,7 @@ _TILTED = 10.0
 
 
 def recorded_object(entry: Mapping[str, Any]) -> SimObject:
-    """Return an upright object from one entry of `metadata["objects"]`; a small tilt goes into its
-    box.
+    """Return an upright object from an entry of `metadata["objects"]`; its box takes a small tilt.
 
     Raises:
         DataError: a required field is missing or malformed.
@@ -67,8 +65,7 @@ def _object(entry: Mapping[str, Any]) -> SimObject:
 
 
 def _type(entry: Mapping[str, Any]) -> ObjectType:
-    """Return the record of the entry's type with the abilities that the entry has: versions of
-    AI2-THOR differ."""
+    """Return the record of the entry's type with the entry's abilities: versions differ."""
     declared = type_named(str(entry["objectType"]))
     return replace(
         declared,
@@ -104,8 +101,7 @@ def _state(entry: Mapping[str, Any]) -> SimObjectState:
 
 
 def _yaw(rotation: Mapping[str, float], points: Array) -> float:
-    """Return the yaw in degrees; of an object that lies on its side, the direction of its longest
-    level edge."""
+    """Return the yaw in degrees; for an object on its side, of its longest level edge."""
     tilt = max(abs(wrap_degrees(float(rotation["x"]))), abs(wrap_degrees(float(rotation["z"]))))
     if tilt <= _TILTED:
         return float(rotation["y"])

@@ -5,16 +5,16 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from infthor_sim.agent import AGENT_HEIGHT, Agent
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import Array, aabb_overlap, level_gaps
 from infthor_sim.object_types import allowed_in, type_named
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
+from infthor_sim.physics.footprints import Rect, subtract
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.navigation import CELL, NavGrid
 from infthor_sim.physics.solids import opening_space
 from infthor_sim.world import RoomShell, World
 
-__all__ = ["RoomPlan", "build_world"]
+__all__ = ["RoomPlan", "build_world", "name_after", "rim_pieces"]
 
 _BODY = 0.23  # the agent's radius and a margin, metres
 # heights in metres between which an object takes floor from the agent
@@ -52,8 +52,7 @@ class RoomPlan:
         y: float = 0.0,
         size: tuple[float, float, float] | None = None,
     ) -> SimObject:
-        """Put an object with the middle of its underside at (x, y, z); the space that its door
-        needs stays free."""
+        """Put an object's underside at (x, y, z); the space of its door stays free."""
         item = self._at(object_type, x, z, yaw, y, size)
         self._add(item)
         return item
@@ -151,8 +150,7 @@ class RoomPlan:
         size: tuple[float, float, float] | None = None,
         y: float = 0.0,
     ) -> SimObject | None:
-        """Put an object at a random free place along one of the walls, tried in order; return None
-        if there is none."""
+        """Put an object at a random free place along the first wall that has one, or None."""
         width = (type_named(object_type).size if size is None else size)[0]
         for side in sides:
             start, end = self.span(side)
@@ -213,8 +211,7 @@ class RoomPlan:
 def build_world(
     name: str, seed: int, plans: list[RoomPlan], doors: list[tuple[float, float]] | None = None
 ) -> World:
-    """Return the world of furnished rooms, with the agent on the free floor and loose objects in
-    the furniture.
+    """Return the world of furnished rooms: the agent on free floor, loose objects in furniture.
 
     `doors` are the cells (x, z) in doorways.
     """
@@ -244,8 +241,7 @@ def _connected_parts(grid: NavGrid) -> list[list[tuple[float, float]]]:
 
 
 def _scatter(world: World, plan: RoomPlan) -> None:
-    """Put the plan's loose objects into or onto its furniture, at random; towels go to holders
-    first."""
+    """Put the plan's loose objects into or onto furniture at random; towels on holders first."""
     homes = [
         (o, o.type.capacity)
         for o in plan.objects
@@ -260,16 +256,33 @@ def _scatter(world: World, plan: RoomPlan) -> None:
         for home, stock in order:
             if len(home.contents) >= stock:
                 continue
-            place = find_place(world, item, home, random=plan.random)
-            if place is None:
+            tried = find_place(world, item, home, random=plan.random)
+            if tried is None:
                 continue
-            # A new object at the place, as its id names its position. Two at the same rounded one
+            # A new object at that place, as its id names its position. Two at the same rounded one
             # would share an id.
             placed = default_object(
-                object_type, np.round(place.position, 4), float(place.rotation[1])
+                object_type, np.round(tried.position, 4), float(tried.rotation[1])
             )
             placed.style = item.style
             if placed.object_id not in world.objects:
                 world.add(placed)
                 world.attach(placed, home)
                 break
+
+
+def name_after(outer: SimObject, basin: SimObject) -> None:
+    """Give a basin the id and name that AI2-THOR derives from those of its sink or tub."""
+    basin.object_id = f"{outer.object_id}|{basin.object_type}"
+    basin.name = f"{basin.object_type}_{outer.name.split('_')[1]}"
+
+
+def rim_pieces(outer: SimObject, inner: SimObject) -> tuple[Rect, ...]:
+    """Return the outline of `outer` from above without that of `inner`; both have the same yaw."""
+    middle = outer.matrix.T @ (inner.center - outer.center)
+    whole = outer.box_size / 2
+    hole = inner.box_size / 2
+    return subtract(
+        (-float(whole[0]), -float(whole[2]), float(whole[0]), float(whole[2])),
+        [(middle[0] - hole[0], middle[2] - hole[2], middle[0] + hole[0], middle[2] + hole[2])],
+    )

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from infthor_eval.errors import DataError
+from infthor_sim.errors import DataError
 
 __all__ = ["Supplement", "read_supplement"]
 

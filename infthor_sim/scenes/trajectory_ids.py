@@ -9,10 +9,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import Array
 from infthor_sim.object_types import type_named
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
 from infthor_sim.physics.navigation import NavGrid
 
 __all__ = ["use_trajectory_ids"]
@@ -23,8 +22,7 @@ _NEAR = 0.3  # metres that an object may be off between the two versions
 def use_trajectory_ids(
     objects: dict[str, SimObject], ids: Iterable[str], nav: NavGrid, floor: float
 ) -> dict[str, SimObject]:
-    """Return `objects` with a fixed object for each id: renamed, given another type, or created if
-    missing.
+    """Return `objects` with a fixed one for each id: renamed, of another type, or created.
 
     Ids of loose objects are skipped: those come with a trajectory's own poses.
     """
@@ -53,8 +51,7 @@ def use_trajectory_ids(
 
 
 def parse_id(object_id: str) -> tuple[str, Array]:
-    """Return the type and position (3,) that an id names; `Sink|..|..|..|SinkBasin` is a
-    SinkBasin."""
+    """Return type and position (3,) of an id; `Sink|..|..|..|SinkBasin` is a SinkBasin."""
     parts = object_id.split("|")
     object_type = parts[4].split("_")[0] if len(parts) > 4 else parts[0]
     try:
@@ -71,8 +68,7 @@ def _is_loose(object_id: str) -> bool:
 
 
 def _match_cost(object_id: str, item: SimObject) -> float | None:
-    """Return how unlikely it is that an object is the one that an id names; None: it is another
-    one."""
+    """Return how unlikely it is that an id names an object; None: it names another one."""
     object_type, position = parse_id(object_id)
     low, high = item.bounds()
     level = float(np.hypot(*(position - item.position)[[0, 2]]))
@@ -103,13 +99,11 @@ def _rename(item: SimObject, object_id: str) -> None:
 
 
 def _create(object_id: str, nav: NavGrid, floor: float) -> SimObject:
-    """Return a new object of the type and at the position that an id names, turned to the free
-    floor."""
+    """Return a new object of an id's type and position, turned to the free floor."""
     object_type, position = parse_id(object_id)
     item = default_object(object_type, position, nav.freest_yaw(position[0], position[2]))
-    if (
-        item.type.furniture
-    ):  # the id's height is that of its top, or of its underside if near the floor
+    # the id's height is that of its top, or of its underside if near the floor
+    if item.type.furniture:
         top = position[1] if position[1] - floor > 0.3 else floor + item.type.size[1]
         item.box_size = np.array([item.box_size[0], top - floor, item.box_size[2]])
         item.box_center = np.array([0.0, (top + floor) / 2 - position[1], 0.0])

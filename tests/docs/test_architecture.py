@@ -8,22 +8,26 @@ import pytest
 
 from .blocks import ROOT
 
-PAGES = ("docs/architecture.md", "docs/where-things-go.md", "CONTRIBUTING.md")
+PAGES = (
+    "docs/architecture.md",
+    "docs/where-things-go.md",
+    "CONTRIBUTING.md",
+    "infthor_sim/README.md",
+)
+PACKAGES = ("infthor_eval", "infthor_sim", "model_adapters")
 PLACE = re.compile(r"`([\w./-]+?(?:/|\.(?:py|yaml|md|js|html|css|txt|gz)))(?:: ?(\w+))?`")
-WRITTEN = {"results.json", "usage.json", "run.yaml"}  # files of runs, which are not in the tree
+# Files of runs and of recorded data, which are not in the tree.
+WRITTEN = {
+    "results.json",
+    "usage.json",
+    "run.yaml",
+    "alfred/layouts/",
+    "thor_scenes/objects.jsonl.gz",
+    "DIR/procthor/asset-database.json.gz",
+}
 SOURCES = [
     path
-    for top in (
-        "infthor_eval",
-        "model_adapters",
-        "tasks",
-        "tests",
-        "docs",
-        "benchmarks",
-        "examples",
-        "results",
-        ".ci",
-    )
+    for top in (*PACKAGES, "tasks", "tests", "docs", "benchmarks", "examples", "results", ".ci")
     for path in (ROOT / top).rglob("*")
     if "__pycache__" not in path.parts
 ]
@@ -55,15 +59,25 @@ def test_every_place_that_is_named_is_there(page: str) -> None:
 
 def test_every_package_and_module_has_its_row() -> None:
     page = (ROOT / "docs/architecture.md").read_text()
-    packages = {path.parent.name for path in (ROOT / "infthor_eval").glob("*/__init__.py")}
-    modules = {path.name for path in (ROOT / "infthor_eval").glob("*.py")} - {
-        "__init__.py",
-        "__main__.py",
-    }
-    engines = {path.parent.name for path in (ROOT / "model_adapters").glob("*/__init__.py")}
-    assert [name for name in sorted(packages) if f"`infthor_eval/{name}/`" not in page] == []
-    assert [name for name in sorted(modules) if f"`{name}`" not in page] == []
-    assert [name for name in sorted(engines) if f"`{name}/`" not in page] == []
+    rows = [f"`{name}/`" for name in PACKAGES if name != "infthor_eval"]
+    rows += [f"`infthor_eval/{name}/`" for name in rooms("infthor_eval")]
+    modules = {path.name for path in (ROOT / "infthor_eval").glob("*.py")}
+    rows += [f"`{name}`" for name in modules - {"__init__.py", "__main__.py"}]
+    assert [row for row in rows if row not in page] == []
+
+
+def test_the_row_of_a_package_names_its_rooms() -> None:
+    lines = (ROOT / "docs/architecture.md").read_text().splitlines()
+    folders = ["infthor_sim", "model_adapters"]
+    folders += [f"infthor_eval/{name}" for name in rooms("infthor_eval")]
+    for folder in folders:
+        (row,) = (line for line in lines if line.startswith(f"| `{folder}/` |"))
+        assert [name for name in rooms(folder) if f"`{name}/`" not in row] == [], folder
+
+
+def rooms(folder: str) -> list[str]:
+    """Names of the packages directly in one."""
+    return sorted(path.parent.name for path in (ROOT / folder).glob("*/__init__.py"))
 
 
 def test_every_package_has_its_import_contract() -> None:
@@ -76,8 +90,6 @@ def test_every_package_has_its_import_contract() -> None:
         for key in ("source_modules", "protected_modules")
         for name in one.get(key, ())
     }
-    packages = {
-        f"infthor_eval.{path.parent.name}" for path in (ROOT / "infthor_eval").glob("*/__init__.py")
-    }
+    packages = {f"infthor_eval.{name}" for name in rooms("infthor_eval")} | set(PACKAGES[1:])
     free = {"infthor_eval.cli"}  # which may import anything but the simulator
     assert packages - held - free == set()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from infthor_eval.errors import InfthorError
+from infthor_sim.errors import SimulatorError
 
 from .damage import Form
 
@@ -48,7 +49,7 @@ class Reader:
         try:
             with _at_most(_SECONDS):
                 self.read(folder)
-        except InfthorError as error:
+        except (InfthorError, SimulatorError) as error:
             message = str(error)
             assert message and len(message) < _LONGEST, (
                 f"a message of {len(message)} characters: {message[:300]!r}"

@@ -1,7 +1,6 @@
 """The real Controller of ai2thor, driving the simulator's process."""
 
 import shlex
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,9 +23,9 @@ def need_data() -> Path:
 def start(scene: Any, *options: str, **init: Any) -> Any:
     from ai2thor.controller import Controller
 
-    command = " ".join(
-        [shlex.quote(sys.executable), "-m", "infthor_sim", *map(shlex.quote, options)]
-    )
+    from infthor_sim.launch import player_command
+
+    command = shlex.join([*shlex.split(player_command()), *options])
     settings = {
         "gridSize": 0.25,
         "visibilityDistance": 1.5,

@@ -49,10 +49,8 @@ class Bench:
         return next(o for o in self.metadata["objects"] if o["objectId"] == object_id)
 
     def first(self, object_type: str, **values: Any) -> str:
-        return next(
-            o["objectId"] for o in self.metadata["objects"]
-            if o["objectType"] == object_type and all(o[k] == v for k, v in values.items())
-        )  # fmt: skip
+        wanted = {"objectType": object_type, **values}
+        return next(o["objectId"] for o in self.metadata["objects"] if wanted.items() <= o.items())
 
     def stand_before(self, object_id: str) -> None:
         """Teleport the agent to a place near the object from which it sees it."""

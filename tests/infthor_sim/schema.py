@@ -79,9 +79,8 @@ def problems(value: Any, form: Any, where: str = "") -> list[str]:
 def check(metadata: dict[str, Any]) -> None:
     wrong = problems(dict(metadata), AGENT, "metadata")
     for listed in metadata["objects"]:
-        item = {
-            key: value for key, value in listed.items() if key != "visibleBounds2D"
-        }  # added by the client
+        # added by the client
+        item = {key: value for key, value in listed.items() if key != "visibleBounds2D"}
         wrong += problems(item, OBJECT, item.get("objectId", "?"))
         if item["temperature"] not in {"RoomTemp", "Hot", "Cold"}:
             wrong.append(f"{item['objectId']}: temperature {item['temperature']}")

@@ -85,9 +85,8 @@ def test_poses_that_see_the_fridge(bench):
 @pytest.mark.parametrize("tilt", [0, 40])
 def test_the_hand_turns_by_its_own_angles(bench, turn, rotation, tilt):
     bottle = bench.first("SoapBottle")
-    bench.sim.world.objects[bottle].rotation[2] = (
-        tilt  # lying otherwise in the hand changes nothing
-    )
+    # lying otherwise in the hand changes nothing
+    bench.sim.world.objects[bottle].rotation[2] = tilt
     bench.ok("PickupObject", objectId=bottle, forceAction=True)
     before = bench.metadata["heldObjectPose"]
     after = bench.ok("RotateHeldObject", **turn)["hand"]

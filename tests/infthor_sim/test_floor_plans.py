@@ -1,5 +1,4 @@
-"""Floor plans from a data folder: any folder of the documented form, and what trajectories add to
-it."""
+"""Floor plans from any data folder of the documented form, and what trajectories add."""
 
 import gzip
 import json
@@ -9,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from infthor_eval.errors import DataError
+from infthor_sim.errors import DataError
 from infthor_sim.scenes.catalogue import Catalogue
 from infthor_sim.scenes.supplement import read_supplement
 
@@ -18,8 +17,7 @@ from .harness import Bench
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A data folder with one floor plan, written from a procedural kitchen as the metadata reports
-    it."""
+    """A data folder with one floor plan: a procedural kitchen as the metadata reports it."""
     bench = Bench(size=40)
     entries = bench.reset("kitchen-1")["objects"]
     for entry in entries:  # the public form has boxes without corner points
@@ -52,7 +50,8 @@ def test_a_scene_survives_being_written_and_read(folder):
             assert after[name][key] == item[key], (name, key)
         for axis in "xyz":
             for part in ("center", "size"):
-                old, new = (o["axisAlignedBoundingBox"][part][axis] for o in (item, after[name]))
+                old = item["axisAlignedBoundingBox"][part][axis]
+                new = after[name]["axisAlignedBoundingBox"][part][axis]
                 assert new == pytest.approx(old, abs=2e-3), (name, part)
     lying = [n for n, o in before.items() if o["parentReceptacles"] and o["pickupable"]]
     same = [n for n in lying if after[n]["parentReceptacles"] == before[n]["parentReceptacles"]]
@@ -124,9 +123,8 @@ def test_poses_rearrange_the_loose_objects(folder):
     mug = bench.object(bench.first("Mug"))
     table = bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"]
     top = table["center"]["y"] + table["size"]["y"] / 2
-    here, there = (
-        {"x": table["center"]["x"], "y": top, "z": table["center"]["z"] + d} for d in (0.1, -0.25)
-    )
+    here = {**table["center"], "y": top, "z": table["center"]["z"] + 0.1}
+    there = {**here, "z": table["center"]["z"] - 0.25}
     bench.ok(
         "SetObjectPoses",
         objectPoses=[

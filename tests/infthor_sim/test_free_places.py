@@ -1,13 +1,12 @@
-"""Things are put where there is room for them, by what is drawn: counted by points in solids, and
-by hand."""
+"""Things are put where there is room, by what is drawn: by points in solids, and by hand."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.object_types import OBJECT_TYPES, allowed_in
+from infthor_sim.objects import default_object
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.solids import Wall, opening_space, part_boxes
 from infthor_sim.scenes.catalogue import Catalogue
@@ -104,14 +103,11 @@ def test_by_hand_a_thing_fits_in_a_round_vessel_by_its_corners():
     wall = Wall(
         np.array([0.0, 0.5, 0.0]), np.array([0.2, 0.5, 0.2]), np.eye(3), bottom=0.5, top=1.0
     )
-    corners = np.array(
-        [[0.07, 0.07], [0.07, -0.07], [-0.07, 0.07], [-0.07, -0.07]]
-    )  # 0.099 m from the middle
+    # 0.099 m from the middle
+    corners = np.array([[0.07, 0.07], [0.07, -0.07], [-0.07, 0.07], [-0.07, -0.07]])
     middle = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    assert wall.holds(middle, corners).tolist() == [
-        True,
-        True,
-    ]  # the radius is 0.1 m below, 0.2 m above
+    # the radius is 0.1 m below, 0.2 m above
+    assert wall.holds(middle, corners).tolist() == [True, True]
     assert wall.holds(middle + np.array([0.02, 0.0, 0.0]), corners).tolist() == [False, True]
 
 

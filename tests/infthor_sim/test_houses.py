@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from infthor_eval.errors import DataError
+from infthor_sim.errors import DataError
 from infthor_sim.scenes.catalogue import Catalogue
 
 from .harness import Bench
@@ -37,7 +37,7 @@ def room(name: str, room_type: str, *corners: tuple[float, float]) -> dict[str, 
     }
 
 
-def thing(
+def furniture(
     name: str, asset: str, x: float, y: float, z: float, yaw: float = 0, children: Any = ()
 ) -> dict[str, Any]:
     return {"id": name, "assetId": asset, "position": point(x, z, y),
@@ -65,11 +65,11 @@ def house() -> dict[str, Any]:
         "wall1": walls[6]["id"],
         "holePolygon": [point(1.0, 0), point(2.0, 0, 2.1)],
     }
-    apple = thing("Apple|surface|2|4", "Apple_11", 1.0, 0.86, 2.0)
+    apple = furniture("Apple|surface|2|4", "Apple_11", 1.0, 0.86, 2.0)
     objects = [
-        thing("Fridge|2|1", "Fridge_11", 0.5, 0.93, 5.4, 180),
-        thing("DiningTable|2|2", "Dining_Table_21_2", 1.0, 0.4, 2.0, 0, [apple]),
-        thing("Bed|3|1", "Bed_1", 7.5, 0.45, 2.9, 180),
+        furniture("Fridge|2|1", "Fridge_11", 0.5, 0.93, 5.4, 180),
+        furniture("DiningTable|2|2", "Dining_Table_21_2", 1.0, 0.4, 2.0, 0, [apple]),
+        furniture("Bed|3|1", "Bed_1", 7.5, 0.45, 2.9, 180),
     ]
     agent = {
         "position": point(2.5, 2.5, 0.95),

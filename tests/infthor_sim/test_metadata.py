@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from infthor_sim.actions import action_names
@@ -88,8 +89,8 @@ def test_a_box_holds_the_open_door(object_type):
     bench.ok("OpenObject", objectId=name, forceAction=True)
     wide = bench.object(name)["axisAlignedBoundingBox"]
     assert closed["size"] != half["size"] != wide["size"]
-    low = [min(c[i] for c in wide["cornerPoints"]) for i in range(3)]
-    assert all(low[i] <= min(c[i] for c in closed["cornerPoints"]) for i in range(3))
+    low = np.min(wide["cornerPoints"], axis=0)
+    assert (low <= np.min(closed["cornerPoints"], axis=0)).all()
     bench.ok("CloseObject", objectId=name, forceAction=True)
     assert bench.object(name)["axisAlignedBoundingBox"] == closed
 

@@ -1,11 +1,17 @@
-"""A type of object is one record: what the records say holds together, and a new one needs nothing
-else."""
+"""A type of object is one record: they fit together, and a new one needs nothing else."""
 
 import numpy as np
 import pytest
 
-from infthor_sim.default_objects import default_object
-from infthor_sim.object_types import OBJECT_TYPES, ObjectType, allowed_in, type_named
+from infthor_sim.object_types import (
+    FORMER_NAMES,
+    OBJECT_TYPES,
+    ObjectType,
+    allowed_in,
+    modern_type,
+    type_named,
+)
+from infthor_sim.objects import default_object
 from infthor_sim.pictures.instances import instance_color
 from infthor_sim.player.fifo import FieldType
 from infthor_sim.render.shapes.catalogue import SHAPES, shape
@@ -29,8 +35,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
 
 
 def lay_on_table(bench: Bench, object_type: str) -> tuple[str, str]:
-    """Puts an object of a type that the scene lacks on the table and keeps the first mug; ids of
-    both."""
+    """Puts an object of a new type on the table and keeps the first mug; ids of both."""
     mug, table = (
         bench.object(bench.first("Mug")),
         bench.object(bench.first("DiningTable"))["axisAlignedBoundingBox"],
@@ -117,3 +122,13 @@ def test_records_name_only_what_there_is():
 def test_receptacles_take_what_ai2thor_documents(receptacle, taken, refused):
     assert allowed_in(taken, receptacle)
     assert not allowed_in(refused, receptacle)
+
+
+def test_former_names_are_those_of_the_trajectories():
+    # The one import of infthor_eval in the simulator's tests: it renames the same types in what it
+    # reads, and neither package may import the other's table.
+    from infthor_eval.formats import object_ids
+
+    assert object_ids._RENAMED == FORMER_NAMES
+    assert {modern_type(name) for name in FORMER_NAMES} <= set(OBJECT_TYPES)
+    assert all(modern_type(name) == name for name in OBJECT_TYPES)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import to_xyz
+from infthor_sim.objects import default_object
 from infthor_sim.physics.receptacles import surfaces
 
 from .harness import Bench
@@ -75,7 +75,8 @@ def test_vessels_are_hollow(bench, vessel, kind):
 
 
 def test_a_closed_box_is_solid_and_so_is_what_is_too_small(bench):
-    carton, bowl = (default_object(kind, np.array([0.0, 1.2, 0.0])) for kind in ("Box", "Bowl"))
+    carton = default_object("Box", np.array([0.0, 1.2, 0.0]))
+    bowl = default_object("Bowl", np.array([0.0, 1.2, 0.0]))
     for new in (carton, bowl):
         bench.sim.world.add(new)
     inside = to_xyz(surfaces(carton)[0].center)
@@ -269,7 +270,7 @@ def test_a_push_leaves_things_in_what_is_closed(bench):
 def test_a_thing_teleported_into_the_tray_of_an_open_drawer_is_in_it_and_goes_with_it(bench):
     world = bench.sim.world
     drawer = next(o for o in world.objects.values() if o.object_type == "Drawer" and o.contents)
-    (item, *_) = (o for o in world.objects.values() if o.object_id in drawer.contents)
+    item = next(o for o in world.objects.values() if o.object_id in drawer.contents)
     bench.ok("OpenObject", objectId=drawer.object_id, openness=1.0, forceAction=True)
     out = bench.object(item.object_id)
     aside = {**out["position"], "y": out["position"]["y"] + 1.0}
@@ -294,7 +295,8 @@ def test_a_push_takes_what_is_in_its_way_along_and_nothing_through_it(scene):
     world = bench.sim.world
     table = world.objects[bench.first("DiningTable")]
     low, high = table.bounds()
-    first, second = (default_object(name, np.zeros(3)) for name in ("Apple", "Tomato"))
+    first = default_object("Apple", np.zeros(3))
+    second = default_object("Tomato", np.zeros(3))
     for item in world.children(table):
         world.remove(item)
     for number, item in enumerate((first, second)):
@@ -313,7 +315,8 @@ def test_a_push_takes_what_is_in_its_way_along_and_nothing_through_it(scene):
         moveMagnitude=20,
         forceAction=True,
     )
-    first, second = (world.objects[f"{name}|pushed"] for name in ("Apple", "Tomato"))
+    first = world.objects["Apple|pushed"]
+    second = world.objects["Tomato|pushed"]
     assert gap > 0.02
     assert second.position[2] > low[2] + 0.41, "it was pushed along"
     assert second.bounds()[0][2] > first.bounds()[1][2] - 0.006, "and not gone through"

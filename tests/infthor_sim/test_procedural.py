@@ -1,5 +1,4 @@
-"""Procedural rooms are furnished as their type needs, connected, and different from seed to
-seed."""
+"""Procedural rooms are furnished by type, connected, and different from seed to seed."""
 
 import numpy as np
 import pytest
@@ -66,7 +65,9 @@ def test_nothing_stands_in_another_thing(scene):
 
 @pytest.mark.parametrize("scene_type", SCENE_TYPES)
 def test_names_are_reproducible_and_seeds_differ(scene_type):
-    first, again, other = (Catalogue().load(f"{scene_type}-{seed}") for seed in (3, 3, 4))
+    first = Catalogue().load(f"{scene_type}-3")
+    again = Catalogue().load(f"{scene_type}-3")
+    other = Catalogue().load(f"{scene_type}-4")
     assert list(first.objects) == list(again.objects)
     assert list(first.objects) != list(other.objects)
 

@@ -54,10 +54,10 @@ def test_garbage_instead_of_an_action(pipes):
             actions.write(struct.pack("!BI", 2, 3) + b"{]}" + struct.pack("!BI", 255, 0))
         while states.read(65536):
             pass
-    _, said = process.communicate(timeout=PATIENCE_S)
+    _, printed = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
-    assert "not JSON" in said
-    assert "Traceback" not in said
+    assert "not JSON" in printed
+    assert "Traceback" not in printed
 
 
 def test_it_goes_when_the_controller_hangs_up(pipes):
@@ -79,15 +79,13 @@ def test_it_goes_when_its_parent_dies_before_the_handshake(pipes):
     assert parent.stdout is not None
     child = int(parent.stdout.readline())
     status = Path(f"/proc/{child}/status")
-    looks = deque(
-        maxlen=20
-    )  # it waits once it sleeps in so many looks in a row; while it imports it works
+    # it waits once it sleeps in so many looks in a row; while it imports it works
+    looks = deque(maxlen=20)
     wait_until(
         lambda: looks.append("(sleeping)" in status.read_text()) or sum(looks) == looks.maxlen
     )
     parent.kill()
     parent.wait()
     parent.stdout.close()
-    wait_until(
-        lambda: not status.exists() or "(zombie)" in status.read_text()
-    )  # it waits for no dead controller
+    # it waits for no dead controller
+    wait_until(lambda: not status.exists() or "(zombie)" in status.read_text())

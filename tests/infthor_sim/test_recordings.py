@@ -1,5 +1,4 @@
-"""Expert trajectories recorded in AI2-THOR are accepted, and what they point at is where the
-recording saw it."""
+"""Expert trajectories recorded in AI2-THOR replay; objects are where the recording saw them."""
 
 import gzip
 import json
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from infthor_eval.thor.axes import modern_rotation
+from infthor_sim.geometry import euler_matrix, matrix_euler, round_xyz, to_array, yaw_matrix
 from infthor_sim.scenes.catalogue import Catalogue
 
 from .conftest import need_data
@@ -17,6 +16,13 @@ from .harness import INIT, Bench
 
 EVERY = 4  # of the 251 trajectories of valid_seen: half a minute for all of them
 LARGE = {"Fridge", "CounterTop", "Microwave"}
+# Degrees about their own vertical axis that AI2-THOR 5 has turned the models of these types by.
+TURNS = {
+    **dict.fromkeys(
+        ("ButterKnife", "Fork", "Knife", "Ladle", "Pen", "Pencil", "Spoon", "SprayBottle"), 90.0
+    ),
+    "Spatula": 270.0,
+}
 MOVES = {"MoveAhead", "RotateLeft", "RotateRight", "LookUp", "LookDown"}
 
 
@@ -90,14 +96,12 @@ def drawn_box(bench: Bench, object_id: str) -> list[int] | None:
 
 
 def modern(pose: dict[str, Any], known: set[str]) -> dict[str, Any]:
-    """A pose of AI2-THOR 2.1.0 as one of 5.0.0; names that both versions have are of things that
-    did not change."""
-    if pose["objectName"] in known:
+    """A pose of AI2-THOR 2.1.0 as one of 5.0.0; names in both are of objects without change."""
+    turn = TURNS.get(pose["objectName"].partition("_")[0])
+    if pose["objectName"] in known or turn is None:
         return pose
-    return {
-        **pose,
-        "rotation": modern_rotation(pose["objectName"].partition("_")[0], pose["rotation"]),
-    }
+    turned = euler_matrix(to_array(pose["rotation"])) @ yaw_matrix(turn)
+    return {**pose, "rotation": round_xyz(matrix_euler(turned))}
 
 
 def start(bench: Bench, scene: dict[str, Any]) -> None:

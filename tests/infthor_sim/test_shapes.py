@@ -1,5 +1,4 @@
-"""The shapes of objects: within their boxes, the same outside whether open or closed, floors where
-contents stand."""
+"""The shapes of objects: within their boxes, one outside open or closed, floors for contents."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,24 +8,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import Array, euler_matrix
 from infthor_sim.object_types import OBJECT_TYPES
-from infthor_sim.objects import DRAWER_SLIDE, SimObject, SimObjectState
+from infthor_sim.objects import DRAWER_SLIDE, SimObject, SimObjectState, default_object
 from infthor_sim.physics.receptacles import surfaces
 from infthor_sim.physics.solids import as_open
 from infthor_sim.render.camera import PinholeCamera
 from infthor_sim.render.lighting import Lights
-from infthor_sim.render.picture import cast_picture, choose_rasterizer, colour_picture
+from infthor_sim.render.picture import cast_picture, colour_picture
 from infthor_sim.render.primitives import Form, ShapePart, rows
 from infthor_sim.render.shapes import shape
+
+from .numpy_renderer import NUMPY
 
 _OUT = 0.02  # metres that handles and the like may stand out
 _STYLES = 12
 # What lies in a bowl rests on its sides; a pan's box has its handle, so that its middle is not the
 # pan's.
 _UNEVEN = {"Bowl", "Pan"}
-_RASTERIZER = choose_rasterizer("numpy")
 
 
 def states(item: SimObject) -> Iterator[SimObjectState]:
@@ -58,8 +57,7 @@ def reach(part: ShapePart) -> Array:
 
 
 def allowed(item: SimObject) -> tuple[Array, Array]:
-    """Return the corners of the box that an object may fill in its own frame, with the way of its
-    door or drawer."""
+    """Return the corners of the box that an object may fill, with the way of its door or drawer."""
     low, high = (
         item.box_center - item.box_size / 2 - _OUT,
         item.box_center + item.box_size / 2 + _OUT,
@@ -99,9 +97,9 @@ def looks(item: SimObject, pitch: float, yaw: float) -> tuple[Array, Array]:
     away = 3.0 * float(np.linalg.norm(item.box_size))
     camera = PinholeCamera(item.center - view[:, 2] * away, view, 30.0, 60, 60)
     seen = cast_picture(
-        rows(shape(item), item.position, item.matrix, 0), (item.object_id,), camera, _RASTERIZER
+        rows(shape(item), item.position, item.matrix, 0), (item.object_id,), camera, NUMPY
     )
-    return colour_picture(seen, Lights.none(), _RASTERIZER, antialias=False).astype(
+    return colour_picture(seen, Lights.none(), NUMPY, antialias=False).astype(
         float
     ), seen.instances == 0
 
@@ -112,12 +110,8 @@ def test_outside_looks_the_same_open_and_closed(object_type: str, style: int) ->
     item = default_object(object_type, np.zeros(3))
     item.hinge, item.style = -1, style
     opened = as_open(item, 1.0)
-    for pitch, yaw in (
-        (80.0, 0.0),
-        (20.0, 0.0),
-        (20.0, 40.0),
-        (20.0, -40.0),
-    ):  # from above and behind
+    # from above and behind
+    for pitch, yaw in ((80.0, 0.0), (20.0, 0.0), (20.0, 40.0), (20.0, -40.0)):
         closed_look, closed_at = looks(item, pitch, yaw)
         open_look, open_at = looks(opened, pitch, yaw)
         both = closed_at & open_at
@@ -136,8 +130,7 @@ def test_outside_looks_the_same_open_and_closed(object_type: str, style: int) ->
 def test_contents_stand_on_what_is_drawn(
     object_type: str, share_x: float, share_z: float, grown: float
 ) -> None:
-    """Under each place where contents stand is a drawn floor, at most a few millimetres above or
-    below it."""
+    """Where contents stand is a drawn floor, at most a few millimetres above or below."""
     usual = default_object(object_type, np.zeros(3)).box_size
     item = default_object(object_type, np.zeros(3), size=usual * grown)
     item.hinge = -1

@@ -1,15 +1,13 @@
-"""The surface on which things are put is the surface that is drawn: measured by points below each
-thing, by hand."""
+"""Things stand on what is drawn: measured by points below each thing, and by hand."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from infthor_sim.default_objects import default_object
 from infthor_sim.geometry import aabb_overlap
 from infthor_sim.object_types import OBJECT_TYPES, allowed_in
-from infthor_sim.objects import SimObject
+from infthor_sim.objects import SimObject, default_object
 from infthor_sim.physics.free_places import find_place
 from infthor_sim.physics.receptacles import surfaces
 from infthor_sim.physics.solids import as_open
@@ -53,8 +51,7 @@ def in_solid(row: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def parts_below(world: World, placed: SimObject, deep: float) -> np.ndarray:
-    """The drawn primitives of other things that reach into the space below a thing, `deep` metres
-    down."""
+    """Drawn primitives of others that reach into the space below a thing, `deep` metres."""
     low, high = placed.bounds()
     around = np.array([SLIDE, deep, SLIDE])
     near = []
@@ -66,8 +63,7 @@ def parts_below(world: World, placed: SimObject, deep: float) -> np.ndarray:
 
 
 def gap_below(world: World, placed: SimObject) -> float:
-    """Metres from the underside of a thing down to the first drawn solid under one of 25 points of
-    it."""
+    """Metres from a thing's underside to the first drawn solid under one of 25 points."""
     low, high = placed.bounds()
     shares = np.linspace(0.05, 0.95, 5)
     depths = np.arange(-RISE, 0.3, 0.002)
@@ -131,9 +127,8 @@ def test_what_is_put_somewhere_stands_on_what_is_drawn(object_type, data, grown,
     world.add(placed)
     if object_type in HANGERS:
         assert hangs_on(receptacle, placed)
-    elif (
-        object_type != "Fridge"
-    ):  # whose shelves are drawn as frames in front, as clear glass is seen through
+    # a fridge's shelves are drawn as frames in front, as clear glass is seen through
+    elif object_type != "Fridge":
         assert gap_below(world, placed) < NEAR
 
 
@@ -164,13 +159,11 @@ def test_by_hand_things_on_a_toilet_stand_on_its_tank():
 def test_by_hand_a_pan_holds_things_beside_its_handle_and_a_carton_between_its_flaps():
     pan = default_object("Pan", np.zeros(3), size=np.array([0.28, 0.05, 0.40]))
     (inside,) = surfaces(pan)
-    assert inside.center[[0, 2]] == pytest.approx(
-        [0.0, -0.06]
-    )  # its round part is 0.28 m wide, at the end of the box
+    # its round part is 0.28 m wide, at the end of the box
+    assert inside.center[[0, 2]] == pytest.approx([0.0, -0.06])
     assert inside.half == pytest.approx((0.102, 0.102))
     carton = default_object("Box", np.zeros(3), size=np.array([0.5, 0.3, 0.5]))
     assert carton.state.openness == 1.0
     (inside,) = surfaces(carton)
-    assert inside.half == pytest.approx(
-        (0.195, 0.195)
-    )  # 0.82 of its box is what is left when it is closed
+    # 0.82 of its box is what is left when it is closed
+    assert inside.half == pytest.approx((0.195, 0.195))

@@ -1,10 +1,9 @@
-"""What opening does to the boxes of things without doors and drawers: expectations written by
-hand."""
+"""What opening does to the boxes of things without doors or drawers, by hand."""
 
 import numpy as np
 import pytest
 
-from infthor_sim.default_objects import default_object
+from infthor_sim.objects import default_object
 from infthor_sim.physics.clearance import occupant
 from infthor_sim.render.primitives import CENTER, HALF, rows
 from infthor_sim.render.shapes import shape
@@ -82,7 +81,8 @@ def test_the_picture_fills_the_box_and_no_more(bench, kind, front):
 
 
 def test_an_open_laptop_takes_the_room_above_it(bench):
-    laptop, pen = (default_object(kind, np.array([0.0, 1.2, 0.0])) for kind in ("Laptop", "Pen"))
+    laptop = default_object("Laptop", np.array([0.0, 1.2, 0.0]))
+    pen = default_object("Pen", np.array([0.0, 1.2, 0.0]))
     for item in (laptop, pen):
         bench.sim.world.add(item)
     pen.place_bottom(np.array([0.0, 1.35, 0.0]))

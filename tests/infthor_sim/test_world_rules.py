@@ -4,8 +4,6 @@ import itertools
 
 import pytest
 
-from infthor_eval.storage.limits import OBJECT_POSES
-
 from .harness import Bench
 
 
@@ -287,7 +285,7 @@ def test_a_pile_of_plates_is_carried_however_high_it_is(bench):
 
 
 def test_more_poses_than_a_scene_has_are_refused(bench, monkeypatch):
-    monkeypatch.setenv(OBJECT_POSES.name, "1")
+    monkeypatch.setenv("INFTHOR_EVAL_MAX_OBJECT_POSES", "1")
     pose = {"objectName": "Mug_1", "position": {"x": 0, "y": 1, "z": 0}}
     bench.ok("SetObjectPoses", objectPoses=[pose])
     assert "2 entries, too many for a scene" in bench.refused(

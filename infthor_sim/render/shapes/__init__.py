@@ -1,5 +1,4 @@
-"""The shapes of the types of objects, one module per theme; importing this package registers all
-drawings."""
+"""Shapes of object types, a module per theme; importing this package registers all drawings."""
 
 from importlib import import_module
 from pkgutil import iter_modules

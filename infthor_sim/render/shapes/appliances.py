@@ -2,8 +2,8 @@
 
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, BRASS, CHROME, DARK, STEEL, WHITE, pick
-from infthor_sim.render.shapes.register import draws
 
 _SCREEN: Color = (0.35, 0.6, 0.9)
 _ICONS: tuple[Color, ...] = (
@@ -32,8 +32,7 @@ def toaster(b: Builder) -> None:
 
 @draws
 def coffee_machine(b: Builder) -> None:
-    """A back with a tank, a head, and a plate for the mug in front; a stream and a light while
-    on."""
+    """A back with a tank, a head, a plate for the mug in front; while on, a stream and a light."""
     color = pick((BLACK, STEEL, (0.5, 0.15, 0.14)), b.style)
     b.box((0, 0, -0.6), (0.9, 1, 0.4), color, Material.METAL)
     b.box((0, 0.72, 0.1), (0.9, 0.28, 0.85), shade_of(color, 1.15), Material.METAL)
@@ -127,8 +126,7 @@ def _lamp(b: Builder, foot: float, shade_low: float) -> None:
 
 @draws
 def cell_phone(b: Builder) -> None:
-    """A slab of glass in a bright metal edge: a round key, a slit for the ear, and icons while it
-    is on."""
+    """A slab of glass in a bright metal edge: a round key, a slit for the ear; icons while on."""
     b.box((0, -0.15, 0), (1, 0.85, 1), CHROME, Material.METAL)
     b.box((0, 0.2, 0), (0.92, 0.68, 0.96), (0.04, 0.04, 0.05))
     lit = b.state.toggled
@@ -166,8 +164,7 @@ def vacuum(b: Builder) -> None:
 
 @draws
 def alarm_clock(b: Builder) -> None:
-    """A round clock on two feet with two bells on top, a face with hands and marks, and keys to
-    wind it at its back."""
+    """A round clock on two feet: two bells on top, a face with hands and marks, keys behind."""
     color = pick(((0.75, 0.2, 0.18), (0.2, 0.42, 0.55), (0.3, 0.5, 0.4)), b.style)
     b.coin(2, (0, -0.16, 0), (0.8, 0.8, 0.74), color)
     b.coin(2, (0, -0.16, 0.76), (0.68, 0.68, 0.06), WHITE)

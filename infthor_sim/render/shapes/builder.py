@@ -1,5 +1,4 @@
-"""Building the shape of one object: coordinates run from -1 to 1 across the object's box, front
-towards +z."""
+"""Building an object's shape: coordinates from -1 to 1 across its box, front towards +z."""
 
 from collections.abc import Sequence
 from functools import partialmethod
@@ -122,8 +121,7 @@ class Builder:
         glow: float = 0.0,
         top: bool = True,
     ) -> None:
-        """Add a box without its front: five boards, `WALL` thick with a lining in a colour of its
-        own.
+        """Add a box without its front: five boards, `WALL` thick, with a lining of its own colour.
 
         Args:
             outside, inside: colours of the boards and of their lining.
@@ -172,8 +170,7 @@ class Builder:
     def open_top(
         self, color: Color, material: Material, wall: float, floor: float, glow: float = 0.0
     ) -> None:
-        """Add a box without its lid: four sides `wall` metres thick and a bottom; `glow` lights its
-        inside.
+        """Add a box without lid: four sides `wall` metres thick, a bottom; `glow`: inside light.
 
         Args:
             floor: height of the bottom's upper side in fractions.
@@ -201,8 +198,7 @@ class Builder:
         material: Material = Material.PLAIN, *,
         glow: float = 0.0,
     ) -> None:  # fmt: skip
-        """Add a round or oval disc whose flat sides face along `axis`; its half extents are
-        fractions along x, y, z."""
+        """Add a round or oval disc with flat sides along `axis`; `half` in fractions of x, y, z."""
         metres = np.asarray(half, dtype=float) * self.half
         tilt, order = {0: ((0.0, 0.0, 90.0), [1, 0, 2]), 1: ((0.0, 0.0, 0.0), [0, 1, 2]),
                        2: ((90.0, 0.0, 0.0), [0, 2, 1])}[axis]  # fmt: skip
@@ -239,8 +235,7 @@ class Builder:
         *,
         glow: float = 0.0,
     ) -> None:
-        """Add a round bar on the middle line of `axis` from `start` to `end`, with its radii in
-        metres there."""
+        """Add a round bar on the middle line of `axis` from `start` to `end`, radii in metres."""
         tilt = {0: (0.0, 0.0, -90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
         matrix = self._turn @ euler_matrix(tilt)
         widest = max(radii)
@@ -252,8 +247,7 @@ class Builder:
         )
 
     def rod(self, at: Vector, radius: float, length: float, axis: int, color: Color) -> None:
-        """Add a round bar, `radius` and half `length` in metres, along axis 0 (x), 1 (y) or 2
-        (z)."""
+        """Add a round bar, `radius` and half `length` in metres, along axis 0, 1 or 2."""
         tilt = {0: (0.0, 0.0, 90.0), 1: (0.0, 0.0, 0.0), 2: (90.0, 0.0, 0.0)}[axis]
         matrix = self._turn @ euler_matrix(tilt)
         self.parts.append(
@@ -285,8 +279,7 @@ class Builder:
         material: Material,
         glow: float = 0.0,
     ) -> None:
-        """Add a box turned by `angle` degrees about an upright hinge, which is at a position in
-        fractions.
+        """Add a box turned by `angle` degrees about an upright hinge at a position in fractions.
 
         The box's middle before turning, from the hinge, and its half extents are given in metres.
         """

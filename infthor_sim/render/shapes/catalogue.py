@@ -1,19 +1,33 @@
 """The shape of any object: the drawing that its type names, with dirt and variation of colour."""
 
+from collections.abc import Callable
 from dataclasses import replace
+
+import numpy as np
 
 from infthor_sim.objects import SimObject
 from infthor_sim.render.primitives import Color, ShapePart
 from infthor_sim.render.shapes.builder import Builder, shade_of
-from infthor_sim.render.shapes.register import SHAPES, draws
 
-__all__ = ["shape"]
+__all__ = ["SHAPES", "draws", "shape"]
+
+Drawing = Callable[[Builder], None]
 
 _DIRT: Color = (0.36, 0.27, 0.16)
 _DIRT_SHARE = 0.45
 # objects of one colour differ a little in brightness, by their style
 _TINTS = 5
 _TINT = 0.045
+
+SHAPES: dict[str, Drawing] = {}
+"""The drawings by the names that types give."""
+
+
+def draws(drawing: Drawing) -> Drawing:
+    """Register a drawing under the name of its function."""
+    assert drawing.__name__ not in SHAPES, f"two shapes are called {drawing.__name__}"
+    SHAPES[drawing.__name__] = drawing
+    return drawing
 
 
 def shape(item: SimObject) -> list[ShapePart]:
@@ -33,5 +47,5 @@ def box(b: Builder) -> None:
 
 
 def _dirty_color(color: Color) -> Color:
-    r, g, b = (c * (1 - _DIRT_SHARE) + d * _DIRT_SHARE for c, d in zip(color, _DIRT, strict=True))
-    return (r, g, b)
+    red, green, blue = np.array(color) * (1 - _DIRT_SHARE) + np.array(_DIRT) * _DIRT_SHARE
+    return float(red), float(green), float(blue)

@@ -4,8 +4,8 @@ import math
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CHROME, DARK, STEEL
-from infthor_sim.render.shapes.register import draws
 
 _BRIGHT: Color = (0.9, 0.92, 0.95)
 _GRIP: Color = (0.15, 0.13, 0.12)
@@ -25,8 +25,7 @@ def knife(b: Builder) -> None:
 
 @draws
 def butter_knife(b: Builder) -> None:
-    """All of bright steel: a stout round handle, a neck, and a blade with a round end and a
-    notch."""
+    """All of bright steel: a stout round handle, a neck, a blade with a round end and a notch."""
     b.ball((0, 0, 0.58), (0.75, 1, 0.42), shade_of(STEEL, 0.85), Material.METAL)
     b.box((0, 0, 0.12), (0.35, 0.7, 0.1), CHROME, Material.METAL)
     b.box((0.1, 0, -0.36), (0.9, 0.5, 0.4), _BRIGHT, Material.METAL)

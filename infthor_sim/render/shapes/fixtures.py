@@ -2,6 +2,7 @@
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import (
     BLACK,
     BRASS,
@@ -14,7 +15,6 @@ from infthor_sim.render.shapes.palette import (
     WOODS,
     pick,
 )
-from infthor_sim.render.shapes.register import draws
 from infthor_sim.render.shapes.tables import cut_slab
 from infthor_sim.render.shell import FLOORS
 from infthor_sim.world import FLOOR_STYLES
@@ -32,8 +32,7 @@ def floor(b: Builder) -> None:
 
 @draws
 def sink(b: Builder) -> None:
-    """A rim of steel or ceramic around the basins; a hollow tub if the basins are no separate
-    objects."""
+    """A rim of steel or ceramic around the basins; a hollow tub if they are no objects."""
     color = STEEL if b.style % 2 else _CERAMIC
     if not b.item.pieces:
         b.open_top(color, Material.METAL, 0.02, b.floor, glow=0.22)

@@ -2,7 +2,7 @@
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
-from infthor_sim.render.shapes.register import draws
+from infthor_sim.render.shapes.catalogue import draws
 
 __all__ = ["APPLES", "CRUST", "LETTUCE", "POTATO", "TOMATO"]
 
@@ -72,8 +72,7 @@ def bread(b: Builder) -> None:
 def loaf(
     b: Builder, axis: int, share: float, length: float, color: Color, material: Material
 ) -> None:
-    """Add a tin loaf along `axis`, with a share of its width and height and a share of its
-    length."""
+    """Add a tin loaf along `axis`, by shares of its width and height and of its length."""
     at = (0.0, -0.3 * share, 0.0)
     half = [0.86 * share] * 3
     half[1] = 0.7 * share

@@ -2,6 +2,7 @@
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import (
     BLACK,
     BRASS,
@@ -15,7 +16,6 @@ from infthor_sim.render.shapes.palette import (
     WOODS,
     pick,
 )
-from infthor_sim.render.shapes.register import draws
 
 _COVERS: tuple[Color, ...] = (
     (0.6, 0.18, 0.15),
@@ -57,8 +57,7 @@ def disc(b: Builder) -> None:
 
 @draws
 def watch(b: Builder) -> None:
-    """A white dial in a metal case with a crown, on a closed strap that is narrower than the
-    case."""
+    """A white dial in a metal case with a crown, on a closed strap narrower than the case."""
     strap = pick(((0.12, 0.12, 0.13), (0.42, 0.24, 0.12), (0.16, 0.22, 0.42)), b.style)
     case = pick((CHROME, BRASS), b.style)
     b.box((0, -0.92, 0), (0.66, 0.08, 0.48), strap)
@@ -113,8 +112,7 @@ def vase(b: Builder) -> None:
 
 @draws
 def statue(b: Builder) -> None:
-    """A human figure of one colour on a plinth: robe, chest, head, one arm raised and the other at
-    its hip."""
+    """A human figure of one colour on a plinth: robe, chest, head, an arm up, one at its hip."""
     color = pick((BRASS, (0.78, 0.76, 0.73), (0.42, 0.36, 0.32)), b.style)
     if b.state.broken:
         _shards(b, color)

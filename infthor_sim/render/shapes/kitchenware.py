@@ -2,6 +2,7 @@
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, Vector, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import (
     BLACK,
     CERAMICS,
@@ -13,7 +14,6 @@ from infthor_sim.render.shapes.palette import (
     WOODS,
     pick,
 )
-from infthor_sim.render.shapes.register import draws
 
 _LIQUIDS: dict[str, Color] = {
     "water": (0.5, 0.72, 0.88),
@@ -171,8 +171,7 @@ def pepper_shaker(b: Builder) -> None:
 def _stroke(
     b: Builder, face: int, at: tuple[float, float], half: tuple[float, float], color: Color
 ) -> None:
-    """A stroke of a letter on the front (1) or back (-1) of a shaker, in shares of the letter seen
-    upright."""
+    """A stroke of a letter on a shaker's front (1) or back (-1), in shares of the letter."""
     b.box(
         (-face * at[0] * 0.36, -0.3 + 0.4 * at[1], face * 0.9),
         (half[0] * 0.36, 0.4 * half[1], 0.08),

@@ -2,13 +2,12 @@
 
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CLOTHS, WHITE, WOODS, pick
-from infthor_sim.render.shapes.register import draws
 
 
 def _seat_level(b: Builder, usual: float) -> float:
-    """Return the height of the seat as a fraction of the half box: the object's surface height if
-    it is known."""
+    """Return the seat's height as a fraction of the half box: the surface height if known."""
     if b.item.support is None:
         return usual
     return min(0.9, max(-0.8, b.item.support / float(b.half[1]) - 1))

@@ -3,8 +3,8 @@
 from infthor_sim.object_types import OBJECT_TYPES
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.food import APPLES, CRUST, LETTUCE, POTATO, TOMATO, loaf
-from infthor_sim.render.shapes.register import draws
 
 # Number of slices, by the type of slice.
 _COUNTS = {whole.slice_type: whole.slices for whole in OBJECT_TYPES.values() if whole.slices}
@@ -66,8 +66,7 @@ def potato_slice(b: Builder) -> None:
 
 @draws
 def lettuce_slice(b: Builder) -> None:
-    """A ruffled leaf, paler within, with a broad white rib from its foot that branches into
-    veins."""
+    """A ruffled leaf, paler within, with a broad white rib from its foot that becomes veins."""
     for aside, up in _RUFFLES:
         _disc(b, 0.34, 0.76, shade_of(LETTUCE, 0.66), (aside, up))
     _disc(b, 0.82, 0.84, shade_of(LETTUCE, 1.15), (0.0, 0.0))
@@ -79,8 +78,7 @@ def lettuce_slice(b: Builder) -> None:
 
 
 def _rib(b: Builder, at: tuple[float, float], angle: float, half: tuple[float, float]) -> None:
-    """A white rib on both faces, `angle` degrees from upright; its half width and half length are
-    fractions."""
+    """A white rib on both faces, `angle` degrees from upright; half sizes are fractions."""
     thin = _thin_axis(b)
     # A tilted box has half extents along its own axes, hence lengths in metres and not in fractions
     # of the tilted ones.
@@ -112,8 +110,7 @@ def _spots(b: Builder, places: tuple[tuple[float, float], ...], size: float, col
 
 
 def _relative_width(b: Builder) -> float:
-    """Return the width of a slice as a share of the widest: the first and last slices of a round
-    thing are smaller."""
+    """Return a slice's width as a share of the widest: a round thing's end slices are smaller."""
     # The id ends with the number of the slice.
     number = b.item.object_id.rsplit("_", 1)[-1]
     count = _COUNTS.get(b.item.object_type, 1)

@@ -2,8 +2,8 @@
 
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CLOTHS, WHITE, pick
-from infthor_sim.render.shapes.register import draws
 
 
 @draws

@@ -4,8 +4,8 @@ import math
 
 from infthor_sim.render.primitives import Color, Form, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, CHROME, DARK, pick
-from infthor_sim.render.shapes.register import draws
 
 _STRING: Color = (0.3, 0.3, 0.32)
 
@@ -20,8 +20,7 @@ def ball(b: Builder) -> None:
 
 @draws
 def bat(b: Builder) -> None:
-    """A knob, a wound grip, a slender handle that widens, and a thick barrel with a round end, on
-    its longest side."""
+    """A knob, a wound grip, a slender handle, a thick barrel with a round end; the longest side."""
     axis = b.longest
     wood: Color = (0.86, 0.66, 0.4)
     thick = min(float(b.half[i]) for i in range(3) if i != axis)
@@ -37,25 +36,23 @@ def bat(b: Builder) -> None:
 
 @draws
 def racket(b: Builder) -> None:
-    """An oval frame with a net of strings, a forked throat and a wound grip, along its longest
-    side."""
+    """An oval frame with strings, a forked throat and a wound grip, along its longest side."""
     long = b.longest
     flat = min(range(3), key=lambda i: float(b.half[i]))
     wide = 3 - long - flat
 
     def at(along: float, across: float = 0.0, up: float = 0.0) -> list[float]:
-        """A position, or half extents, in fractions along the racket, across it and away from its
-        face."""
+        """A position or half extents in fractions along the racket, across, and off its face."""
         return [along if axis == long else across if axis == wide else up for axis in range(3)]
 
     frame = pick(((0.75, 0.12, 0.12), (0.1, 0.25, 0.6), (0.12, 0.12, 0.14)), b.style)
     b.coin(flat, at(0.44), at(0.56, 1.0, 0.75), frame)
     b.coin(flat, at(0.44), at(0.48, 0.86, 0.8), (0.9, 0.9, 0.8))
     for index in range(5):
-        place = (index - 2) / 3
-        reach = math.sqrt(1 - place * place)
-        b.box(at(0.44 + 0.48 * place), at(0.008, 0.86 * reach, 0.86), _STRING)
-        b.box(at(0.44, 0.86 * place), at(0.48 * reach, 0.02, 0.86), _STRING)
+        offset = (index - 2) / 3
+        reach = math.sqrt(1 - offset * offset)
+        b.box(at(0.44 + 0.48 * offset), at(0.008, 0.86 * reach, 0.86), _STRING)
+        b.box(at(0.44, 0.86 * offset), at(0.48 * reach, 0.02, 0.86), _STRING)
     b.box(at(-0.2), at(0.12, 0.13, 0.6), frame)
     b.box(at(-0.66), at(0.34, 0.15, 0.9), BLACK, Material.FABRIC)
 

@@ -4,14 +4,13 @@ import math
 
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, BRASS, CHROME, STEEL, WHITE, pick
-from infthor_sim.render.shapes.register import draws
 
 
 @draws
 def card(b: Builder) -> None:
-    """A bright plastic card: a gold chip, a white line of numbers, and the two overlapping discs of
-    its maker."""
+    """A bright plastic card: a gold chip, a white line of numbers, its maker's two discs."""
     b.box(
         (0, -0.1, 0),
         (1, 0.9, 1),
@@ -49,8 +48,7 @@ def pencil(b: Builder) -> None:
 
 
 def _thickness(b: Builder) -> float:
-    """Return half of the second longest side, metres: the thickness of a round thing in a box
-    around it."""
+    """Return half of the second longest side, metres: a round thing's thickness in its box."""
     return sorted(float(v) for v in b.half)[1]
 
 

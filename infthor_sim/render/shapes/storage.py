@@ -3,13 +3,12 @@
 from infthor_sim.objects import DOOR_SWING, DRAWER_SLIDE, WALL
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import BLACK, CHROME, DARK, STEEL, WHITE, WOODS, pick
-from infthor_sim.render.shapes.register import draws
 
 _LEAF = 0.02  # thickness of a door, metres
-_FRIDGE_GRIP = (
-    0.022  # metres that a fridge's grips stand out within its box, as recorded in FloorPlan28
-)
+# metres that a fridge's grips stand out within its box, as recorded in FloorPlan28
+_FRIDGE_GRIP = 0.022
 _LIT = 0.2  # glow of the insides of open things: their contents would be hard to see otherwise
 # of a wide open cardboard box's width; the rest is its flaps. The type's `unfolds` has the same
 # share.
@@ -33,14 +32,13 @@ def _door(
     high: float = 1.0,
     grip_in: float = 0.0,
 ) -> None:
-    """Add a hinged door over the front from height fraction `low` to `high`, at the object's
-    openness.
+    """Add a hinged door over the front, from height fraction `low` to `high`, as open as it is.
 
     With `grip_in`, the grip is within the object's box, and the door so many metres behind its
     front.
     """
     side = b.item.hinge or -1
-    width, height, depth = (float(v) for v in b.half)
+    width, height, depth = map(float, b.half)
     middle = (low + high) / 2 * height
     half = (high - low) / 2 * height
     angle = side * DOOR_SWING * b.state.openness
@@ -150,7 +148,7 @@ def _door_racks(b: Builder) -> None:
     """The white inner side of the open doors, with racks."""
     side = b.item.hinge or -1
     angle = side * DOOR_SWING * b.state.openness
-    width, height, _ = (float(v) for v in b.half)
+    width, height, _ = map(float, b.half)
     hinge = (side, 0.0, 1.0)
     inward = -_LEAF - _FRIDGE_GRIP
     for low, high in ((-0.93, 0.26), (0.37, 0.96)):

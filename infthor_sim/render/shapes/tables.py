@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from infthor_sim.physics.footprints import Rect
 from infthor_sim.render.primitives import Color, Material
 from infthor_sim.render.shapes.builder import Builder, shade_of
+from infthor_sim.render.shapes.catalogue import draws
 from infthor_sim.render.shapes.palette import CHROME, CLOTHS, DARK, WOODS, pick
-from infthor_sim.render.shapes.register import draws
 
 __all__ = ["cut_slab"]
 
@@ -18,9 +18,8 @@ def counter(b: Builder) -> None:
     """A slab of stone, cut out where sinks are; a tall box has a body of wood below it."""
     height = 2 * float(b.half[1])
     color = pick(_STONES, b.style)
-    if (
-        height < 0.1 and b.item.support is not None
-    ):  # a recorded counter is a thin space above its slab
+    # a recorded counter is a thin space above its slab
+    if height < 0.1 and b.item.support is not None:
         half = 0.018 / float(b.half[1])
         cut_slab(b, b.item.support / float(b.half[1]) - 1 - half, half, color, Material.STONE)
         return
@@ -39,8 +38,7 @@ def counter(b: Builder) -> None:
 def cut_slab(
     b: Builder, at: float, half: float, color: Color, material: Material, shrink: float = 1.0
 ) -> None:
-    """Add a board over the object's outline from above, its middle at height `at`, `half` thick
-    (fractions)."""
+    """Add a board over the object's outline, its middle at `at`, `half` thick (fractions)."""
     turned = round(b.item.front / 90)
     x, z = float(b.half[0]), float(b.half[2])
     for piece in b.item.pieces or ((-x, -z, x, z),):
@@ -52,8 +50,7 @@ def cut_slab(
 
 
 def _turn(rect: Rect, quarters: int) -> Rect:
-    """Return a rectangle of the object's frame in the frame of its front, which is turned by
-    quarter turns."""
+    """Return a rectangle of the object's frame in that of its front, by quarter turns."""
     x0, z0, x1, z1 = rect
     for _ in range(quarters % 4):
         x0, z0, x1, z1 = -z1, x0, -z0, x1
@@ -76,8 +73,7 @@ def _surface(b: Builder) -> float:
 
 
 def _top(b: Builder, color: Color, edge: float) -> float:
-    """Add the board, and a back where the surface is lower than the box; return the height of the
-    board's underside."""
+    """Add a board, and a back where the box is higher; return the board's lower height."""
     surface = _surface(b)
     board = b.thick(0.02, 1)
     b.box((0, surface - board, 0), (1, board, 1), color, Material.WOOD)
@@ -112,14 +108,12 @@ def _legs(b: Builder, under: float, thick: float, color: Color) -> None:
 
 @draws
 def desk(b: Builder) -> None:
-    """A writing mat on a board, a block of drawers at one end, a side at the other and a panel
-    along the back."""
+    """A writing mat on a board, drawers at one end, a side at the other, a panel at the back."""
     color = pick(WOODS, b.style)
     under = _top(b, color, 0.7)
     mat = min(0.8, b.thick(0.36, 0)), min(0.62, b.thick(0.22, 2))
-    level = _surface(b) - b.thick(
-        0.001, 1
-    )  # it stands out by half a millimetre: things stand on the board
+    # it stands out by half a millimetre: things stand on the board
+    level = _surface(b) - b.thick(0.001, 1)
     b.box((0, level, 0.14), (mat[0], b.thick(0.0015, 1), mat[1]), (0.13, 0.25, 0.2))
     if b.item.hollow:
         _carcass(b, color, under)
@@ -151,8 +145,7 @@ def desk(b: Builder) -> None:
 
 @draws
 def dining_table(b: Builder) -> None:
-    """A large board on turned legs, thick above and slender at the foot, a deep apron, and a runner
-    of cloth on it."""
+    """A large board on turned, slender-footed legs, a deep apron, and a runner of cloth."""
     color = shade_of(pick(WOODS, b.style + 2), 1.05)
     under = _top(b, color, 0.6)
     if b.item.hollow:
@@ -190,8 +183,7 @@ def dining_table(b: Builder) -> None:
 
 @draws
 def side_table(b: Builder) -> None:
-    """A small stand: a drawer's front with a knob below the board, slim legs, a shelf near the
-    floor."""
+    """A small stand: a drawer's front with a knob, slim legs, a shelf near the floor."""
     color = pick(WOODS, b.style)
     under = _top(b, color, 0.7)
     if b.item.hollow:
@@ -221,8 +213,7 @@ def coffee_table(b: Builder) -> None:
 
 @draws
 def chest(b: Builder) -> None:
-    """A closed body with a board on top: dressers and stands whose drawers are not objects of their
-    own."""
+    """A closed body with a board on top: dressers and stands whose drawers are no objects."""
     color = pick(WOODS, b.style)
     board = b.thick(0.02, 1)
     top = _surface(b)

@@ -7,9 +7,9 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from infthor_eval.errors import SimulatorError
 from infthor_eval.formats.floor_plans import write_floor_plan
 from infthor_eval.thor.view import view_of
+from infthor_sim.errors import SimulatorError
 from infthor_sim.player.fifo import FieldType, parse_action
 from infthor_sim.scenes.catalogue import Catalogue
 

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from infthor_sim.arm.kinova import LINK, SHOULDER, Kinova, forward, inverse
 from infthor_sim.arm.paths import path_distances, rotation_steps
 from infthor_sim.arm.rig import ArmPose
-from infthor_sim.arm.rotations import axis_angle, rotation
 from infthor_sim.arm.stretch import Stretch
-from infthor_sim.geometry import euler_matrix
+from infthor_sim.geometry import axis_angle, axis_rotation, euler_matrix
 
 UNIT = st.tuples(*[st.floats(-1, 1)] * 3).map(np.array).filter(lambda v: np.linalg.norm(v) > 0.1)
 ANGLE = st.floats(-720, 720)
@@ -45,7 +44,8 @@ def test_the_elbow_turns_about_the_line_from_shoulder_to_wrist(direction, share,
     target = SHOULDER + direction / np.linalg.norm(direction) * share * REACH
     (_, before), (_, after) = solved(target, elbow), solved(target, elbow + turn)
     line = (target - SHOULDER) / np.linalg.norm(target - SHOULDER)
-    first, second = (j[2] - SHOULDER - line * (line @ (j[2] - SHOULDER)) for j in (before, after))
+    first = before[2] - SHOULDER - line * (line @ (before[2] - SHOULDER))
+    second = after[2] - SHOULDER - line * (line @ (after[2] - SHOULDER))
     cosine = first @ second / np.linalg.norm(first) / np.linalg.norm(second)
     assert cosine == pytest.approx(np.cos(np.radians(turn)), abs=1e-6)
 
@@ -85,7 +85,7 @@ def test_restricted_movements_have_a_front_and_a_reach(line, allowed):
 def test_axis_and_angle_give_the_same_rotation(angles):
     turn = euler_matrix(angles)
     axis, degrees = axis_angle(turn)
-    assert rotation(axis, degrees) == pytest.approx(turn, abs=1e-5)
+    assert axis_rotation(axis, degrees) == pytest.approx(turn, abs=1e-5)
     steps = rotation_steps(turn, 5.0)
     assert steps[-1] is turn
     for before, after in zip([np.eye(3), *steps], steps, strict=False):

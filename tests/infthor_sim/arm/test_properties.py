@@ -51,8 +51,7 @@ PROPERTY = settings(max_examples=15)
 
 
 def deepest(bench: Bench, thing: int) -> tuple[float, str]:
-    """How deep points of one box of the arm are in something solid, metres, and what that is; by
-    points alone."""
+    """How deep points of a box of the arm are in something solid, metres, and in what."""
     box, solids = own_boxes(bench)[thing : thing + 1], obstacles(bench.sim)
     points = box.center[0] + (GRID * box.half[0]) @ box.axes[0]
     local = np.abs(

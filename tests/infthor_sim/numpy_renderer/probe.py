@@ -1,4 +1,4 @@
-"""Checking whether an object is visible, in numpy; gives the same answer as `probe_numba`."""
+"""Whether an object is visible, in numpy; the same answer as `probe_numba`."""
 
 from dataclasses import replace
 
@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
-from infthor_sim.render.raster_numpy import cast, hit
+
+from .raster import cast, hit
 
 __all__ = ["is_visible"]
 
@@ -19,8 +20,7 @@ def is_visible(
     own: NDArray[np.bool_],
     min_pixels: int,
 ) -> bool:
-    """Return whether at least `min_pixels` pixels show a primitive of `projection` that is marked
-    in `own` (n,)."""
+    """Return whether at least `min_pixels` pixels show a primitive marked in `own` (n,)."""
     us, vs = camera.rays()
     # First the pixels that the object would show alone; then each other primitive takes away those
     # that it hides.

@@ -1,5 +1,4 @@
-"""Smoothing of jagged pixels in numpy: the formulas of `smoothing_numba`, in the same order of
-operations."""
+"""Smoothing of jagged pixels in numpy."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,14 +7,12 @@ from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
 from infthor_sim.render.lighting import Lights
 from infthor_sim.render.primitives import COLOR
-from infthor_sim.render.raster_numpy import hit
-from infthor_sim.render.shading_numpy import brightness_at
-from infthor_sim.render.smoothing import JUMP, NEIGHBOURS, SUBPIXELS
+from infthor_sim.render.smoothing_numba import JUMP, NEIGHBOURS, SUBPIXELS
+
+from .raster import hit
+from .shading import brightness_at
 
 __all__ = ["smooth"]
-
-_NEIGHBOURS = np.array(NEIGHBOURS)
-_SUBPIXELS = np.array(SUBPIXELS)
 
 
 def smooth(
@@ -33,8 +30,8 @@ def smooth(
         return
     us, vs = camera.rays()
     pixel = vs[1] - vs[0] if len(vs) > 1 else 0.0
-    around_y = ys[:, None] + _NEIGHBOURS[:, 0]
-    around_x = xs[:, None] + _NEIGHBOURS[:, 1]
+    around_y = ys[:, None] + NEIGHBOURS[:, 0]
+    around_x = xs[:, None] + NEIGHBOURS[:, 1]
     inside = (
         (around_y >= 0) & (around_x >= 0) & (around_y < rgb.shape[0]) & (around_x < rgb.shape[1])
     )
@@ -42,7 +39,7 @@ def smooth(
     around_x = np.where(inside, around_x, xs[:, None])
     orders = np.where(inside, nearest[around_y, around_x], -1)
     total = np.zeros((len(ys), 3))
-    for dx, dy in _SUBPIXELS:
+    for dx, dy in SUBPIXELS:
         u, v = us[xs] + dx * pixel, vs[ys] + dy * pixel
         depths = _depths(prims, projection, camera, orders, u, v)
         chosen = depths.argmin(axis=1)
@@ -63,7 +60,7 @@ def smooth(
         )
         level = level * factors[near_y, near_x]
         total[at] += np.minimum(p[:, COLOR : COLOR + 3] * level[:, None] * 255.0, 255.0)
-    rgb[ys, xs] = (total / len(_SUBPIXELS)).astype(np.uint8)
+    rgb[ys, xs] = (total / len(SUBPIXELS)).astype(np.uint8)
 
 
 def _find_jagged(rgb: NDArray[np.uint8]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -91,8 +88,7 @@ def _depths(
     u: Array,
     v: Array,
 ) -> Array:
-    """Return the depth of each candidate (n, m) on the rays (u, v) (n,); infinity where it is
-    missed."""
+    """Return depths of candidates (n, m) on the rays (u, v) (n,); infinity for misses."""
     depths = np.full(orders.shape, np.inf)
     for order in np.unique(orders[orders >= 0]):
         rows, columns = np.nonzero(orders == order)

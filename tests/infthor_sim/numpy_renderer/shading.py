@@ -1,11 +1,11 @@
-"""Colours of the cast pixels in numpy: the formulas of `shading_numba`, in the same order of
-operations."""
+"""Colours of the cast pixels, and light and shadow at creases, in numpy."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from infthor_sim.geometry import Array
 from infthor_sim.render.camera import PinholeCamera, Projection
+from infthor_sim.render.creases_numba import DARKEST, LIGHTEST, ROWS, STRENGTH
 from infthor_sim.render.lighting import (
     AMBIENT,
     HEADLIGHT,
@@ -15,22 +15,26 @@ from infthor_sim.render.lighting import (
     SUN_DIRECTION,
     Lights,
 )
+from infthor_sim.render.normals import surface
 from infthor_sim.render.patterns import PATTERNS
-from infthor_sim.render.primitives import (
-    AXES,
-    BOTTOM,
-    COLOR,
-    EMISSION,
-    FORM,
-    HALF,
-    MATERIAL,
-    TOP,
-    Form,
-)
+from infthor_sim.render.primitives import COLOR, EMISSION, MATERIAL
 
-__all__ = ["brightness_at", "shade", "surface_normals"]
+__all__ = ["brightness_at", "crease_factors", "shade"]
 
-_RIM = 1.0 - 1e-6
+
+def crease_factors(depth: Array) -> Array:
+    """Return factors of brightness (h, w), see `creases_numba.crease_factors`."""
+    step = max(1, depth.shape[0] // ROWS)
+    # In place where possible: temporaries of a whole picture cost more than the sums.
+    inverse = np.pad(1.0 / depth, step, mode="edge")
+    around = inverse[: -2 * step, step:-step] + inverse[2 * step :, step:-step]
+    around += inverse[step:-step, : -2 * step]
+    around += inverse[step:-step, 2 * step :]
+    around *= depth
+    around -= 4.0
+    around *= -STRENGTH
+    around += 1.0
+    return np.clip(around, DARKEST, LIGHTEST, out=around)
 
 
 def shade(
@@ -42,8 +46,7 @@ def shade(
     factors: Array,
     lights: Lights,
 ) -> NDArray[np.uint8]:
-    """Return RGB (h, w, 3), bottom row first, of the pixels that `cast` hit, each brightness times
-    its factor."""
+    """Return RGB (h, w, 3), bottom row first, of cast pixels, each brightness times its factor."""
     us, vs = camera.rays()
     rgb = np.zeros((*nearest.shape, 3), dtype=np.uint8)
     ys, xs = np.nonzero(nearest >= 0)
@@ -69,11 +72,10 @@ def brightness_at(
     camera: PinholeCamera,
     lights: Lights,
 ) -> Array:
-    """Return the brightness (n,) of primitives `p` (n, COLUMNS) at depth t on the rays (u, v,
-    t)."""
+    """Return the brightness (n,) of primitives (n, COLUMNS) at depth t on rays (u, v, t)."""
     u, v, t = rays
     local = [o[:, i] + t * ((s[:, 0, i] + u * s[:, 1, i]) + v * s[:, 2, i]) for i in range(3)]
-    normal, a, b = _surface(p, local)
+    normal, a, b = surface(p, local)
     ray = [
         (camera.matrix[i, 2] + u * camera.matrix[i, 0]) + v * camera.matrix[i, 1] for i in range(3)
     ]
@@ -86,67 +88,6 @@ def brightness_at(
     glow = p[:, EMISSION]
     level: Array = glow * 1.15 + (1.0 - glow) * (light * factor)
     return level
-
-
-def surface_normals(
-    prims: Array,
-    projection: Projection,
-    camera: PinholeCamera,
-    depth: Array,
-    nearest: NDArray[np.int32],
-) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-    """Return rows, columns and world normals (n, 3), of either sign, of the pixels that `cast`
-    hit."""
-    us, vs = camera.rays()
-    ys, xs = np.nonzero(nearest >= 0)
-    order = nearest[ys, xs]
-    u = us[xs]
-    v = vs[ys]
-    t = depth[ys, xs]
-    o = projection.origin[order]
-    s = projection.steps[order]
-    local = [o[:, i] + t * (s[:, 0, i] + u * s[:, 1, i] + v * s[:, 2, i]) for i in range(3)]
-    normal, _, _ = _surface(prims[projection.index[order]], local)
-    return ys, xs, np.stack(normal, axis=1)
-
-
-def _surface(p: Array, local: list[Array]) -> tuple[list[Array], Array, Array]:
-    """Return world normals (3 arrays) and two surface coordinates in metres of hit points in scaled
-    frames."""
-    x, y, z = local
-    form = p[:, FORM]
-    ax = np.abs(x)
-    ay = np.abs(y)
-    az = np.abs(z)
-    on_x = (ax >= ay) & (ax >= az)
-    on_y = ~on_x & (ay >= az)
-    k = (p[:, TOP] - p[:, BOTTOM]) * 0.5
-    m = (p[:, BOTTOM] + p[:, TOP]) * 0.5
-    box = form == Form.BOX
-    ball = (form == Form.ELLIPSOID) | (form == Form.BOWL)
-    cap = (ay >= _RIM) & ~((y > 0) & (form == Form.CUP))
-    nx = np.where(box, np.where(on_x, x, 0.0), np.where(ball | ~cap, x, 0.0))
-    nz = np.where(box, np.where(on_x | on_y, 0.0, z), np.where(ball | ~cap, z, 0.0))
-    ny = np.where(
-        box, np.where(on_y, y, 0.0), np.where(ball, y, np.where(cap, y, -k * (m + k * y)))
-    )
-    ny = np.where(form == Form.BOWL, (y - 1.0) * 0.25, ny)
-    hx = p[:, HALF]
-    hy = p[:, HALF + 1]
-    hz = p[:, HALF + 2]
-    nx = nx / hx
-    ny = ny / hy
-    nz = nz / hz
-    normal = [
-        p[:, AXES + i] * nx + p[:, AXES + 3 + i] * ny + p[:, AXES + 6 + i] * nz for i in range(3)
-    ]
-    length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]) + 1e-12
-    mx = x * hx
-    my = y * hy
-    mz = z * hz
-    a = np.where(box, np.where(on_x, mz, mx), mx + mz)
-    b = np.where(box & on_y, mz, my)
-    return [n / length for n in normal], a, b
 
 
 def _light(normal: list[Array], ray: list[Array], world: list[Array], lights: Lights) -> Array:

@@ -1,8 +1,4 @@
-"""The ray caster in numpy, for machines without numba; draws the same picture as `raster_numba`,
-bit for bit.
-
-Every formula has the order of operations of its counterpart there, which has the comments.
-"""
+"""The ray caster of `raster_numba`, which has the comments, in numpy."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +15,7 @@ _TINY = 1e-12
 def cast(
     prims: Array, projection: Projection, camera: PinholeCamera
 ) -> tuple[Array, NDArray[np.int32]]:
-    """Return depth in metres (h, w), and each pixel's nearest primitive, by order in `projection`,
-    or -1 (h, w)."""
+    """Return depth (h, w), metres, and each pixel's nearest primitive in `projection`, or -1."""
     us, vs = camera.rays()
     depth = np.full((len(vs), len(us)), camera.far)
     nearest = np.full((len(vs), len(us)), -1, dtype=np.int32)
@@ -41,8 +36,7 @@ def cast(
 def hit(
     prims: Array, projection: Projection, order: int, rays: tuple[Array, Array], near: float
 ) -> Array:
-    """Return depths at which rays (u, v) meet primitive `order` of the projection; infinity where
-    they do not."""
+    """Return the depths at which rays (u, v) meet primitive `order`; infinity for misses."""
     prim = prims[projection.index[order]]
     o = projection.origin[order]
     steps = projection.steps[order]

@@ -1,0 +1,22 @@
+"""The command line that starts the simulator as the player behind an ai2thor Controller."""
+
+import shlex
+import sys
+from pathlib import Path
+
+__all__ = ["player_command"]
+
+
+def player_command(data: Path | str | None = None, supplement: Path | str | None = None) -> str:
+    """Return the command line of the simulator, for ai2thor's `local_executable_path`.
+
+    Args:
+        data: folder of recorded floor plans (`scenes.dataset`); None: procedural scenes alone.
+        supplement: file with additions to them from trajectories (`scenes.supplement`).
+    """
+    words = [sys.executable, "-m", "infthor_sim.player"]
+    if data is not None:
+        words += ["--data", str(Path(data).resolve())]
+    if supplement is not None:
+        words += ["--supplement", str(Path(supplement).resolve())]
+    return shlex.join(words)

@@ -1,0 +1,15 @@
+"""A second renderer, in numpy: the compiled one is held to its pictures, bit for bit.
+
+Every formula has the order of operations of its counterpart in `infthor_sim.render`.
+"""
+
+from infthor_sim.render.picture import Rasterizer
+
+from .probe import is_visible
+from .raster import cast
+from .shading import crease_factors, shade
+from .smoothing import smooth
+
+__all__ = ["NUMPY"]
+
+NUMPY = Rasterizer(cast, crease_factors, shade, smooth, is_visible)

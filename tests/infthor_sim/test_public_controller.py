@@ -1,0 +1,200 @@
+"""What others import and start: Controller, `run SCRIPT`, the README's examples."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from infthor_sim import Controller, player_command
+from infthor_sim.errors import SimulatorError
+
+from ..docs.blocks import ROOT, blocks_of
+from ..waiting import PATIENCE_S, wait_until
+from .conftest import need_data
+
+EXAMPLES = [
+    block.text for block in blocks_of("infthor_sim/README.md") if block.language == "python"
+]
+SCRIPT = """
+import sys
+import ai2thor.controller
+from ai2thor.controller import Controller
+
+controller = Controller(scene="bathroom-1", x_display="0.0", local_executable_path="/opt/thor")
+controller.step(action="RotateRight")
+print(controller.last_event.metadata["sceneName"], sys.argv[1:], __name__)
+{ending}
+"""
+
+
+def python(*words: str | Path, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *words],
+        check=False,
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **variables},
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+    )
+
+
+def run_script(folder: Path, ending: str, *words: str) -> subprocess.CompletedProcess[str]:
+    (folder / "script.py").write_text(SCRIPT.format(ending=ending))
+    return python("-m", "infthor_sim", "run", *words, cwd=folder)
+
+
+def alive(controller: Any) -> bool:
+    return Path(f"/proc/{controller.unity_pid}").exists()
+
+
+def test_it_needs_no_display_and_leaves_nothing_behind(monkeypatch, tmp_path):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", None)
+    with Controller() as controller:
+        assert controller.last_event.metadata["sceneName"] == "kitchen-1"
+        assert controller.last_event.frame.shape == (300, 300, 3)
+        assert alive(controller)
+    assert not alive(controller)
+    assert [path.name for path in tmp_path.rglob("*")] == ["temporary"]
+    controller.stop()  # once more does nothing
+
+
+def test_its_process_ends_with_python(tmp_path):
+    code = "from infthor_sim import Controller; print(Controller(scene='bathroom-1').unity_pid)"
+    status = Path(f"/proc/{int(python('-c', code, cwd=tmp_path).stdout)}/status")
+    wait_until(lambda: not status.exists() or "(zombie)" in status.read_text())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"gpu_device": 0, "platform": "CloudRendering"},
+        {"x_display": "0.0", "local_executable_path": None, "server_class": None},
+        {"start_unity": False, "commit_id": "0" * 40, "branch": "main", "local_build": True},
+        {"headless": True},
+    ],
+)
+def test_what_chooses_a_build_or_a_screen_has_no_effect(options, monkeypatch):
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "0")  # for which ai2thor would run vulkaninfo
+    with Controller(scene="bathroom-1", width=200, height=100, **options) as controller:
+        event = controller.step("RotateRight")
+        assert event.metadata["lastActionSuccess"]
+        assert (event.screen_width, event.screen_height) == (200, 100)
+        assert (event.frame is None) == ("headless" in options)
+
+
+def test_arguments_of_ai2thor_pass_through():
+    with Controller(
+        "Low", scene="bathroom-1", gridSize=0.5, agentMode="arm", renderDepthImage=True
+    ) as controller:
+        assert controller.quality == "Low"
+        assert controller.last_event.depth_frame is not None
+        assert controller.initialization_parameters["gridSize"] == 0.5
+        assert controller.last_event.metadata["arm"]["heldObjects"] == []
+
+
+def test_a_download_starts_nothing():
+    with Controller(download_only=True) as controller:
+        assert controller.last_event is None
+
+
+@pytest.mark.parametrize("scene", ["FloorPlan1", "castle-1"])
+def test_a_refused_scene_ends_the_process(scene, monkeypatch):
+    started = []
+    monkeypatch.setattr(
+        Controller, "_await_first_state", lambda self, process: started.append(process)
+    )
+    with pytest.raises(RuntimeError, match=scene):
+        Controller(scene=scene)
+    assert started[0].poll() is not None
+
+
+def test_a_process_that_cannot_start_is_one_line(monkeypatch):
+    monkeypatch.setattr(
+        "infthor_sim.controller.player_command",
+        lambda *_: f"{sys.executable} -c 'raise SystemExit(\"no such luck\")'",
+    )
+    with pytest.raises(SimulatorError, match="does not start: no such luck"):
+        Controller()
+
+
+def test_recorded_floor_plans_with_data():
+    with Controller(scene="FloorPlan1", data=need_data()) as controller:
+        assert controller.last_event.metadata["sceneName"] == "FloorPlan1_physics"
+
+
+def test_the_command_starts_this_python_with_whole_paths(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert player_command() == f"{sys.executable} -m infthor_sim.player"
+    command = player_command("a b", Path("s.json"))
+    assert command.endswith(f" --data '{tmp_path}/a b' --supplement {tmp_path}/s.json")
+
+
+def test_a_script_for_ai2thor_runs_as_it_stands(tmp_path):
+    done = run_script(tmp_path, "controller.stop()", "script.py", "--data", "x", "-h")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "bathroom-1 ['--data', 'x', '-h'] __main__\n"
+
+
+def test_errors_and_exit_codes_of_a_script_are_its_own(tmp_path):
+    done = run_script(tmp_path, "raise KeyError('mine')", "script.py")
+    assert done.returncode == 1
+    assert done.stderr.startswith("Traceback")
+    assert done.stderr.endswith(
+        "script.py\", line 9, in <module>\n    raise KeyError('mine')\nKeyError: 'mine'\n"
+    )
+    assert run_script(tmp_path, "sys.exit(5)", "script.py").returncode == 5
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["run"], "arguments are required: script"),
+        (["run", "none.py"], "there is no file none.py"),
+        (["walk"], "invalid choice: 'walk'"),
+    ],
+)
+def test_misuse_is_one_line(words, message, tmp_path):
+    done = python("-m", "infthor_sim", *words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_without_arguments_it_explains_itself(tmp_path):
+    done = python("-m", "infthor_sim", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "run SCRIPT" in done.stdout
+
+
+def test_the_package_is_light_and_stands_alone(tmp_path):
+    light = "import sys, infthor_sim; print({'ai2thor', 'numpy', 'numba'} & set(sys.modules))"
+    assert python("-c", light, cwd=tmp_path).stdout == "set()\n"
+    whole = (
+        "import importlib, pkgutil, sys, infthor_sim\n"
+        "for found in pkgutil.walk_packages(infthor_sim.__path__, 'infthor_sim.'):\n"
+        "    importlib.import_module(found.name)\n"
+        "names = {'infthor_eval', 'model_adapters', 'torch', 'numba'}\n"
+        "print(names & set(sys.modules))"
+    )
+    assert python("-c", whole, cwd=tmp_path).stdout == "{'numba'}\n"
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=["fridge", "arm"])
+def test_the_examples_of_the_readme(example, tmp_path):
+    (tmp_path / "example.py").write_text(example)
+    done = python("example.py", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    if "fridge" in example:
+        with Image.open(tmp_path / "fridge.png") as picture:
+            assert picture.size == (640, 480)
+    else:
+        assert done.stdout.startswith("held: ['Tomato|")
