@@ -6,8 +6,8 @@ through entry points, as "module:Class" under the suite's name: the suite in `in
 its presenter in `infthor_eval.presenters` (without one it gets `PlainPresenter`), its adapter in
 `infthor_eval.lm_eval`.
 
-To add a suite: a package with a `Suite` (`tests/runs/toy.py` is the smallest), its line here, task
-files with `metadata: {suite: NAME}` and a presenter in `infthor_eval/report/suites/`.
+To add a suite: a package with a `Suite` (`infthor_eval/runs/suite.py`), its line here, task files
+with `metadata: {suite: NAME}`, and a presenter in `infthor_eval/report/suites/`.
 
 To add a suite of another package: entry points; `examples/sums/` is a whole package to copy
 (`docs/own-tasks.md`).

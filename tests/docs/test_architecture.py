@@ -1,19 +1,20 @@
 """The pages about the code name what is there, and all of it."""
 
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from .blocks import PLACE, ROOT
+from .blocks import ROOT
 
 PAGES = ("docs/architecture.md", "docs/where-things-go.md", "CONTRIBUTING.md")
+PLACE = re.compile(r"`([\w./-]+?(?:/|\.(?:py|yaml|md|js|html|css|txt|gz)))(?:: ?(\w+))?`")
 WRITTEN = {"results.json", "usage.json", "run.yaml"}  # files of runs, which are not in the tree
 SOURCES = [
     path
     for top in (
         "infthor_eval",
-        "infthor_sim",
         "model_adapters",
         "tasks",
         "tests",

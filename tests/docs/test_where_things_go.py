@@ -5,7 +5,8 @@ import sys
 
 import pytest
 
-from .blocks import PLACE, ROOT
+from .blocks import ROOT
+from .test_architecture import PLACE
 
 
 def load_script():
