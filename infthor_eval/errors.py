@@ -2,6 +2,10 @@
 
 Every message is one line that says what is wrong, where, and how to fix it. The command line prints
 it without a traceback and exits with the error's `exit_code`.
+
+To add an error that a user may meet: one of these classes, and a row in `tests/faults/`.
+
+To add a library's error as one line: `with wrap_errors(...)` around the call.
 """
 
 import difflib

@@ -3,6 +3,8 @@
 Questions on one trajectory share its frames, scene and objects, so their scores are correlated. The
 independent unit is the trajectory. Every interval here sums or resamples over trajectories, through
 one partition (`_partition`).
+
+To add or change an interval: here; `benchmarks/interval_coverage.py` measures it.
 """
 
 import math

@@ -5,6 +5,12 @@ Each class is imported only when needed, so that `--help` stays quick. Other pac
 through entry points, as "module:Class" under the suite's name: the suite in `infthor_eval.suites`,
 its presenter in `infthor_eval.presenters` (without one it gets `PlainPresenter`), its adapter in
 `infthor_eval.lm_eval`.
+
+To add a suite: a package with a `Suite` (`infthor_eval/runs/suite.py`), its line here, task files
+with `metadata: {suite: NAME}`, and a presenter in `infthor_eval/report/suites/`.
+
+To add a suite of another package: entry points; `examples/sums/` is a whole package to copy
+(`docs/own-tasks.md`).
 """
 
 from collections.abc import Iterable, Mapping

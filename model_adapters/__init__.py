@@ -1,6 +1,9 @@
 """Models for infthor-eval: the protocols that a model implements, and one module per model family.
 
 Importing this package imports neither torch nor transformers; the first model that needs them does.
+
+To add an engine: a package here whose model keeps `protocols.py` and passes `check_adapter`, and
+its line in `built_in.py`. In another package: `docs/own-models.md`.
 """
 
 from model_adapters.backend import Backend, BackendConversation

@@ -4,6 +4,8 @@ Models that think write it before the answer, between markers of their family. T
 those of the families' chat templates and of vLLM's reasoning parsers. Some templates write the
 first marker themselves, so that a reply has the second alone. A server that tells thoughts apart
 sends them in a field of their own (`Reply.thinking`).
+
+To add markers of a family that thinks: a line in `MARKERS`.
 """
 
 import re

@@ -8,6 +8,9 @@
 A total of 0 says that the trajectory never came to its final task: the set-up failed, which means
 the task just before it; of earlier ones the script leaves out the rest. `agent_reward` is not read:
 it is 0 in every published row.
+
+To add a form of plan counts that others made: here, and
+`infthor_eval/plans/published/imported_counts.py`.
 """
 
 import re

@@ -3,6 +3,9 @@
 Opening a named pipe or a device would block for ever, a packed file can hold a thousand times its
 size, and a nested one can exceed any decoder's recursion limit. Each of these is a `DataError`
 here, with the file, the reason and a hint.
+
+To add or change a check of files before they are read: here, for `csv_files.py` and `yaml_files.py`
+too; size limits in `infthor_eval/storage/limits.py`.
 """
 
 import gzip

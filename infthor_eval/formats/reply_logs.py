@@ -10,6 +10,9 @@ A published log is named `eval_<question file>_<model>_<mode>.log`; a row
 repeats its question (`question`, `traj_id`, `gt_img_idx`, `gt_answer`) and has a `score`. A neutral
 one may have `n_context_tokens`, `n_reply_tokens`, `seconds` and `frames_shown`, the numbers of the
 frames that were shown.
+
+To add a form of replies that others made: here; a published mode in
+`infthor_eval/nieh/published/imported_replies.py: _MODES`.
 """
 
 from collections.abc import Iterator

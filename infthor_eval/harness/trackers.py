@@ -1,4 +1,8 @@
-"""Our runs in experiment trackers and on the hub, through lm-eval's own loggers."""
+"""Our runs in experiment trackers and on the hub, through lm-eval's own loggers.
+
+To add a tracker: here, its option in `infthor_eval/cli/options/show.py`, its row in
+`docs/howto/trackers.md`.
+"""
 
 import difflib
 import importlib.util

@@ -2,6 +2,9 @@
 
 The tables are the published ones (`affordances.yaml`). They are narrower than what AI2-THOR allows,
 which would accept a statue in the sink basin. Types are those of AI2-THOR 5.x.
+
+To add or change which objects fit where, and which tasks a room: `affordances.yaml`, the published
+tables.
 """
 
 from collections.abc import Iterable

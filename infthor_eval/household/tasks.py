@@ -1,4 +1,7 @@
-"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one."""
+"""Tasks with object types: ALFRED's seven task types, and putting away what is held after one.
+
+To add a household task type: here, its goal in `goals.py` and `pddl.py`.
+"""
 
 from enum import StrEnum
 from typing import Any

@@ -1,4 +1,8 @@
-"""What drives an arm: it begins an episode, and gives steps until the episode is over."""
+"""What drives an arm: it begins an episode, and gives steps until the episode is over.
+
+To add a baseline of arms: a class in `BASELINES` here, and its name in `infthor_eval/suites.py`;
+how `planner-arm` moves is in `planner/reaching.py`.
+"""
 
 import math
 import random

@@ -4,6 +4,9 @@ A policy moves the end effector in the frame of a robot's base: x forward, y lef
 right-handed. AI2-THOR's arm is moved in the frame "armBase": x right, y up, z forward, left-handed.
 A change of handedness reverses the sense of turns. So yaw changes its sign. Pitch keeps it, as its
 axis is reversed too, and so does roll, as AI2-THOR counts it the other way.
+
+To add or change what a policy's seven numbers do: here; their limits and scales in
+`tasks/manipulation/`.
 """
 
 import math

@@ -1,4 +1,8 @@
-"""An environment with the episodes of one trajectory, which begin in the expert's true states."""
+"""An environment with the episodes of one trajectory, which begin in the expert's true states.
+
+To add or change when an episode of an arm begins and succeeds: here; copying its scene to the arm's
+simulator is in `infthor_eval/thor/transfer.py`.
+"""
 
 import math
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,7 @@
-"""Contract checks for anybody's memory, through the protocol alone; a violation is one line."""
+"""Contract checks for anybody's memory, through the protocol alone; a violation is one line.
+
+To add or change a rule of memories' contract: a check here, and in `docs/memories.md`.
+"""
 
 import json
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,7 @@
-"""Memories by name: built in, of other packages (entry points), and classes in a user's file."""
+"""Memories by name: built in, of other packages (entry points), and classes in a user's file.
+
+To add a memory: a class in this package and its line in `MEMORIES` (`docs/memories.md`).
+"""
 
 import inspect
 import typing

@@ -1,5 +1,8 @@
 """Frame ablations: other frames in the places of the true ones, to measure what a model gains from
-seeing them."""
+seeing them.
+
+To add a frame ablation: its effect here, its name in `options.py: FRAMES`.
+"""
 
 import random
 from collections.abc import Sequence

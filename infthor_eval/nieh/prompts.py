@@ -1,4 +1,8 @@
-"""Prompts of NIEH in the words of the published evaluation, and what counts of a response."""
+"""Prompts of NIEH in the words of the published evaluation, and what counts of a response.
+
+To add or change the words of a question: here; which contexts take them is in
+`contexts/__init__.py: CONTEXTS`.
+"""
 
 from infthor_eval.formats.question import Question
 

@@ -13,6 +13,9 @@ fixes the faults:
 * numbers must be equal: "100" is not nearly "10";
 * a slice is its food: "lettuce slice", "sliced lettuce", "lettucesliced" and "lettuce" are one
   thing, in keys too.
+
+To add or change a metric of NIEH: here for all tasks; for one alone, `process_results` and
+`metric_list` in its task file.
 """
 
 import re

@@ -3,6 +3,9 @@
 An action is rewarded by the plan's kind. A refused action ends the plan and earns nothing. An
 action that is not valid for the kind earns nothing and ends nothing. The reward of the whole task
 is added once, with the first valid action after which the task's goal holds.
+
+To add or change a reward of plans: its numbers and valid actions in `rewards.yaml`; the rule of a
+kind here.
 """
 
 import math

@@ -1,4 +1,7 @@
-"""Jobs of one result each, done by workers, as commands do with --workers."""
+"""Jobs of one result each, done by workers, as commands do with --workers.
+
+To add a command that shares its work: an `OpenWorker`, given to `run_jobs`.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any

@@ -1,4 +1,7 @@
-"""The protocols of a worker, which does jobs in another process, and of the driver's link to it."""
+"""The protocols of a worker, which does jobs in another process, and of the driver's link to it.
+
+To add a place where workers run: a `Link` in this package, and its line in `settings.py`.
+"""
 
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol

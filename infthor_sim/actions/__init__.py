@@ -1,4 +1,8 @@
-"""The actions of the protocol, one module per theme; importing this package registers them all."""
+"""The actions of the protocol, one module per theme; importing this package registers them all.
+
+To add a simulator action: a function with `@action` here (`modes=` for some agent modes alone), and
+its line in `docs/simulator.md`.
+"""
 
 from importlib import import_module
 from pkgutil import iter_modules

@@ -1,4 +1,7 @@
-"""The interface of an arm: a pose, and a rig that computes joints and boxes from it."""
+"""The interface of an arm: a pose, and a rig that computes joints and boxes from it.
+
+To add a robot arm: a rig in this package, and its line in `infthor_sim/arm/equipment.py`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """The types of objects: one record each, in tables by theme.
 
-To add a type, add a record. A type without a `shape` is drawn as a plain box. A new shape is a
-function in `render/shapes` with `@draws`, whose name the record gives.
+To add an object type: a record here; if a plain box is not enough, a function with `@draws` in
+`infthor_sim/render/shapes/`, whose name is the record's `shape`.
 """
 
 from infthor_sim.object_types import appliances, fixtures, food, furniture, household, kitchenware

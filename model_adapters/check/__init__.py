@@ -2,6 +2,9 @@
 
 The checks use the protocols only, so they apply to every back end. A violated clause raises an
 error of one line.
+
+To add or change a rule of adapters' contract: a check here, its line in `contract.py: model_checks`
+or `policy.py: policy_checks`, and in `docs/own-models.md`.
 """
 
 from model_adapters.check.clauses import ContractError

@@ -1,4 +1,8 @@
-"""Options of models behind a server: address, form of requests, rate limits and spend caps."""
+"""Options of models behind a server: address, form of requests, rate limits and spend caps.
+
+To add an option of served models: a field here, in `_IN_IDENTITY` if it can change a reply; its
+effect in `model.py`, `messages.py` or `endpoint.py`.
+"""
 
 import re
 from dataclasses import dataclass

@@ -1,5 +1,9 @@
 """The tables of settings in docs/own-tasks.md, from the code: `python -m
-tests.docs.settings_tables` writes them."""
+tests.docs.settings_tables` writes them.
+
+To add or change a setting of task files: a field of the suite's class that `docs/own-tasks.md`
+names; then run this.
+"""
 
 import importlib
 import inspect

@@ -1,4 +1,7 @@
-"""`infthor-eval doctor`: check the installation and suggest fixes."""
+"""`infthor-eval doctor`: check the installation and suggest fixes.
+
+To add a check of `doctor`: here; one of a set in `infthor_eval/cli/set_checks.py`.
+"""
 
 import ctypes.util
 import importlib.util

@@ -1,4 +1,8 @@
-"""The options of a run, for every command that takes them, and the runs that they ask for."""
+"""The options of a run, for every command that takes them, and the runs that they ask for.
+
+To add an option of a run: here, and in `infthor_eval/runs/stored/command.py`, which stores a run's
+command, unless a suite has it.
+"""
 
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -1,5 +1,8 @@
 """Baselines that see no frame: the answer key itself, the best guess from the question alone, and
-chance."""
+chance.
+
+To add a baseline of NIEH: a class in `BASELINES` here, and its name in `infthor_eval/suites.py`.
+"""
 
 import random
 from collections import Counter, defaultdict

@@ -1,4 +1,8 @@
-"""Contexts by the names that task files use."""
+"""Contexts by the names that task files use.
+
+To add a context (what a model sees): its functions here, its entry in `CONTEXTS` and a task
+file in `tasks/nieh/contexts/`.
+"""
 
 from infthor_eval.errors import UsageError
 from infthor_eval.nieh.contexts import (

@@ -1,4 +1,7 @@
-"""Baselines that see no frame: expert, chance, a script for a plan's words, experts' habits."""
+"""Baselines that see no frame: expert, chance, a script for a plan's words, experts' habits.
+
+To add a baseline of agents: a class in `BASELINES` here, and its name in `infthor_eval/suites.py`.
+"""
 
 import random
 from collections.abc import Callable, Mapping, Sequence

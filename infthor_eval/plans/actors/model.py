@@ -1,4 +1,9 @@
-"""A model as an actor: it continues the sequence that it was trained on."""
+"""A model as an actor: it continues the sequence that it was trained on.
+
+To add or change how an agent is asked and read: here; the words in
+`infthor_eval/household/sequence_text.py` and `infthor_eval/formats/object_ids.py`, actions in
+`infthor_eval/thor/actions.py`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

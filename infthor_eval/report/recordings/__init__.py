@@ -1,1 +1,4 @@
-"""Pictures of replayed episodes, for recordings and for the page."""
+"""Pictures of replayed episodes, for recordings and for the page.
+
+To add or change what `watch` shows: `replay` of the suite's presenter, its drawing here.
+"""

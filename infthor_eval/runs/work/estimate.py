@@ -6,6 +6,8 @@ others only for themselves. So each quantity of a group with n units on f frames
 
     f * (excess of a first unit over a later one, per measured frame) + n * (quantity of a later
     unit)
+
+To add or change the estimate of what a run takes: here; a group's `frames` in its suite.
 """
 
 import time

@@ -3,6 +3,8 @@ tree, and no code.
 
 pip download vllm==0.33.0 --no-deps --only-binary :all: -d FOLDER
 python tests/model_adapters/vllm/read_signatures.py FOLDER/vllm-*.whl
+
+To add arguments of a newer vLLM: run this on its wheel.
 """
 
 import ast
