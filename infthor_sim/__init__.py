@@ -1,6 +1,6 @@
 """The embedded simulator: a process that takes the place of the Unity build of AI2-THOR.
 
-`python -m infthor_sim` speaks the FIFO protocol of ai2thor 5.0.0, so the unmodified
+`python -m infthor_sim.player` speaks the FIFO protocol of ai2thor 5.0.0, so the unmodified
 `ai2thor.controller.Controller` drives it through `local_executable_path`. No other package imports
 this one; all use it as that process. Its geometry is calibrated on recordings of AI2-THOR, its
 looks are not.

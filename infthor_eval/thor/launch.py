@@ -48,7 +48,7 @@ def embedded_launch(
     Raises:
         UsageError: the time limit of an action, `limits.ACTION_SECONDS`, is set to no number.
     """
-    words = [sys.executable, "-m", "infthor_sim"]
+    words = [sys.executable, "-m", "infthor_sim.player"]
     if data is not None:
         words += ["--data", str(Path(data).resolve())]
     if supplement is not None:

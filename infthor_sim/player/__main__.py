@@ -1,4 +1,4 @@
-"""`python -m infthor_sim [--data DIR] [--supplement FILE] <arguments of a Unity player>`.
+"""`python -m infthor_sim.player [--data DIR] [--supplement FILE] <arguments of a Unity player>`.
 
 The Controller starts this process as if it were Unity and names the pipes in the environment. Of
 Unity's own arguments only the screen's size and the quality have an effect.
@@ -29,7 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
     from infthor_sim.simulation import Simulation
 
     parser = ArgumentParser(
-        prog="python -m infthor_sim",
+        prog="python -m infthor_sim.player",
         description="The embedded simulator that takes the place of AI2-THOR's Unity build",
         add_help=False,
     )
@@ -50,7 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         return 0  # the controller went away while a reply was under way
     except InfthorError as error:
-        print(f"infthor_sim: {error}", file=sys.stderr)
+        print(f"infthor_sim.player: {error}", file=sys.stderr)
         return error.exit_code
     return 0
 

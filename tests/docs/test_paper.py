@@ -18,7 +18,9 @@ from .blocks import ROOT
 PAGE = (ROOT / "docs/paper.md").read_text()
 TABLE_ROW = re.compile(r"^\| (?!---|claim)(.+?) \|$", re.MULTILINE)
 TEST = re.compile(r"`(tests/[\w/]+\.py)(?:::(\w+))?`")
-FILE = re.compile(r"`((?:infthor_eval|model_adapters|tasks|results|benchmarks|docs)/[\w./-]+)`")
+FILE = re.compile(
+    r"`((?:infthor_eval|infthor_sim|model_adapters|tasks|results|benchmarks|docs)/[\w./-]+)`"
+)
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
 SECTIONS = ("A.1.1", "A.1.2", "A.1.3", "A.2", "B.1", "C.1", "C.2", "D")
 

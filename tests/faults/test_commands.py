@@ -81,8 +81,8 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(
 
     for begins in (
         "thor.simulator.Simulator.__init__",
-        "runs.binding._load_subject",
-        "formats.hub_data._download",
+        "runs.work.binding._load_subject",
+        "nieh.published.hub_data._download",
     ):
         monkeypatch.setattr(f"infthor_eval.{begins}", work)
     (tmp_path / "file.json").write_text("{}")

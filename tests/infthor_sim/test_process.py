@@ -13,7 +13,7 @@ import pytest
 
 from ..waiting import PATIENCE_S, wait_until
 
-COMMAND = [sys.executable, "-m", "infthor_sim"]
+COMMAND = [sys.executable, "-m", "infthor_sim.player"]
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ from tests.runs.toy_command import request
 
 from ...waiting import PATIENCE_S, wait_until
 
-TOY = Path(__file__).with_name("toy_command.py")
+TOY = Path(__file__).parents[1] / "toy_command.py"
 
 
 class Watching:

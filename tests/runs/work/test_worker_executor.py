@@ -291,7 +291,7 @@ def test_ctrl_c_finishes_the_unit_in_hand_and_shows_what_is_there_and_again_stop
     tmp_path, again
 ):
     toy, gate, output = (
-        Path(__file__).with_name("toy_command.py"),
+        Path(__file__).parents[1] / "toy_command.py",
         tmp_path / "gate",
         tmp_path / "out",
     )
