@@ -44,7 +44,7 @@ def test_nothing_is_collected_during_an_import_and_its_objects_are_passed_over_l
     assert import_target(f"{own_module}:is_collecting") is False
     assert gc.isenabled()
     assert gc.get_freeze_count() > 0
-    assert all(found is not sys.modules[own_module].Loop for found in gc.get_objects())
+    assert all(item is not sys.modules[own_module].Loop for item in gc.get_objects())
 
 
 def test_what_is_made_after_an_import_is_collected(own_module: str) -> None:
@@ -53,7 +53,7 @@ def test_what_is_made_after_an_import_is_collected(own_module: str) -> None:
     loop.itself = loop
     del loop
     gc.collect()
-    assert not any(type(found) is loop_class for found in gc.get_objects())
+    assert not any(type(item) is loop_class for item in gc.get_objects())
 
 
 def test_a_second_import_freezes_nothing(own_module: str) -> None:

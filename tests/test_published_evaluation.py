@@ -53,9 +53,9 @@ def test_parts_of_a_context_take_what_the_whole_takes(costs: Any) -> None:
 
 def test_rates_give_back_what_was_measured(costs: Any) -> None:
     rates = costs.Rates(0, 0, 0, 0)
-    found = costs.rates_from_prefill(rates, (1000, 500.0), (3000, 250.0))
+    fitted = costs.rates_from_prefill(rates, (1000, 500.0), (3000, 250.0))
     for n, rate in ((1000, 500.0), (3000, 250.0)):
-        assert n / costs.seconds(costs.Request(n, 0, 0), found) == pytest.approx(rate)
+        assert n / costs.seconds(costs.Request(n, 0, 0), fitted) == pytest.approx(rate)
 
 
 @pytest.mark.parametrize(
@@ -110,21 +110,25 @@ def test_a_trajectory_is_encoded_once_and_windows_by_what_they_share(
     )
     trajectory = simulation.Trajectory(20, ((3,), (12,), (3,)))
     gt, full, *_, plans = simulation.modes(options)
-    found, _ = simulation.requests(trajectory, full, shape, options)
-    assert [(request.context, request.cached) for request in found] == [
+    requests, _ = simulation.requests(trajectory, full, shape, options)
+    assert [(request.context, request.cached) for request in requests] == [
         (205, 0),
         (205, 200),
         (205, 200),
     ]
-    found, _ = simulation.requests(trajectory, gt, shape, options)
-    assert [(request.context, request.cached) for request in found] == [(15, 0), (15, 10), (15, 0)]
-    found, _ = simulation.requests(trajectory, plans, shape, options)
-    assert [(request.context, request.cached) for request in found[:3]] == [
+    requests, _ = simulation.requests(trajectory, gt, shape, options)
+    assert [(request.context, request.cached) for request in requests] == [
+        (15, 0),
+        (15, 10),
+        (15, 0),
+    ]
+    requests, _ = simulation.requests(trajectory, plans, shape, options)
+    assert [(request.context, request.cached) for request in requests[:3]] == [
         (10, 0),
         (20, 10),
         (30, 20),
     ]
-    assert len(found) == 20
+    assert len(requests) == 20
 
 
 def test_the_haystack_is_the_harness_own(simulation: Any, shape: Any) -> None:
@@ -134,9 +138,12 @@ def test_the_haystack_is_the_harness_own(simulation: Any, shape: Any) -> None:
         shape, frame_tokens=100
     )  # windows of 10 frames, which begin 0, 2, 4, 6, 8 before the clue
     trajectory = simulation.Trajectory(15, ((5,), (5,)))
-    found, n_missing = simulation.requests(trajectory, mode, wide, options)
+    requests, n_missing = simulation.requests(trajectory, mode, wide, options)
     assert n_missing == 4  # two begin before the trajectory, for each of the two questions
-    assert [(request.context, request.cached) for request in found] == [(1000, 0), (1000, 1000)] * 3
+    assert [(request.context, request.cached) for request in requests] == [
+        (1000, 0),
+        (1000, 1000),
+    ] * 3
 
 
 def test_a_run_counts_what_is_too_long_and_what_no_node_has_room_for(
@@ -174,7 +181,7 @@ def test_a_run_counts_what_is_too_long_and_what_no_node_has_room_for(
 def test_the_same_seed_gives_the_same_table(
     simulation: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    given = [
+    words = [
         "--trajectories",
         "3",
         "--haystack",
@@ -184,7 +191,7 @@ def test_the_same_seed_gives_the_same_table(
         "--decode",
         "pixtral=9",
     ]
-    options = simulation._arguments(given)
+    options = simulation._arguments(words)
     trajectories = simulation.draw(options)
     assert trajectories == simulation.draw(options)
     assert {300 <= trajectory.n_frames <= 2287 for trajectory in trajectories} == {True}
@@ -197,6 +204,6 @@ def test_the_same_seed_gives_the_same_table(
         for mode in simulation.modes(options)
         for model in simulation.MODELS
     ]
-    shown = simulation.cost_table(runs, 120, 3.0).splitlines()
-    assert len(shown) == 1 + 4 * 4 + 4 + 1
-    assert {len(line) for line in shown} == {len(shown[0])}
+    table_lines = simulation.cost_table(runs, 120, 3.0).splitlines()
+    assert len(table_lines) == 1 + 4 * 4 + 4 + 1
+    assert {len(line) for line in table_lines} == {len(table_lines[0])}

@@ -118,17 +118,18 @@ def point(package, monkeypatch):
     """Makes another target the suite `sums`, or the folder of the tasks."""
 
     def point(target, group="infthor_eval.suites"):
-        found = [EntryPoint("sums", target, group)]
+        entry_points_of_test = [EntryPoint("sums", target, group)]
         for module in ("infthor_eval.plugins", "infthor_eval.runs.catalog"):
             monkeypatch.setattr(
-                f"{module}.entry_points", lambda group: [one for one in found if one.group == group]
+                f"{module}.entry_points",
+                lambda group: [one for one in entry_points_of_test if one.group == group],
             )
 
     return point
 
 
 @pytest.mark.parametrize(
-    ("target", "said"),
+    ("target", "expected"),
     [
         ("no_such_module:A", "the suite sums cannot be imported from no_such_module:A"),
         ("sums_suite:Nothing", "the suite sums cannot be imported"),
@@ -136,9 +137,9 @@ def point(package, monkeypatch):
         ("sums_suite:Renamed", "calls itself 'other'; give it one name"),
     ],
 )
-def test_what_is_no_suite_is_refused_in_one_line(point, target, said):
+def test_what_is_no_suite_is_refused_in_one_line(point, target, expected):
     point(target)
-    with pytest.raises(InfthorError, match=said) as caught:
+    with pytest.raises(InfthorError, match=expected) as caught:
         find_suite("sums")
     assert "\n" not in str(caught.value)
 
@@ -165,15 +166,15 @@ def test_a_suite_without_a_presenter_has_the_plain_one_and_a_package_may_bring_o
 
 
 @pytest.mark.parametrize(
-    ("target", "said"),
+    ("target", "expected"),
     [
         ("sums_suite:Nothing", "the presenter sums cannot be imported from sums_suite:Nothing"),
         ("sums_suite:Options", "the presenter sums of another package lacks title, measure"),
     ],
 )
-def test_what_is_no_presenter_is_refused_in_one_line(package, add_presenter, target, said):
+def test_what_is_no_presenter_is_refused_in_one_line(package, add_presenter, target, expected):
     add_presenter(target)
-    with pytest.raises(InfthorError, match=said) as caught:
+    with pytest.raises(InfthorError, match=expected) as caught:
         find_presenter("sums")
     assert "\n" not in str(caught.value)
 

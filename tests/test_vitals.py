@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from .benchmarks import FOLDER, load_benchmark
+from .helpers.benchmarks import FOLDER, load_benchmark
 
 VITALS = load_benchmark("vitals")
 PRINTS = 'import json; print(json.dumps({"a": {"b": [3, 4.5]}, "yes": True}))'
@@ -39,14 +39,14 @@ def vitals(tmp_path: Path, *words: str, command=("python", "-c", PRINTS), **fiel
     ("value", "moved"), [(4.5, False), (4.7, False), (4.3, False), (4.71, True), (4.2, True)]
 )
 def test_what_is_within_the_noise_has_not_moved(tmp_path, value, moved):
-    code, shown, _ = vitals(tmp_path, value=value)
-    assert (code, "MOVED" in shown) == ((1, True) if moved else (0, False))
+    code, output, _ = vitals(tmp_path, value=value)
+    assert (code, "MOVED" in output) == ((1, True) if moved else (0, False))
 
 
 def test_what_was_never_measured_is_new_and_is_to_be_committed(tmp_path):
-    code, shown, _ = vitals(tmp_path, value=None)
+    code, output, _ = vitals(tmp_path, value=None)
     assert code == 1
-    assert "new" in shown
+    assert "new" in output
 
 
 def test_a_move_is_committed_with_its_reason_and_has_then_not_moved(tmp_path):
@@ -63,7 +63,7 @@ def test_a_value_that_has_not_moved_is_left_as_it_is(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("command", "path", "said"),
+    ("command", "path", "expected"),
     [
         (("python", "-c", "raise SystemExit('no room')"), "a", "failed with 1: no room"),
         (("python", "-c", "print('text')"), "a", "failed with 0"),
@@ -71,17 +71,17 @@ def test_a_value_that_has_not_moved_is_left_as_it_is(tmp_path):
         (("python", "-c", PRINTS), "a.b.7", "no number at a.b.7"),
     ],
 )
-def test_what_cannot_be_measured_is_said_and_fails(tmp_path, command, path, said):
-    code, shown, _ = vitals(tmp_path, command=command, path=path)
+def test_what_cannot_be_measured_is_said_and_fails(tmp_path, command, path, expected):
+    code, output, _ = vitals(tmp_path, command=command, path=path)
     assert code == 1
-    assert said in shown
+    assert expected in output
 
 
 def test_what_needs_recorded_data_is_left_out_without_it(tmp_path):
     command = ("python", "-c", PRINTS, "{data}")
-    code, shown, _ = vitals(tmp_path, command=command, value=1.0)
+    code, output, _ = vitals(tmp_path, command=command, value=1.0)
     assert code == 0
-    assert "left out: needs --data" in shown
+    assert "left out: needs --data" in output
     assert vitals(tmp_path, "--data", str(tmp_path))[0] == 1  # it was measured now
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from .benchmarks import load_benchmark
+from .helpers.benchmarks import load_benchmark
 
 BUILDING = load_benchmark("wheel_size")
 
@@ -65,15 +65,15 @@ def test_what_runs_is_the_installed_code(installed, tmp_path):
         "import infthor_eval, model_adapters as other; print(infthor_eval.__file__, other.__file__)"
     )
     env = {**os.environ, "PYTHONPATH": str(installed)}
-    found = subprocess.check_output(
+    module_paths = subprocess.check_output(
         [sys.executable, "-c", code], cwd=tmp_path, env=env, text=True
     ).split()
-    assert all(Path(path).is_relative_to(installed) for path in found)
+    assert all(Path(path).is_relative_to(installed) for path in module_paths)
 
 
 def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert "nieh_haystack_128k" in command("ls", "tasks")
-    asked = (
+    words = (
         "--model",
         "blind,oracle,qwen2.5-vl-nano",
         "--tasks",
@@ -82,7 +82,7 @@ def test_it_runs_in_an_empty_folder(command, tmp_path):
         "20",
         "--full",
     )
-    table = command(*asked)
+    table = command(*words)
     assert "Qwen2.5-VL 7B" in table  # the published numbers came with it
     assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {
         "results"

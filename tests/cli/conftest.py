@@ -8,9 +8,9 @@ import pytest
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
 from infthor_eval.runs import RunHeader, UnitRecord, read_run
-from infthor_eval.runs.journals.journal import Journal
 
-from ..nieh.made import identity
+from ..helpers.journals import write_journal
+from ..helpers.nieh_runs import make_config
 from .commands.rescored import REPLIES
 
 
@@ -36,26 +36,26 @@ def source(tmp_path: Path) -> Callable[..., Path]:
         metrics: tuple[str, ...] = SCORERS,
         **changes: object,
     ) -> Path:
-        config = identity(model="m", checkpoint=None, n_parameters=None, metrics=metrics) | changes
+        config = (
+            make_config(model="m", checkpoint=None, n_parameters=None, metrics=metrics) | changes
+        )
         config["tasks"]["nieh_gt"]["n_samples"] = n_samples
         folder = tmp_path / "elsewhere" / "a run"
-        with Journal(folder, RunHeader(suite=suite, name="m", config=config), RECORDS) as journal:
-            for item in records:
-                journal.append(item)
-        return folder
+        header = RunHeader(suite=suite, name="m", config=config)
+        return write_journal(folder, header, records, RECORDS)
 
     return source
 
 
 @pytest.fixture
 def rescore(
-    tmp_path: Path, run: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, run_cli: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> Callable[..., tuple[int, str, Path | None]]:
     """Scores a run again; returns exit code, what was said, and the folder of the new run."""
     monkeypatch.chdir(tmp_path)
 
     def rescore(folder: Path, *options: object) -> tuple[int, str, Path | None]:
-        code, out, err = run("rescore", folder, "--output", tmp_path / "out", *options)
+        code, out, err = run_cli("rescore", folder, "--output", tmp_path / "out", *options)
         folders = sorted((tmp_path / "out").glob("*/*"), key=lambda path: path.stat().st_mtime)
         return code, out + err, folders[-1] if folders else None
 

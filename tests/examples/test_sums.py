@@ -42,8 +42,8 @@ def page(folders):
     return build_page(read_report_runs(folders, find_suite, find_presenter), PageRequest())
 
 
-def test_its_results_are_shown_and_exported(folders, run):
-    code, out, _ = run("show", *folders)
+def test_its_results_are_shown_and_exported(folders, run_cli):
+    code, out, _ = run_cli("show", *folders)
     rows = {
         line.split()[0]: line.split()
         for line in out.splitlines()
@@ -58,10 +58,12 @@ def test_its_results_are_shown_and_exported(folders, run):
         line["target"] == str(line["doc"]["a"] + line["doc"]["b"]) == line["resps"][0][0]
         for line in lines
     )
-    assert "sums_small right % 100.00 0.00 -100.00" in " ".join(run("compare", *folders)[1].split())
+    assert "sums_small right % 100.00 0.00 -100.00" in " ".join(
+        run_cli("compare", *folders)[1].split()
+    )
 
 
-def test_a_stopped_run_goes_on(folders, run):
+def test_a_stopped_run_goes_on(folders, run_cli):
     (journal,) = (folders[0] / "journal").glob("*.jsonl")
     lines = journal.read_text().splitlines()
     journal.write_text("\n".join(lines[:-3]) + "\n")
@@ -75,7 +77,7 @@ def test_a_stopped_run_goes_on(folders, run):
         "--output",
         folders[0].parents[1],
     )
-    code, _, err = run(*words)
+    code, _, err = run_cli(*words)
     assert (code, "3 evaluated now, 5 resumed from the journal" in err) == (0, True)
 
 

@@ -22,8 +22,8 @@ def rows_of(path):
 
 
 def table(suite, title):
-    (found,) = [table for table in published_tables(suite) if table.title == title]
-    return found
+    (matching,) = [table for table in published_tables(suite) if table.title == title]
+    return matching
 
 
 @pytest.mark.parametrize("suite", ["nieh", "plans", "manipulation", "training"])
@@ -50,7 +50,10 @@ def test_means_of_replies_are_those_of_the_logs(title, row, mode):
     ]
     assert published.columns == ("nieh_single_clue", "nsieh_multi_clue")
     assert (
-        tuple(round(100 * sum(given) / len(given), 2) for given in scores)
+        tuple(
+            round(100 * sum(scores_of_scorer) / len(scores_of_scorer), 2)
+            for scores_of_scorer in scores
+        )
         == published.rows[row].values
     )
 

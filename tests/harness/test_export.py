@@ -9,10 +9,11 @@ from lm_eval.utils import (
     make_table,
 )
 
-from tests.harness.conftest import only, samples
+from tests.harness.conftest import samples
+from tests.helpers.files import find_one
 
 
-def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run):
+def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run_cli):
     arguments = [
         "--model",
         "oracle",
@@ -23,8 +24,8 @@ def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run):
         "--output",
         tmp_path,
     ]
-    assert run(*arguments)[0] == 0
-    names = [str(path) for path in only(tmp_path, "lm_eval").rglob("*.json*")]
+    assert run_cli(*arguments)[0] == 0
+    names = [str(path) for path in find_one(tmp_path, "lm_eval").rglob("*.json*")]
     (results,) = get_results_filenames(names)
     assert len(get_sample_results_filenames(names)) == 2
     with open(results) as file:  # noqa: PTH123
@@ -41,10 +42,10 @@ def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run):
     assert document["task_hashes"]["nieh_gt"] == hash_string(hashes)
 
 
-def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run):
+def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run_cli):
     from datasets import load_dataset
 
-    run(
+    run_cli(
         "--model",
         "blind",
         "--tasks",
@@ -54,7 +55,9 @@ def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run):
         "--output",
         tmp_path,
     )
-    rows = load_dataset("json", data_files=str(only(tmp_path, "samples_*.jsonl")), split="train")
+    rows = load_dataset(
+        "json", data_files=str(find_one(tmp_path, "samples_*.jsonl")), split="train"
+    )
     assert len(rows) == 5
     assert rows[0]["metrics"] == ["reference", "strict"]
     assert set(rows[0]) >= {
@@ -69,7 +72,7 @@ def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run):
     }
 
 
-def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run):
+def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
@@ -83,7 +86,7 @@ def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run):
         "--output",
         tmp_path,
     ]
-    assert run(*arguments)[0] == 1
+    assert run_cli(*arguments)[0] == 1
     rows = samples(tmp_path)["nieh_gt"]
     assert len(rows) == 5
     assert [row["strict"] for row in rows if row["resps"] == [[""]]] == [0.0, 0.0]

@@ -15,7 +15,7 @@ TASKS = packaged_folder("tasks")
 
 
 @pytest.fixture
-def ours(make_nieh_set, tmp_path, run):
+def ours(make_nieh_set, tmp_path, run_cli):
     """The set, and the samples that our own command exports of a model on it."""
 
     def ours(model, *options):
@@ -30,7 +30,7 @@ def ours(make_nieh_set, tmp_path, run):
             "--output",
             tmp_path / "ours",
         ]
-        code, _, err = run(*arguments, *options)
+        code, _, err = run_cli(*arguments, *options)
         assert code == 0, err
         return data, samples(tmp_path / "ours")
 
@@ -45,7 +45,7 @@ def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, our
 
     checkpoint = tmp_path / "checkpoint"
     save_tiny_checkpoint(checkpoint, seed=0)
-    data, found = ours(
+    data, our_samples = ours(
         "qwen2.5-vl", "--model-args", f"pretrained={checkpoint},dtype=float32,device=cpu"
     )
     arguments = [
@@ -82,11 +82,11 @@ def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, our
 
     theirs = replies(samples(tmp_path / "theirs"))
     assert len(theirs) == 10
-    assert replies(found) == theirs
+    assert replies(our_samples) == theirs
 
 
 def test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own(tmp_path, ours, start):
-    data, found = ours("qwen2.5-vl-tiny")
+    data, our_samples = ours("qwen2.5-vl-tiny")
     # Named by their files, as lm-eval 0.4.13 imports a task's functions, and so ours, before it
     # looks for the model.
     tasks = f"{TASKS / 'nieh' / 'nieh_gt.yaml'},{TASKS / 'nieh' / 'nieh_full.yaml'}"
@@ -95,7 +95,7 @@ def test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own(tmp_p
     start(LM_EVAL, "run", *arguments, "--log_samples", "--output_path", tmp_path / "theirs")
     theirs = samples(tmp_path / "theirs")
     assert {task: len(rows) for task, rows in theirs.items()} == {"nieh_gt": 5, "nieh_full": 5}
-    assert found == theirs
+    assert our_samples == theirs
 
 
 def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(

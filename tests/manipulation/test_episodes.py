@@ -86,12 +86,12 @@ def test_the_planner_puts_into_open_drawers(arena):
 
 def test_a_larger_sphere_takes_no_success_from_the_planner(room):
     radii = (0.06, 0.1, 0.2, 0.35, 0.5)
-    found = {
+    successes = {
         radius: [room.play(actor("planner-arm"), episode.index, radius=radius).done
                  for episode in room.of(ManipulationKind.PICKUP)]
         for radius in radii
     }  # fmt: skip
-    rates = [sum(found[radius]) for radius in radii]
+    rates = [sum(successes[radius]) for radius in radii]
     assert rates == sorted(rates)
     assert rates[0] > 0 and rates[-1] == 5
 
@@ -229,7 +229,7 @@ def test_a_hand_takes_the_target_alone_or_all_that_is_in_the_sphere(room):
 
 def test_other_things_in_the_hand_are_no_success(room):
     """The sphere holds something, but not the target."""
-    found = 0
+    n_others = 0
     for episode in room.of(ManipulationKind.PICKUP):
         environment, begun = room.begin(episode.index, Grasp(takes_all=True))
         if environment.starts_inside or not begun.view.arm.pickupable:
@@ -237,8 +237,8 @@ def test_other_things_in_the_hand_are_no_success(room):
         outcome = environment.step(gripper(0.0))
         assert outcome.view.inventory and outcome.ended is None
         assert environment.step(gripper(1.0)).view.inventory == ()  # and it lets go of them again
-        found += 1
-    assert found
+        n_others += 1
+    assert n_others
 
 
 # -- what counts

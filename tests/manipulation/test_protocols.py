@@ -5,7 +5,7 @@ import pytest
 from infthor_eval.runs import execute
 from model_adapters import ArmDelta
 
-from ..plans.cut import MUG, cut, write
+from ..helpers.trajectories import MUG, cut_trajectory, write_trajectories
 from .scripted import ScriptedPolicy
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
@@ -19,7 +19,7 @@ OPEN = ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.9)
 def picking(prepared, monkeypatch, tmp_path):
     """The record of a pick-up of a clock beside the expert, by a policy that holds its hand still
     and open."""
-    data = write(tmp_path / "clock", cut(MUG, 6))
+    data = write_trajectories(tmp_path / "clock", cut_trajectory(MUG, 6))
 
     def picking(model=TWIN, **changes):
         if model == TWIN:
@@ -34,9 +34,9 @@ def picking(prepared, monkeypatch, tmp_path):
 
 
 def test_a_hand_closes_when_it_is_asked_always_or_at_the_end(picking):
-    asked, always, end = (picking(closing=closing) for closing in ("asked", "always", "end"))
-    assert asked.starts_inside  # with a sphere of half a metre
-    assert (asked.ended, len(asked.steps)) == ("step limit", 60)
+    when_asked, always, end = (picking(closing=closing) for closing in ("asked", "always", "end"))
+    assert when_asked.starts_inside  # with a sphere of half a metre
+    assert (when_asked.ended, len(when_asked.steps)) == ("step limit", 60)
     assert (always.ended, len(always.steps)) == ("done", 1)
     assert (end.ended, len(end.steps)) == ("done", 61)
     assert [call["action"] for call in end.steps[-1].calls] == ["PickupObject"]

@@ -15,7 +15,8 @@ from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import execute, prepare, read_run
 from model_adapters import ArmDelta, load
 
-from ..plans.cut import CANDLE, FORK, MUG, cut, write
+from ..helpers.refusals import read_one_line
+from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 from .scripted import ScriptedPolicy
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
@@ -30,19 +31,14 @@ def by_key(outcome):
     }
 
 
-def one_line(caught):
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
 @pytest.fixture
 def policy(monkeypatch):
     """Has runs load a scripted policy."""
 
     def make(gives):
-        made = ScriptedPolicy(gives)
-        monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: made)
-        return made
+        policy = ScriptedPolicy(gives)
+        monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: policy)
+        return policy
 
     return make
 
@@ -51,10 +47,10 @@ def policy(monkeypatch):
 
 
 def test_the_planner_does_what_the_expert_did(prepared, data):
-    write(data / "more", cut(CANDLE))
+    write_trajectories(data / "more", cut_trajectory(CANDLE))
     outcome = execute(prepared())
-    found = by_key(outcome)
-    assert {key: record.payload.instruction for key, record in found.items()} == {
+    records = by_key(outcome)
+    assert {key: record.payload.instruction for key, record in records.items()} == {
         (PICK, MUG, 9): "pick up the mug",
         (PUT, MUG, 21): "put the mug in the desk",
         (PICK, CANDLE, 6): "pick up the candle",
@@ -65,7 +61,7 @@ def test_the_planner_does_what_the_expert_did(prepared, data):
         record.key: sample.number
         for record, sample in zip(outcome.records, outcome.samples, strict=True)
     }
-    assert numbers[found[PUT, MUG, 21].key] == 0
+    assert numbers[records[PUT, MUG, 21].key] == 0
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     (row,) = [row for row in table.rows if not row.is_published]
     assert [cell.partition(" ")[0] for cell in row.cells] == [
@@ -141,7 +137,7 @@ def test_all_that_changes_a_number_is_part_of_a_runs_identity(prepared, task_fil
     ):
         task_file(settings)
         changed.append(prints())
-    assert all(not set(found) & set(plain) for found in changed)
+    assert all(not set(fingerprints) & set(plain) for fingerprints in changed)
 
 
 # -- policies
@@ -181,7 +177,7 @@ def test_a_policy_sees_the_present_frame_once_per_chunk_and_is_told_what_to_do(
     scripted = policy(lambda number: (move, STILL))
     outcome = execute(prepared("openvla-tiny", instruction="please: {object}"))
     assert [len(record.payload.steps) for record in outcome.records] == [4, 4]
-    assert scripted.told == ["please: mug"] * 4
+    assert scripted.instructions == ["please: mug"] * 4
     assert scripted.resets == [0, 2]
     with Image.open(io.BytesIO(scripted.seen[0])) as image:
         assert image.size == (96, 96)
@@ -192,15 +188,15 @@ def test_a_policy_sees_the_present_frame_once_per_chunk_and_is_told_what_to_do(
 
 def test_blank_frames_are_plain_and_change_nothing_else(prepared, task_file, policy, tmp_path):
     task_file("max_steps: 2, image_size: 64")
-    shown = policy(lambda number: (STILL,))
+    on_true_frames = policy(lambda number: (STILL,))
     plain = execute(prepared("openvla-tiny"))
     blank = policy(lambda number: (STILL,))
     outcome = execute(prepared("openvla-tiny", frames="blank", output=tmp_path / "blank"))
-    assert len(set(blank.seen)) == 1 and not set(blank.seen) & set(shown.seen)
+    assert len(set(blank.seen)) == 1 and not set(blank.seen) & set(on_true_frames.seen)
     with Image.open(io.BytesIO(blank.seen[0])) as image:
         pixels = np.asarray(image)
     assert pixels.shape[:2] == (64, 64) and (pixels == 128).all()
-    assert blank.told == shown.told
+    assert blank.instructions == on_true_frames.instructions
     assert [record.payload for record in outcome.records] == [
         record.payload for record in plain.records
     ]
@@ -228,11 +224,11 @@ BAD = {
 @pytest.mark.parametrize("name", BAD)
 def test_what_is_no_movement_is_a_failure_of_the_policy(prepared, task_file, policy, name):
     task_file("max_steps: 3, image_size: 32")
-    chunk, said = BAD[name]
+    chunk, expected = BAD[name]
     policy(lambda number: chunk)
     outcome = execute(prepared("openvla-tiny", tasks=(PICK,)))
     (record,) = outcome.records
-    assert said in record.failure and "\n" not in record.failure
+    assert expected in record.failure and "\n" not in record.failure
     assert (record.payload.ended, record.payload.done, record.excluded) == ("", False, None)
     task = outcome.summary.summary.tasks[PICK]
     assert (task.n_failed, task.success.mean, task.endings) == (1, 0, {"failed": 1})
@@ -242,14 +238,18 @@ def test_what_is_no_movement_is_a_failure_of_the_policy(prepared, task_file, pol
 
 
 def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepared, tmp_path):
-    document = cut(MUG)
+    document = cut_trajectory(MUG)
     document["plan"]["low_actions"][12]["api_action"] = {
         "action": "OpenObject",
         "objectId": "Desk|+9.99|+0.00|+0.00",
     }
     for model in ("planner-arm", "still"):
         outcome = execute(
-            prepared(model, data=write(tmp_path / model, document), output=tmp_path / "out" / model)
+            prepared(
+                model,
+                data=write_trajectories(tmp_path / model, document),
+                output=tmp_path / "out" / model,
+            )
         )
         pick, put = by_key(outcome)[PICK, MUG, 9], by_key(outcome)[PUT, MUG, 21]
         assert pick.excluded is None
@@ -261,10 +261,10 @@ def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepared, tmp_p
 
 
 def test_an_episode_whose_object_is_missing_counts_for_nobody(prepared, tmp_path):
-    document = cut(MUG)
+    document = cut_trajectory(MUG)
     recorded = document["plan"]["low_actions"][9]["api_action"]
     recorded["objectId"] = "Elephant|+00.00|+00.00|+00.00"
-    outcome = execute(prepared("still", data=write(tmp_path / "elephant", document)))
+    outcome = execute(prepared("still", data=write_trajectories(tmp_path / "elephant", document)))
     assert all(
         "Elephant" in record.excluded for record in outcome.records
     )  # what comes after is not known either
@@ -273,7 +273,7 @@ def test_an_episode_whose_object_is_missing_counts_for_nobody(prepared, tmp_path
 
 
 def test_a_scene_that_is_not_here_counts_for_nobody(prepared, data):
-    document = cut(FORK, called="elsewhere")
+    document = cut_trajectory(FORK, called="elsewhere")
     document["scene"]["floor_plan"] = "FloorPlan7"
     (data / "elsewhere.json").write_text(json.dumps(document))
     outcome = execute(prepared("still"))
@@ -302,16 +302,16 @@ BROKEN = {
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
-    damage, said = BROKEN[name]
+    damage, expected = BROKEN[name]
     if isinstance(damage, str):
         (data / "broken.json").write_text(damage)
     else:
-        document = cut(MUG, called="broken")
+        document = cut_trajectory(MUG, called="broken")
         damage(document)
         (data / "broken.json").write_text(json.dumps(document))
     outcome = execute(prepared("still", tasks=(PICK,)))
     ((reason, number),) = outcome.summary.summary.tasks[PICK].skipped.items()
-    assert number == 1 and reason.startswith("broken.json") and said in reason
+    assert number == 1 and reason.startswith("broken.json") and expected in reason
     assert "\n" not in reason and str(data) not in reason
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     assert f"1 left out: {reason}" in table.notes
@@ -319,30 +319,30 @@ def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
 
 
 def test_where_no_trajectory_has_such_an_action_that_is_said(prepared, tmp_path):
-    data = write(tmp_path / "walks", cut(MUG, 1))
+    data = write_trajectories(tmp_path / "walks", cut_trajectory(MUG, 1))
     with pytest.raises(
         UsageError, match="manipulathor_pickup: no trajectory there has a Pick-up"
     ) as caught:
         prepared(data=data)
-    one_line(caught)
+    read_one_line(caught)
     with pytest.raises(UsageError, match="manipulathor_put: no trajectory there has a Put"):
-        prepared(data=write(tmp_path / "picks", cut(MUG, 2)), tasks=(PUT,))
+        prepared(data=write_trajectories(tmp_path / "picks", cut_trajectory(MUG, 2)), tasks=(PUT,))
 
 
 def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
     broken = tmp_path / "broken"
     broken.mkdir()
     (broken / "a.json").write_text("{")
-    for place, error, said in (
+    for place, error, expected in (
         (None, UsageError, "no trajectories of its own; give them as --data"),
         (broken, DataError, "nothing to evaluate"),
     ):
-        with pytest.raises(error, match=said) as caught:
+        with pytest.raises(error, match=expected) as caught:
             prepared(data=place)
-        one_line(caught)
+        read_one_line(caught)
 
 
-@pytest.mark.parametrize(("option", "value", "said"), [
+@pytest.mark.parametrize(("option", "value", "expected"), [
     ("radius", "0.7", "--radius 0.7: is a length of 0.04 to 0.5 metres"),
     ("radius", "wide", "--radius wide: is a length"),
     ("frames", "black", "--frames black: tasks in a simulator have shown, blank"),
@@ -350,12 +350,12 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
     ("scenes", "/nowhere/at/all", "/nowhere/at/all"),
 ])  # fmt: skip
 def test_an_option_that_does_not_fit_ends_the_command_in_one_line(
-    run, data, tmp_path, option, value, said
+    run_cli, data, tmp_path, option, value, expected
 ):
     words = ("run", "--model", "still", "--tasks", PICK, "--data", data, "--output", tmp_path / "o")
-    code, out, err = run(*words, f"--{option}", value)
+    code, out, err = run_cli(*words, f"--{option}", value)
     assert (code, out) == (2, "")
-    assert said in " ".join(err.split()) and "Traceback" not in err
+    assert expected in " ".join(err.split()) and "Traceback" not in err
 
 
 def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
@@ -366,11 +366,12 @@ def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
             f"{settings}}}\n"
         )
     outcome = execute(prepared("planner-arm", tasks=("near", "far")))
-    found = by_key(outcome)
-    assert sorted(found) == [("far", MUG, 9), ("near", MUG, 9)]
-    assert found["far", MUG, 9].payload.done
+    records = by_key(outcome)
+    assert sorted(records) == [("far", MUG, 9), ("near", MUG, 9)]
+    assert records["far", MUG, 9].payload.done
     assert (
-        found["near", MUG, 9].payload.start_distance > found["far", MUG, 9].payload.start_distance
+        records["near", MUG, 9].payload.start_distance
+        > records["far", MUG, 9].payload.start_distance
     )  # a small sphere
     rows = [
         row for row in outcome.run.suite.tables([outcome.summary])[0].rows if not row.is_published

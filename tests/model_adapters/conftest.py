@@ -145,19 +145,19 @@ def answer_plainly() -> Answers:
     def answer(prompts: Mapping[Path, Sequence[Sequence[Turn]]], new: int) -> dict[Path, list[Any]]:
         if not PEERS.is_dir():
             pytest.skip("torchvision is not set aside in test-peers (make test does it)")
-        asked = {
+        prompts_as_json = {
             str(folder): [_as_json(turns) for turns in listed] for folder, listed in prompts.items()
         }
         run = subprocess.run(
             [sys.executable, "-c", PLAINLY],
-            input=json.dumps({"new": new, "prompts": asked}),
+            input=json.dumps({"new": new, "prompts": prompts_as_json}),
             check=True,
             capture_output=True,
             text=True,
             env=os.environ | {"PYTHONPATH": str(PEERS)},
         )
-        found = json.loads(run.stdout.splitlines()[-1])
-        return {folder: found[str(folder)] for folder in prompts}
+        answers = json.loads(run.stdout.splitlines()[-1])
+        return {folder: answers[str(folder)] for folder in prompts}
 
     return answer
 

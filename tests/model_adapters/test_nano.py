@@ -27,11 +27,13 @@ def test_it_is_small_and_has_a_card():
 def test_it_sees(nano):
     """More presence questions of the bundled set are answered rightly than by chance."""
     samples = find_samples({"bundled": "nieh_mini", "context": "clues"})
-    asked = [item for item in samples.samples if item.question.question_type == "object_presence"]
+    presence_samples = [
+        item for item in samples.samples if item.question.question_type == "object_presence"
+    ]
     right = []
-    for sample in asked:
+    for sample in presence_samples:
         talk = nano.conversation()
-        shown, text = samples.request(sample)
-        talk.append(*shown, text)
+        context, text = samples.request(sample)
+        talk.append(*context, text)
         right.append(talk.reply(Decoding(max_new_tokens=10)).text == doc_target(sample.question))
     assert sum(right) / len(right) > 0.6

@@ -21,8 +21,8 @@ class Options:
 
 
 def test_values_take_the_type_of_the_field() -> None:
-    given = {"text": "7", "count": "7", "part": "7", "flag": "No", "limit": "7"}
-    assert parse("m", Options, given) == Options("7", 7, 7.0, False, 7)
+    texts = {"text": "7", "count": "7", "part": "7", "flag": "No", "limit": "7"}
+    assert parse("m", Options, texts) == Options("7", 7, 7.0, False, 7)
 
 
 def test_what_is_left_out_takes_its_default() -> None:
@@ -35,7 +35,7 @@ def test_none_where_the_field_allows_it(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "complaint"),
+    ("texts", "complaint"),
     [
         ({"count": "x"}, "m: option count=x is not int"),
         ({"count": "none"}, "m: option count=none is not int"),
@@ -44,14 +44,14 @@ def test_none_where_the_field_allows_it(text: str) -> None:
         ({"limits": "1"}, r"m has no option limits; did you mean limit\?"),
     ],
 )
-def test_what_does_not_fit_is_named_with_all_options(given: dict[str, str], complaint: str) -> None:
+def test_what_does_not_fit_is_named_with_all_options(texts: dict[str, str], complaint: str) -> None:
     with pytest.raises(UsageError, match=complaint) as caught:
-        parse("m", Options, given)
+        parse("m", Options, texts)
     assert "it takes: text=a, count=3, part=0.5, flag=true, limit=none" in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("options", "shown"), [(NoOptions, "no options"), (Options, "text=a, count=3")]
+    ("options", "beginning"), [(NoOptions, "no options"), (Options, "text=a, count=3")]
 )
-def test_describe(options: Any, shown: str) -> None:
-    assert describe(options).startswith(shown)
+def test_describe(options: Any, beginning: str) -> None:
+    assert describe(options).startswith(beginning)

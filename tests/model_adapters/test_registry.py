@@ -204,7 +204,7 @@ def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path)
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"),
+    ("model_options", "expected"),
     [
         ({}, "qwen2.5-vl"),
         ({"dtype": "float32"}, "qwen2.5-vl"),
@@ -220,8 +220,8 @@ def test_the_source_of_an_adapter_that_is_not_there_is_one_line(installed: Path)
         ({"pretrained": "runs/nano/checkpoint-500"}, "checkpoint-500"),
     ],
 )
-def test_a_run_is_called_by_its_checkpoint(given: dict[str, str], expected: str) -> None:
-    assert label("qwen2.5-vl", given) == expected
+def test_a_run_is_called_by_its_checkpoint(model_options: dict[str, str], expected: str) -> None:
+    assert label("qwen2.5-vl", model_options) == expected
 
 
 @pytest.mark.parametrize("pretrained", [".", "..", "/", "./", "../.."])

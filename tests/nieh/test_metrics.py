@@ -51,9 +51,9 @@ def test_the_files_function_makes_the_scores_and_the_published_scorers_stay_out(
         "Is there a sink?": {"letters": 2 / 20, "plain": 1.0},
     }
     document = json.loads((outcome.folder / "results.json").read_text())
-    found = document["summary"]["tasks"]["nieh_own"]
-    assert found["metrics"] == ["letters", "plain"]
-    scores = found["by_clues"]["total"]["scores"]
+    summary = document["summary"]["tasks"]["nieh_own"]
+    assert summary["metrics"] == ["letters", "plain"]
+    scores = summary["by_clues"]["total"]["scores"]
     assert {name: score["mean"] for name, score in scores.items()} == {
         "letters": pytest.approx(0.27),
         "plain": 0.6,
@@ -105,15 +105,17 @@ BAD_REPLIES = [
 
 
 @pytest.mark.parametrize(
-    ("body", "place", "said"), BAD_REPLIES, ids=[said for _, _, said in BAD_REPLIES]
+    ("body", "place", "expected"), BAD_REPLIES, ids=[expected for _, _, expected in BAD_REPLIES]
 )
-def test_a_function_that_fails_fails_the_sample_by_name_and_place(prepared, own, body, place, said):
+def test_a_function_that_fails_fails_the_sample_by_name_and_place(
+    prepared, own, body, place, expected
+):
     own(f"def measure(doc, results):\n{body}")
     outcome = execute(prepared(tasks=("nieh_own",)))
     assert len(outcome.records) == 5
     for record in outcome.records:
         assert record.failure.startswith(f"process_results fails on {record.id}: {place}")
-        assert record.failure.endswith(f": {said}; traceback in journal/tracebacks.txt")
+        assert record.failure.endswith(f": {expected}; traceback in journal/tracebacks.txt")
         assert "\n" not in record.failure
     assert (outcome.folder / "journal" / "tracebacks.txt").read_text().count(
         "attempt 1\nTraceback (most"
@@ -176,13 +178,13 @@ BAD_FILES = [
 
 
 @pytest.mark.parametrize(
-    ("content", "function", "said"), BAD_FILES, ids=[said for *_, said in BAD_FILES]
+    ("content", "function", "expected"), BAD_FILES, ids=[expected for *_, expected in BAD_FILES]
 )
 def test_a_file_whose_metrics_cannot_be_had_is_refused_in_one_line(
-    prepared, own, content, function, said
+    prepared, own, content, function, expected
 ):
     own(function, content)
-    with pytest.raises(DataError, match=said) as caught:
+    with pytest.raises(DataError, match=expected) as caught:
         prepared(tasks=("nieh_own",))
     assert "nieh_own.yaml" in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -212,6 +214,6 @@ def test_baselines_are_measured_by_the_files_function_too(prepared, own):
         "def measure(doc, results):\n    return {'letters': results[0] == doc['question'], "
         "'plain': True}\n"
     )
-    (found,) = execute(prepared(Oracle.name, tasks=("nieh_own",))).summary.summary.tasks.values()
-    assert found.by_clues["total"].scores["letters"].mean == 0.0
-    assert found.by_clues["total"].scores["plain"].mean == 1.0
+    (summary,) = execute(prepared(Oracle.name, tasks=("nieh_own",))).summary.summary.tasks.values()
+    assert summary.by_clues["total"].scores["letters"].mean == 0.0
+    assert summary.by_clues["total"].scores["plain"].mean == 1.0

@@ -45,7 +45,10 @@ def test_oracle_is_right_everywhere_and_lm_eval_agrees(prepared):
 def test_the_same_command_goes_on_and_another_starts_anew(prepared):
     watchers = Watcher(), Watcher()
     first, again = (execute(prepared(), watcher) for watcher in watchers)
-    assert [(len(watcher.made), len(watcher.found)) for watcher in watchers] == [(10, 0), (0, 10)]
+    assert [(len(watcher.evaluated), len(watcher.resumed)) for watcher in watchers] == [
+        (10, 0),
+        (0, 10),
+    ]
     assert (again.folder, again.summary, again.records) == (
         first.folder,
         first.summary,
@@ -88,9 +91,9 @@ def test_a_changed_frame_of_the_same_size_is_noticed(prepared, data):
     frame.write_bytes(bytes(content))
     watcher = Watcher()
     execute(prepared(tasks=("nieh_gt",)), watcher)
-    made = {record.payload.question for record in watcher.made}
-    assert made == {"Is there a mug?", "Where was the mug before you put it?"}
-    assert {record.attempt for record in watcher.made} == {2}
+    evaluated = {record.payload.question for record in watcher.evaluated}
+    assert evaluated == {"Is there a mug?", "Where was the mug before you put it?"}
+    assert {record.attempt for record in watcher.evaluated} == {2}
 
 
 class Recorder:
@@ -100,7 +103,7 @@ class Recorder:
     capabilities = Capabilities(token_ids=False)
 
     def __init__(self):
-        self.asked = []
+        self.requests = []
 
     def identity(self):
         return {}
@@ -138,7 +141,7 @@ class Talk:
         return [self.reply_to([*self.parts, *parts]) for parts in continuations]
 
     def reply_to(self, parts):
-        self.model.asked.append(parts)
+        self.model.requests.append(parts)
         for part in parts[:-1]:
             part.load()
         return Reply(
@@ -156,9 +159,9 @@ def recorder(monkeypatch):
 
 def test_a_model_is_asked_by_trajectory_and_in_the_published_words(prepared, recorder):
     outcome = execute(prepared(TINY, tasks=("nieh_full",)))
-    names = [[part.path.parts[-3] for part in parts[:-1]] for parts in recorder.asked]
+    names = [[part.path.parts[-3] for part in parts[:-1]] for parts in recorder.requests]
     assert names == [["traj_a"] * 6] * 3 + [["traj_b"] * 6] * 2
-    assert recorder.asked[0][-1] == (
+    assert recorder.requests[0][-1] == (
         "\nAnswer the question given the agent's views in time order. Do not include explanation "
         "or reasoning in the answer. Answer with a single word or words.\nQuestion: Is there a mug?"
     )
@@ -190,8 +193,8 @@ def test_a_failed_unit_is_tried_again_by_the_next_run(prepared, recorder, data):
     watcher = Watcher()
     outcome = execute(prepared(TINY), watcher)
     assert len(failed) == 5
-    assert {record.key for record in watcher.made} == failed
-    assert {record.attempt for record in watcher.made} == {2}
+    assert {record.key for record in watcher.evaluated} == failed
+    assert {record.attempt for record in watcher.evaluated} == {2}
     assert not any(record.failure for record in outcome.records)
 
 
@@ -215,9 +218,9 @@ def test_a_task_without_its_data_or_without_a_question_is_refused(prepared, make
 def test_the_tiny_model_runs_through_and_shares_prefixes(prepared):
     watcher = Watcher()
     execute(prepared(TINY, tasks=("nieh_full",)), watcher)
-    assert all(record.payload.reply is not None for record in watcher.made)
+    assert all(record.payload.reply is not None for record in watcher.evaluated)
     by_trajectory = {}
-    for record in watcher.made:  # in the order of asking
+    for record in watcher.evaluated:  # in the order of asking
         by_trajectory.setdefault(record.cluster, []).append(record.tokens.cached)
     assert {traj_id: len(cached) for traj_id, cached in by_trajectory.items()} == {
         "traj_a": 3,
@@ -286,32 +289,32 @@ def test_a_model_that_counts_no_tokens_is_asked_once_the_size_of_a_frame_is_told
         execute(prepared(TINY, tasks=tasks))
     watcher = Watcher()
     execute(prepared(TINY, tasks=tasks, suite_options={"tokens_per_frame": 2000}), watcher)
-    assert {len(parts) for parts in recorder.asked} == {8192 // 2000 + 1}
+    assert {len(parts) for parts in recorder.requests} == {8192 // 2000 + 1}
     assert watcher.work.costs == []
 
 
 def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(make_nieh_set):
-    asked = [
+    inside = [
         Question("t", f"Is there a mug on {step}?", (step,), ("yes",)) for step in (14, 15, 16, 17)
     ]
     outside = [
         Question("t", f"Is there a cup on {step}?", (step,), ("yes",)) for step in (90, 91, 92)
     ]
-    questions = [outside[0], asked[0], asked[1], outside[1], asked[2], outside[2], asked[3]]
+    questions = [outside[0], inside[0], inside[1], outside[1], inside[2], outside[2], inside[3]]
     root = make_nieh_set(questions, n_frames=30, size=56)
     config = {"context": "haystack", "data": str(root), "ctx_size": 10, "tokens_per_frame": 1000}
 
-    def found(limit):
+    def take(limit):
         samples = find_samples(config, limit)
         return (
             [sample.question.text[-2:-1] for sample in samples.samples],
             [skipped.question.text for skipped in samples.skipped],
         )
 
-    taken = [found(limit) for limit in (1, 2, 3, 4, 9, None)]
-    for limit, (shown, _) in enumerate(taken[:4], 1):
-        assert shown == [digit for digit in sorted(set(shown)) for _ in range(5)]
-        assert len(set(shown)) == limit
+    taken = [take(limit) for limit in (1, 2, 3, 4, 9, None)]
+    for limit, (steps, _) in enumerate(taken[:4], 1):
+        assert steps == [digit for digit in sorted(set(steps)) for _ in range(5)]
+        assert len(set(steps)) == limit
     for (few, few_left_out), (more, more_left_out) in itertools.pairwise(taken):
         assert set(few) <= set(more)
         assert set(few_left_out) <= set(more_left_out)
@@ -332,12 +335,12 @@ def test_the_limit_takes_from_all_trajectories(make_nieh_set):
         for n in range(9)
     ]
     root = make_nieh_set(questions, size=56)
-    asked = [
+    samples = [
         find_samples({"context": "clues", "data": str(root), "seed": seed}, 4).samples
         for seed in (0, 0, 1)
     ]
-    assert {sample.question.traj_id for sample in asked[0]} == {"a", "b", "c"}
-    assert asked[0] == asked[1] != asked[2]
+    assert {sample.question.traj_id for sample in samples[0]} == {"a", "b", "c"}
+    assert samples[0] == samples[1] != samples[2]
 
 
 def test_baselines_answer_the_same_whatever_runs_beside_them(prepared, make_nieh_set, task_files):
@@ -389,19 +392,23 @@ def sampling(task_files):
 def test_a_temperature_in_the_task_file_samples_and_the_seed_decides_what(
     prepared, sampling, tmp_path
 ):
-    def said(settings, seed=0, folder="out"):
+    def reply_with(settings, seed=0, folder="out"):
         sampling(settings)
         return replies(
             execute(prepared(TINY, tasks=("nieh_gt",), seed=seed, output=tmp_path / folder))
         )
 
-    greedy = said("max_gen_toks: 12, do_sample: false, temperature: 0.0")
-    drawn = said("max_gen_toks: 12, do_sample: true, temperature: 2.0")
+    greedy = reply_with("max_gen_toks: 12, do_sample: false, temperature: 0.0")
+    drawn = reply_with("max_gen_toks: 12, do_sample: true, temperature: 2.0")
     assert drawn != greedy
-    assert said("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
-    assert said("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
     assert (
-        said("max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top")
+        reply_with("max_gen_toks: 12, do_sample: true, temperature: 2.0", folder="again") == drawn
+    )
+    assert reply_with("max_gen_toks: 12, temperature: 2.0", folder="without the word") == drawn
+    assert (
+        reply_with(
+            "max_gen_toks: 12, do_sample: true, temperature: 2.0, top_p: 0.000001", folder="top"
+        )
         == greedy
     )
 
@@ -421,7 +428,7 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampli
 
 
 @pytest.mark.parametrize(
-    ("settings", "said"),
+    ("settings", "expected"),
     [
         ("do_sample: false, temperature: 0.7", "temperature 0.7 without do_sample has no effect"),
         ("do_sample: true, temperature: 0.0", "do_sample with temperature 0 contradict each other"),
@@ -437,10 +444,12 @@ def test_another_seed_draws_other_replies_from_the_same_weights(prepared, sampli
     ],
 )
 def test_settings_that_would_not_act_are_refused_before_a_model_is_loaded(
-    prepared, sampling, settings, said
+    prepared, sampling, settings, expected
 ):
     sampling(settings if "max_gen_toks" in settings else f"max_gen_toks: 12, {settings}")
-    with pytest.raises(UsageError, match=rf"nieh_gt\.yaml: generation_kwargs: {said}") as caught:
+    with pytest.raises(
+        UsageError, match=rf"nieh_gt\.yaml: generation_kwargs: {expected}"
+    ) as caught:
         prepared(TINY, tasks=("nieh_gt",))
     assert "\n" not in str(caught.value)
 

@@ -27,7 +27,7 @@ LIMITS = []
 class Thinker(Talk):
     def reply(self, decoding):
         LIMITS.append((decoding.max_new_tokens, decoding.stop))
-        text = next(said for word, said in SAYS.items() if word in self.turns[-1].parts[-1])
+        text = next(answer for word, answer in SAYS.items() if word in self.turns[-1].parts[-1])
         return Reply(text, n_reply_tokens=len(text.split()), n_context_tokens=10)
 
 
@@ -46,9 +46,9 @@ def answers_of(output):
     return {payload["question"]: payload for payload in payloads}
 
 
-def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run):
+def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
-    code, _, err = run(
+    code, _, err = run_cli(
         "--model", "toy", "--tasks", "nieh_gt", "--data", data, "--output", tmp_path / "out"
     )
     assert code == 0, err
@@ -67,11 +67,11 @@ def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run):
     assert (task["n_thought"], task["failures"]) == (3, [])
     n_tokens = sum(len(text.split()) for text in SAYS.values())
     assert task["tokens_per_right"] == n_tokens / 2
-    assert run("show", results.parent)[0] == 0
+    assert run_cli("show", results.parent)[0] == 0
     assert {limit for limit, _ in LIMITS} == {50}
 
 
-def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run):
+def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
     arguments = [
         "--model",
@@ -83,15 +83,15 @@ def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run):
         "--output",
         tmp_path / "out",
     ]
-    assert run(*arguments, "--max-thinking-tokens", 1000)[0] == 0
+    assert run_cli(*arguments, "--max-thinking-tokens", 1000)[0] == 0
     assert {limit for limit, _ in LIMITS} == {1050}
-    assert "0 evaluated now" not in run(*arguments)[2]  # another run
-    code, _, err = run(*arguments, "--max-thinking-tokens", 0)
+    assert "0 evaluated now" not in run_cli(*arguments)[2]  # another run
+    code, _, err = run_cli(*arguments, "--max-thinking-tokens", 0)
     assert code == 2 and "--max-thinking-tokens 0: give 1 or more" in err
 
 
 def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
-    make_nieh_set, tmp_path, run, monkeypatch
+    make_nieh_set, tmp_path, run_cli, monkeypatch
 ):
     monkeypatch.setitem(SAYS, "first", "<think>a\ncup</think>mug\ncup")
     data = make_nieh_set(QUESTIONS[:1], size=56)
@@ -112,7 +112,7 @@ def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
         "--output",
         tmp_path / "out",
     ]
-    code, _, err = run(*arguments, "--max-thinking-tokens", 100)
+    code, _, err = run_cli(*arguments, "--max-thinking-tokens", 100)
     assert code == 0, err
     assert LIMITS == [(120, ())]
     assert answers_of(tmp_path / "out")["What first?"]["reply"] == "mug"

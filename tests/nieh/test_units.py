@@ -22,7 +22,9 @@ def events(monkeypatch):
     answer = BaselineAnswerer.answer
     monkeypatch.setattr(units, "find_guesses", lambda *_: happened.append("learned") or _Guesses())
     monkeypatch.setattr(
-        BaselineAnswerer, "answer", lambda *given: happened.append("asked") or answer(*given)
+        BaselineAnswerer,
+        "answer",
+        lambda *arguments: happened.append("asked") or answer(*arguments),
     )
     return happened
 

@@ -9,7 +9,7 @@ from infthor_eval.runs import PreparedRun
 
 from ..episodes.pool import Pool
 from ..episodes.preparing import preparer
-from .cut import FORK, cut, write
+from ..helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
 
 @pytest.fixture(scope="session")
@@ -28,7 +28,7 @@ def shared_simulator(simulators: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
     """A folder with the first task of a kitchen."""
-    return write(tmp_path / "data", cut(FORK))
+    return write_trajectories(tmp_path / "data", cut_trajectory(FORK))
 
 
 @pytest.fixture

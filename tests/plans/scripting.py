@@ -30,8 +30,8 @@ class Talk(Transcript):
         for part in self.parts:
             if isinstance(part, FrameRef):
                 assert part.digest  # it is there, and known when it no longer is
-        self._model.asked.append((self.parts, decoding))
-        self._model.told = {part for turn in self.turns[:-1] for part in turn.parts}
+        self._model.requests.append((self.parts, decoding))
+        self._model.system_parts = {part for turn in self.turns[:-1] for part in turn.parts}
         return Reply(self._model.say(self.parts, decoding), 1, self.n_tokens, 0)
 
 
@@ -43,8 +43,8 @@ class ScriptedModel:
 
     def __init__(self, say: Callable[[Sequence[Part], object], str]):
         self.say = say
-        self.asked: list[tuple[list[Part], object]] = []
-        self.told: set[Part] = set()
+        self.requests: list[tuple[list[Part], object]] = []
+        self.system_parts: set[Part] = set()
 
     def identity(self):
         return {}

@@ -14,12 +14,12 @@ from infthor_eval.thor.frames import FrameFolder
 from infthor_eval.thor.view import SimulatorView
 from model_adapters import ContractError
 
-from .cut import FORK, cut, write
+from ..helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
 
 @pytest.fixture
 def trajectory(tmp_path):
-    return next(iter_trajectories(write(tmp_path / "data", cut(FORK))))
+    return next(iter_trajectories(write_trajectories(tmp_path / "data", cut_trajectory(FORK))))
 
 
 @pytest.fixture

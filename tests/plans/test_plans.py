@@ -12,13 +12,13 @@ from infthor_eval.formats.trajectory import Trajectory, TrajectorySource, iter_t
 from infthor_eval.household.tasks import Task, TaskType
 from infthor_eval.plans.plan import PlanKind, plans_of, tasks_of
 
-from .cut import whole
+from ..helpers.trajectories import read_trajectory
 
 SHARED = Path(__file__).parents[2] / "../shared/data"
 
 
 def ours(name="kitchen-1-seed7"):
-    return whole(name)
+    return read_trajectory(name)
 
 
 def published(name):

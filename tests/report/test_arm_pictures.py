@@ -24,7 +24,8 @@ from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEA
 from infthor_eval.report.recordings.episode_sheet import COLUMNS, draw_sheet, shown_steps
 from infthor_eval.report.recordings.reach_view import draw_reach
 
-from ..manipulation.made_runs import episode, made_run, planner_run
+from ..helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
+from .pictures import find_colours
 
 GREEN, RED = (26, 127, 55), (193, 39, 45)
 NAMED, HAND = (213, 94, 0), (0, 114, 178)
@@ -51,30 +52,30 @@ END = replace(
 
 def runs():
     records = [
-        episode(name, number, kind)
+        make_episode_record(name, number, kind)
         for name in "ab"
         for number, kind in enumerate(("pickup", "put"))
     ]
     lost = [
-        episode(name, number, kind, done=False)
+        make_episode_record(name, number, kind, done=False)
         for name in "ab"
         for number, kind in enumerate(("pickup", "put"))
     ]
-    return [made_run("m", lost, radius=0.1), made_run("m", records), planner_run(records)]
+    return [
+        make_arm_run("m", lost, radius=0.1),
+        make_arm_run("m", records),
+        make_arm_planner_run(records),
+    ]
 
 
 def texts(svg):
     return re.findall(r"<text[^>]*>([^<]*)</text>", svg.read_text(encoding="utf-8"))
 
 
-def colours(picture):
-    return {colour for _, colour in picture.getcolors(1 << 24)}
-
-
 def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
     curves = arm_curves([replace(run, label=f"run {number}") for number, run in enumerate(runs())])
     _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure6")
-    said = texts(svg)
+    words_drawn = texts(svg)
     for words in (
         "Pick-up and put",
         "Pick-up",
@@ -85,8 +86,8 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
         "embedded simulator: not comparable with the paper's curves",
         "the runs differ in the radius of the hand's sphere: 0.1, 0.5 m",
     ):
-        assert words in said
-    assert said.count("the expert's step (low-level action)") == 3
+        assert words in words_drawn
+    assert words_drawn.count("the expert's step (low-level action)") == 3
     table = curves_table(curves)
     names = [
         "run",
@@ -112,8 +113,8 @@ def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
 
 
 def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
-    found = success_by_radius(runs())
-    one, other = (draw_radii(found, tmp_path, name)[1] for name in ("one", "other"))
+    curves = success_by_radius(runs())
+    one, other = (draw_radii(curves, tmp_path, name)[1] for name in ("one", "other"))
     assert one.read_bytes() == other.read_bytes()
     for words in (
         "Pick-up",
@@ -126,7 +127,7 @@ def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
         assert words in texts(one)
     with Image.open(tmp_path / "one.png") as picture:
         assert min(picture.size) > 300
-    table = radii_table(found)
+    table = radii_table(curves)
     assert [column.name for column in table.columns][2:] == ["0.1 m", "0.5 m", "episodes", "failed"]
     assert [row.cells[:2] for row in table.rows] == [
         ("m", "Pick-up"),
@@ -140,21 +141,21 @@ def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
 
 
 def test_an_episode_has_its_title_its_start_and_its_end_held():
-    found = list(arm_pictures([START, END], "a run"))
-    assert len(found) == TITLE_REPEATS + 1 + END_REPEATS
-    assert {(picture.size, picture.mode) for picture in found} == {(SIZE, "RGB")}
+    pictures = list(arm_pictures([START, END], "a run"))
+    assert len(pictures) == TITLE_REPEATS + 1 + END_REPEATS
+    assert {(picture.size, picture.mode) for picture in pictures} == {(SIZE, "RGB")}
     idle = replace(START, observation=None, ending="left out: no room")
     assert len(list(arm_pictures([idle], "a run"))) == TITLE_REPEATS
-    assert RED in colours(draw_arm_title(idle, ""))
+    assert RED in find_colours(draw_arm_title(idle, ""))
     with pytest.raises(ValueError, match="no observation"):
         draw_arm_frame(idle, "")
 
 
 def test_the_ending_is_green_or_red_and_what_is_told_is_written():
     lost = replace(END, ending="step limit", done=False)
-    assert GREEN in colours(draw_arm_frame(END, ""))
-    assert RED in colours(draw_arm_frame(lost, ""))
-    assert not {GREEN, RED} & colours(draw_arm_frame(START, ""))
+    assert GREEN in find_colours(draw_arm_frame(END, ""))
+    assert RED in find_colours(draw_arm_frame(lost, ""))
+    assert not {GREEN, RED} & find_colours(draw_arm_frame(START, ""))
     plain = draw_arm_frame(END, "").tobytes()
     for change in (
         {"refusals": ("Collided",)},
@@ -168,7 +169,7 @@ def test_the_ending_is_green_or_red_and_what_is_told_is_written():
 def test_the_reach_shows_hand_and_target_and_not_what_lies_beside():
     picture = draw_reach(REACH, 400)
     assert picture.size == (400, 400)
-    assert {NAMED, HAND} <= colours(picture)
+    assert {NAMED, HAND} <= find_colours(picture)
     without = draw_reach(replace(REACH, objects=(TABLE, MUG)), 400)
     rows = slice(200, 370)  # the view from the side, which the sofa would stand in
     assert np.array_equal(np.asarray(picture)[rows], np.asarray(without)[rows])
@@ -176,9 +177,9 @@ def test_the_reach_shows_hand_and_target_and_not_what_lies_beside():
 
 @pytest.mark.parametrize("n_steps", [0, 1, 3, 4, 60])
 def test_a_row_has_its_start_and_its_end(n_steps):
-    shown = shown_steps(n_steps)
-    assert (shown[0], shown[-1]) == (0, n_steps)
-    assert len(shown) == min(COLUMNS, n_steps + 1)
+    steps = shown_steps(n_steps)
+    assert (steps[0], steps[-1]) == (0, n_steps)
+    assert len(steps) == min(COLUMNS, n_steps + 1)
 
 
 def test_a_sheet_has_a_row_for_each_episode():
@@ -188,6 +189,6 @@ def test_a_sheet_has_a_row_for_each_episode():
     three = draw_sheet([[START, END], [START, lost], [idle]], "a run")
     assert three.size[0] == one.size[0]
     assert three.size[1] > 2 * one.size[1]
-    assert GREEN in colours(one)
-    assert RED not in colours(one)
-    assert {GREEN, RED} <= colours(three)
+    assert GREEN in find_colours(one)
+    assert RED not in find_colours(one)
+    assert {GREEN, RED} <= find_colours(three)

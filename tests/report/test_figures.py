@@ -19,15 +19,16 @@ from infthor_eval.report.figures.curves import draw_curves
 from infthor_eval.report.figures.style import looks_of
 from infthor_eval.runs import read_run
 
-from ..plans.cut import CANDLE, cut, write
-from ..plans.made_runs import made_run, plan, planner_run, write_run
+from ..helpers.journals import write_run
+from ..helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
+from ..helpers.trajectories import CANDLE, cut_trajectory, write_trajectories
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "figure7_panels.yaml"
 
 
 def records(reward: float, *, tokens: bool = True):
     return [
-        plan(
+        make_plan_record(
             name,
             index,
             (10 * index, 10 * index + 10),
@@ -41,9 +42,9 @@ def records(reward: float, *, tokens: bool = True):
 
 def runs(**about):
     return [
-        made_run("model $x$ & <y>", records(1.0), **about),
-        made_run("_random", records(0.5, tokens=False), **about),
-        planner_run(records(2.0, tokens=False), **about),
+        make_plans_run("model $x$ & <y>", records(1.0), **about),
+        make_plans_run("_random", records(0.5, tokens=False), **about),
+        make_planner_run(records(2.0, tokens=False), **about),
     ]
 
 
@@ -57,7 +58,7 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
     with Image.open(png) as picture:
         assert min(picture.size) > 300
         assert len(picture.convert("RGB").getcolors(1 << 20)) > 10
-    said = texts(svg)
+    words_drawn = texts(svg)
     for words in (
         "planner",
         "model $x$ &amp; &lt;y&gt;",
@@ -72,12 +73,12 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
         "planner, context of the plan's last request (tokens): its plans are where the first of "
         "the runs has them",
     ):
-        assert words in said
+        assert words in words_drawn
     assert sorted(path.name for path in tmp_path.iterdir()) == ["figure7.png", "figure7.svg"]
 
 
 def test_a_name_in_letters_that_the_font_lacks_is_no_warning(tmp_path, recwarn):
-    curves = plan_curves([made_run("模型", records(1.0))])
+    curves = plan_curves([make_plans_run("模型", records(1.0))])
     _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
     assert "模型" in texts(svg)
     assert not recwarn.list
@@ -92,7 +93,7 @@ def test_the_same_curves_give_the_same_bytes(tmp_path):
 
 
 def test_a_bound_without_tokens_leaves_one_column(tmp_path):
-    curves = plan_curves([made_run("m", records(1.0, tokens=False))])
+    curves = plan_curves([make_plans_run("m", records(1.0, tokens=False))])
     _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
     assert "at most" in texts(svg)
     assert not any("(tokens)" in words for words in texts(svg))
@@ -101,7 +102,7 @@ def test_a_bound_without_tokens_leaves_one_column(tmp_path):
 def test_the_label_names_the_embedded_runs_where_not_all_are():
     assert embedded_label(plan_curves(runs(simulator="unity"))) is None
     mixed = plan_curves(
-        [made_run("m", records(1.0)), made_run("n", records(1.0), simulator="unity")]
+        [make_plans_run("m", records(1.0)), make_plans_run("n", records(1.0), simulator="unity")]
     )
     assert embedded_label(mixed) == "embedded simulator (m): not comparable with the paper's curves"
 
@@ -131,14 +132,14 @@ def test_panels_have_their_runs_and_the_bound(tmp_path):
     file = tmp_path / "panels.yaml"
     file.write_text("First: ['model $x$ & <y>']\nSecond: [_random]\n")
     _, svg = draw_curves(curves, read_panels(file, curves), tmp_path, "figure7")
-    said = texts(svg)
-    assert [said.count(words) for words in ("First", "Second", "planner", "_random")] == [
+    words_drawn = texts(svg)
+    assert [words_drawn.count(words) for words in ("First", "Second", "planner", "_random")] == [
         1,
         1,
         2,
         1,
     ]
-    assert "context tokens are not reported" in said
+    assert "context tokens are not reported" in words_drawn
 
 
 BAD_PANELS = {
@@ -175,7 +176,9 @@ NAMES = sorted({name for names in FIGURE_7.values() for name in names})
 
 
 def test_the_example_has_the_six_panels_of_the_papers_figure():
-    panels = read_panels(EXAMPLE, plan_curves([made_run(name, records(1.0)) for name in NAMES]))
+    panels = read_panels(
+        EXAMPLE, plan_curves([make_plans_run(name, records(1.0)) for name in NAMES])
+    )
     assert {panel.title[:3]: list(panel.labels) for panel in panels} == FIGURE_7
 
 
@@ -195,7 +198,7 @@ def long_records(done: float, *, tokens: bool = True):
     """Two trajectories of plans of thirty steps of 700 tokens, up to half a million; a part of them
     is done."""
     return [
-        plan(
+        make_plan_record(
             name,
             index,
             (30 * index, 30 * index + 30),
@@ -207,27 +210,32 @@ def long_records(done: float, *, tokens: bool = True):
     ]
 
 
-def test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each(tmp_path, run):
-    made = [made_run(name, long_records((number + 1) / 16)) for number, name in enumerate(NAMES)]
-    folders = [
-        write_run(each, tmp_path) for each in (*made, planner_run(long_records(1.0, tokens=False)))
+def test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_each(
+    tmp_path, run_cli
+):
+    runs = [
+        make_plans_run(name, long_records((number + 1) / 16)) for number, name in enumerate(NAMES)
     ]
-    code, said, err = run(
+    folders = [
+        write_run(each, tmp_path)
+        for each in (*runs, make_planner_run(long_records(1.0, tokens=False)))
+    ]
+    code, output, err = run_cli(
         "report", *folders, "--figure", "7", "--panels", EXAMPLE, "--out", tmp_path
     )
     assert (code, err) == (0, "")
-    assert "in no panel" not in said
+    assert "in no panel" not in output
     words = texts(tmp_path / "figure7.svg")
     assert [words.count(word) for word in ("planner", "500K", FT[130])] == [6, 6, 2]
     assert sum(word.startswith(tuple(FIGURE_7)) for word in words) == 6
 
 
-def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run, monkeypatch):
+def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run_cli, monkeypatch):
     """The whole way of docs/figures.md: a checkpoint trained under YaRN, runs with its names, and
     their figure."""
     monkeypatch.chdir(tmp_path)
-    write(tmp_path / "data", cut(CANDLE, 2))
-    asked = ("--tasks", "infthor_plans", "--data", "data", "--rewards", "published")
+    write_trajectories(tmp_path / "data", cut_trajectory(CANDLE, 2))
+    task_options = ("--tasks", "infthor_plans", "--data", "data", "--rewards", "published")
     training = (
         "--model",
         "llava-onevision-tiny",
@@ -248,17 +256,17 @@ def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run, monkey
             *training,
             "max_steps=1",
         ),
-        ("--model", "planner", *asked),
-        *(_asked_as(name, *asked) for name in NAMES),
+        ("--model", "planner", *task_options),
+        *(_options_of_model(name, *task_options) for name in NAMES),
     ):
-        code, _, err = run(*words)
+        code, _, err = run_cli(*words)
         assert code == 0, f"{words}\n{err}"
-    code, said, _ = run(
+    code, output, _ = run_cli(
         "report", *sorted(Path("results").glob("*/*")), "--figure", "7", "--panels", EXAMPLE
     )
     assert code == 0
-    assert "in no panel" not in said
-    assert {line.split()[0] for line in said.splitlines() if line.split()} >= {*NAMES, "planner"}
+    assert "in no panel" not in output
+    assert {line.split()[0] for line in output.splitlines() if line.split()} >= {*NAMES, "planner"}
     words = texts(Path("results/figures/figure7.svg"))
     assert words.count("planner") == 6
     replies = {
@@ -279,7 +287,7 @@ def _replies(folder: Path) -> list[list[str | None]]:
     ]
 
 
-def _asked_as(name: str, *asked: str) -> tuple[str, ...]:
+def _options_of_model(name: str, *task_options: str) -> tuple[str, ...]:
     """The command of docs/figures.md that makes the run of this name, with a tiny model in the
     place of the large."""
     _, trained, extended = re.fullmatch(r"(llava-ft\d+k)(@yarn4)?(?:-(.+))?", name).groups(
@@ -301,7 +309,7 @@ def _asked_as(name: str, *asked: str) -> tuple[str, ...]:
         *rope,
         "--history",
         "published",
-        *asked,
+        *task_options,
         "--name",
         name,
     )

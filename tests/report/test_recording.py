@@ -23,6 +23,8 @@ from infthor_eval.report.recordings.plan_pictures import (
 )
 from infthor_eval.report.recordings.room_map import draw_map
 
+from .pictures import find_colours
+
 FLOOR = tuple((x * 0.25, z * 0.25) for x in range(8) for z in range(8))
 TABLE, MUG = (
     MapObject("SideTable", (2.0, 0.0), (2.6, 1.0)),
@@ -39,27 +41,23 @@ BADGE = (900, 808)  # a place of it that has no letters
 LONG = "wherever it may be found, and then again " * 20
 
 
-def colours(picture):
-    return {colour for _, colour in picture.getcolors(1 << 24)}
-
-
 def words(picture):
     """What stands beneath frame and map, on the left."""
     return np.asarray(picture)[650:, :870]
 
 
 def test_a_plan_has_its_title_its_start_and_its_end_held():
-    found = list(plan_pictures([START, END, START], "a run"))
-    assert len(found) == TITLE_REPEATS + 1 + END_REPEATS + TITLE_REPEATS + 1
-    assert {(picture.size, picture.mode) for picture in found} == {(SIZE, "RGB")}
+    pictures = list(plan_pictures([START, END, START], "a run"))
+    assert len(pictures) == TITLE_REPEATS + 1 + END_REPEATS + TITLE_REPEATS + 1
+    assert {(picture.size, picture.mode) for picture in pictures} == {(SIZE, "RGB")}
     assert all(side % 2 == 0 for side in SIZE)
 
 
 def test_of_a_plan_that_was_never_begun_the_title_alone_is_shown():
     idle = PlanFrame(title=TITLE, observation=None, rewards=START.rewards, ending="not attempted")
     assert len(list(plan_pictures([idle], "a run"))) == TITLE_REPEATS
-    assert RED in colours(draw_plan_title(idle, "a run"))
-    assert RED not in colours(draw_plan_title(START, "a run"))
+    assert RED in find_colours(draw_plan_title(idle, "a run"))
+    assert RED not in find_colours(draw_plan_title(START, "a run"))
     with pytest.raises(ValueError, match="no observation"):
         draw_plan_frame(idle, "a run")
 
@@ -67,7 +65,7 @@ def test_of_a_plan_that_was_never_begun_the_title_alone_is_shown():
 def test_the_ending_is_green_where_the_plan_is_done_and_red_where_it_is_not():
     ends = [END, replace(END, ending="step limit", done=False)]
     assert [draw_plan_frame(moment, "").getpixel(BADGE) for moment in ends] == [GREEN, RED]
-    assert not {GREEN, RED} & colours(draw_plan_frame(START, ""))
+    assert not {GREEN, RED} & find_colours(draw_plan_frame(START, ""))
 
 
 def test_the_same_moments_are_the_same_pictures():
@@ -90,9 +88,9 @@ def test_whatever_a_model_says_there_is_room_for_it():
     wild = f"{LONG}\n\x1b[31m\u202e\x00{'x' * 5000}"
     title = replace(TITLE, text=wild, goal=wild)
     moment = replace(END, title=title, action=wild, reply=wild, wrong=wild, note=wild, ending=wild)
-    shown = np.asarray(draw_plan_frame(moment, wild))
-    assert (shown[-4:] == 255).all()  # nothing runs out at the bottom
-    assert (shown[660:, 858:876] == 255).all()  # nor into the rewards
+    picture = np.asarray(draw_plan_frame(moment, wild))
+    assert (picture[-4:] == 255).all()  # nothing runs out at the bottom
+    assert (picture[660:, 858:876] == 255).all()  # nor into the rewards
     draw_plan_title(moment, wild)
 
 
@@ -124,8 +122,8 @@ def test_goal_and_named_things_stand_out():
     size = 400
     plain = replace(SIGHT, room=RoomMap(FLOOR, (TABLE,)))
     goal, named = (0, 158, 115), (213, 94, 0)
-    assert {goal, named} <= colours(draw_map(SIGHT, size))
-    assert not {goal, named} & colours(draw_map(plain, size))
+    assert {goal, named} <= find_colours(draw_map(SIGHT, size))
+    assert not {goal, named} & find_colours(draw_map(plain, size))
 
 
 def test_a_room_without_a_cell_is_drawn():

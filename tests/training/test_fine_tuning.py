@@ -18,7 +18,8 @@ from infthor_eval.training.recipe import read_recipe
 from model_adapters import Decoding, load
 
 from ..conftest import QUESTIONS
-from ..waiting import wait_until
+from ..helpers.processes import cli_words
+from ..helpers.waiting import wait_until
 
 RECIPE = """
 title: a small one
@@ -52,9 +53,7 @@ def train(recipe, data, out, **changes):
 
 
 def command(recipe, data, out, *more):
-    code = "from infthor_eval.cli import main; main()"
-    words = ["train", "--recipe", recipe, "--data", data, "--out", out, *more]
-    return [sys.executable, "-c", code, *map(str, words)]
+    return cli_words("train", "--recipe", recipe, "--data", data, "--out", out, *more)
 
 
 def weights(folder):
@@ -77,8 +76,8 @@ def test_a_trained_model_answers_as_it_was_trained_to_behind_its_familys_adapter
     samples = find_samples({"data": str(data), "context": "clues"})
     for sample in samples.samples:
         talk = model.conversation()
-        shown, text = samples.request(sample)
-        talk.append(*shown, text)
+        context, text = samples.request(sample)
+        talk.append(*context, text)
         assert talk.reply(Decoding(max_new_tokens=10)).text == doc_target(sample.question)
 
 
@@ -119,12 +118,12 @@ def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, d
     assert same(weights(tmp_path / "killed"), weights(tmp_path / "whole"))
 
 
-def test_a_folder_is_one_runs(recipe, data, tmp_path, run):
+def test_a_folder_is_one_runs(recipe, data, tmp_path, run_cli):
     train(recipe, data, tmp_path / "out", max_steps=1)
     about = json.loads((tmp_path / "out" / "training.json").read_text())
     assert (about["sequences"], about["recipe"]["max_steps"]) == (5, 1)
     words = ["train", "--recipe", recipe, "--data", data, "--out", tmp_path / "out"]
-    code, _, err = run(*words, "--set", "max_steps=2")
+    code, _, err = run_cli(*words, "--set", "max_steps=2")
     assert (code, err.strip().splitlines()[-1]) == (
         2,
         f"infthor-eval: {tmp_path}/out is a run of another recipe; give another folder with --out",

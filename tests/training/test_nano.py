@@ -26,7 +26,7 @@ from infthor_eval.training.nano.stages import train_small_model
 from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from model_adapters import check_adapter, load
 
-from ..bundled import bundled_name
+from ..helpers.bundled import bundled_name
 
 SMALL = NanoRecipe(
     title="small",
@@ -81,11 +81,11 @@ def test_labels_of_frames_are_those_of_the_logs(small_set, blank):
                 for name, there in zip(dataset.types, dataset.present[at], strict=True)
                 if there
             }
-            shown = {
+            labels = {
                 name for name, there in zip(dataset.types, dataset.shown[at], strict=True) if there
             }
             assert present == {_type(key) for key in step.seen}
-            assert shown <= set(step.object_log.visible) | present
+            assert labels <= set(step.object_log.visible) | present
 
 
 def test_frames_are_what_the_familys_own_features_are_made_of(blank):
@@ -178,10 +178,10 @@ def test_recalled_questions_have_their_clues_among_other_frames_and_end_with_the
         text = loaded.tokenizer.decode(
             [piece for piece in sequence.pieces if isinstance(piece, int)]
         )
-        asked = max((known for known in clues if known in text), key=len)
+        question_text = max((known for known in clues if known in text), key=len)
         assert digests[-1] in lasts
-        if asked not in absences:
-            own = next(frames for frames in clues[asked] if frames <= set(digests))
+        if question_text not in absences:
+            own = next(frames for frames in clues[question_text] if frames <= set(digests))
             n_others.add(len(set(digests) - own - lasts))
     assert n_others <= set(range(5))
     assert len(n_others) > 2

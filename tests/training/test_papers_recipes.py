@@ -15,7 +15,7 @@ from safetensors.torch import load_file
 
 from infthor_eval.training.recipe import Parallel, Recipe, read_recipe
 
-from ..waiting import PATIENCE_S, wait_until
+from ..helpers.waiting import PATIENCE_S, wait_until
 
 SCALE = 16
 PROGRAM = Path(sys.executable).with_name("infthor-eval")
@@ -82,8 +82,8 @@ def weights_of(out: Path) -> dict[str, torch.Tensor]:
 def test_it_trains(bundled_set: Path, tmp_path: Path, name: str, n_processes: int) -> None:
     recipe = scaled(name, n_processes)
     training = started(recipe, n_processes, bundled_set, tmp_path / "out")
-    said, _ = training.communicate(timeout=PATIENCE_S)
-    assert training.returncode == 0, said[-2000:]
+    output, _ = training.communicate(timeout=PATIENCE_S)
+    assert training.returncode == 0, output[-2000:]
     about = msgspec.json.decode((tmp_path / "out" / "training.json").read_bytes())
     assert about["recipe"]["max_tokens"] == recipe.max_tokens
     assert about["sequences"] > 0
@@ -109,9 +109,9 @@ def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_o
     killed.communicate()
     assert not (tmp_path / "killed" / "checkpoint").exists()
     again = started(recipe, 2, bundled_set, tmp_path / "killed")
-    said, _ = again.communicate(timeout=PATIENCE_S)
-    assert again.returncode == 0, said[-2000:]
-    assert "step 6 of 6" in said
+    output, _ = again.communicate(timeout=PATIENCE_S)
+    assert again.returncode == 0, output[-2000:]
+    assert "step 6 of 6" in output
     first, second = weights_of(tmp_path / "whole"), weights_of(tmp_path / "killed")
     assert first.keys() == second.keys()
     assert all(first[name].equal(second[name]) for name in first)

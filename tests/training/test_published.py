@@ -78,7 +78,7 @@ def test_weights_are_taken_over_by_the_names_of_the_transformers_of_the_publishe
     assert all(tensor.equal(wanted[name]) for name, tensor in other.model.state_dict().items())
 
 
-def test_a_chat_keeps_the_chat_template(tmp_path, run):
+def test_a_chat_keeps_the_chat_template(tmp_path, run_cli):
     tiny_qwen = load_starting_model("qwen2.5-vl-tiny", {}, "chat", 0)
     folder = saved(tiny_qwen, tmp_path / "dcp", "model.")
     words = (
@@ -91,7 +91,7 @@ def test_a_chat_keeps_the_chat_template(tmp_path, run):
         "--out",
         tmp_path / "out",
     )
-    code, _, err = run(*words)
+    code, _, err = run_cli(*words)
     assert code == 0, err
     loaded = load(
         "qwen2.5-vl", {"pretrained": str(tmp_path / "out"), "dtype": "float32"}, seed=0
@@ -99,7 +99,7 @@ def test_a_chat_keeps_the_chat_template(tmp_path, run):
     assert loaded.template == tiny_qwen.template
 
 
-def test_the_command_writes_what_the_adapter_loads(tmp_path, run):
+def test_the_command_writes_what_the_adapter_loads(tmp_path, run_cli):
     folder = saved(tiny(0), tmp_path / "dcp", "model.")
     words = [
         "import-checkpoint",
@@ -109,8 +109,8 @@ def test_the_command_writes_what_the_adapter_loads(tmp_path, run):
         "--out",
         tmp_path / "out",
     ]
-    code, said, err = run(*words)
-    assert (code, "0 kept, 0 other tensors ignored" in said) == (0, True), err
+    code, output, err = run_cli(*words)
+    assert (code, "0 kept, 0 other tensors ignored" in output) == (0, True), err
     options = {"pretrained": str(tmp_path / "out"), "dtype": "float32", "max_tokens": "0"}
     model = load("llava-onevision", options, seed=0)
     ours, theirs = model.loaded.model.state_dict(), tiny(0).model.state_dict()

@@ -58,7 +58,7 @@ def test_model_options_of_a_recipe_apply_to_its_own_model_alone(name):
 
 
 @pytest.mark.parametrize("name", ["infthor_32k", "questions", "final_text"])
-def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path, run):
+def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path, run_cli):
     data = tmp_path / "set"
     shutil.copytree(bundled_set / "metadata/bedroom-1-seed7", data / "metadata/bedroom-1-seed7")
     questions = [
@@ -66,7 +66,7 @@ def test_train_takes_another_model_than_the_recipes(name, bundled_set, tmp_path,
     ]
     if name == "questions":  # trajectories alone are enough for the others
         write_questions(data / "qa_set_small.csv", questions[:3])
-    code, _, err = run(
+    code, _, err = run_cli(
         *(
             "train",
             "--recipe",

@@ -8,9 +8,11 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_header, read_run
 from infthor_eval.runs.journals.journal import Journal
 
+from ...helpers.files import find_one
+
 
 @pytest.fixture
-def ask(make_nieh_set, tmp_path, run):
+def ask(make_nieh_set, tmp_path, run_cli):
     """Runs `nieh_gt` with the tiny model, for 5 samples."""
     data = make_nieh_set(size=56)
 
@@ -25,14 +27,9 @@ def ask(make_nieh_set, tmp_path, run):
             "--output",
             tmp_path / "out",
         ]
-        return run(*arguments, *options)
+        return run_cli(*arguments, *options)
 
     return ask
-
-
-def only(folder, pattern):
-    (path,) = folder.rglob(pattern)
-    return path
 
 
 def replies(folder):
@@ -43,7 +40,7 @@ def test_a_name_appears_in_the_folder_the_table_and_the_results(ask, tmp_path):
     assert ask(model="oracle")[0] == 0
     code, out, err = ask("--name", "upper bound", model="oracle")
     assert code == 0
-    results = json.loads(only(tmp_path / "out" / "upper bound", "results.json").read_text())
+    results = json.loads(find_one(tmp_path / "out" / "upper bound", "results.json").read_text())
     assert results["name"] == "upper bound"
     assert any(line.split()[:3] == ["upper", "bound", "nieh_gt"] for line in out.splitlines())
     assert f"upper bound: {tmp_path / 'out' / 'upper bound'}" in out.replace("\n", "")
@@ -70,7 +67,7 @@ def test_one_name_for_two_models_is_refused(ask, tmp_path):
 
 def test_fresh_restarts_and_keeps_every_earlier_journal(ask, tmp_path):
     ask()
-    journal = only(tmp_path / "out", "journal")
+    journal = find_one(tmp_path / "out", "journal")
     folder, first = journal.parent, (journal / "worker-0.jsonl").read_bytes()
     for number in (1, 2):
         code, _, err = ask("--fresh")
@@ -94,7 +91,7 @@ def test_fresh_without_an_earlier_run_changes_nothing(ask, tmp_path):
 @pytest.mark.parametrize("option", ["--fresh", "--recover"])
 def test_the_journal_of_an_active_run_is_left_alone(ask, tmp_path, option):
     ask(model="oracle")
-    folder = only(tmp_path / "out", "journal").parent
+    folder = find_one(tmp_path / "out", "journal").parent
     with Journal(folder, read_header(folder), RECORDS):
         code, out, err = ask(option, model="oracle")
     assert (code, out) == (2, "")
@@ -105,7 +102,7 @@ def test_the_journal_of_an_active_run_is_left_alone(ask, tmp_path, option):
 
 def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
     ask()
-    path = only(tmp_path / "out", "worker-0.jsonl")
+    path = find_one(tmp_path / "out", "worker-0.jsonl")
     before, lines = replies(path.parents[1]), path.read_bytes().splitlines(keepends=True)
     assert len(lines) == 6
     lines[2] = lines[2][:40] + b"\x00\n"
@@ -136,7 +133,7 @@ def test_a_bad_line_in_a_journal_is_named_and_recovered_from(ask, tmp_path):
 
 def test_a_journal_without_its_first_line_is_recovered_from(ask, tmp_path):
     ask()
-    path = only(tmp_path / "out", "worker-0.jsonl")
+    path = find_one(tmp_path / "out", "worker-0.jsonl")
     before, lines = replies(path.parents[1]), path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"no header\n" + b"".join(lines[1:]))
     code, out, err = ask()
@@ -152,7 +149,7 @@ def test_a_journal_without_its_first_line_is_recovered_from(ask, tmp_path):
 
 def test_two_journals_in_one_file_are_named_and_recovered_from(ask, tmp_path):
     ask(model="oracle")
-    path = only(tmp_path / "out", "worker-0.jsonl")
+    path = find_one(tmp_path / "out", "worker-0.jsonl")
     content = path.read_bytes()
     path.write_bytes(2 * content)
     code, out, err = ask(model="oracle")

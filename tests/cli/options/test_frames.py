@@ -18,26 +18,26 @@ def tokens(folder, records_in):
     return tokens
 
 
-def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run, records_in):
+def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run_cli, records_in):
     data, out = make_nieh_set(size=56), tmp_path / "out"
     arguments = ["--model", TINY, "--tasks", "nieh_full", "--data", data, "--output", out]
-    code, shown, err = run(*arguments, "--frames", "shown,blank,shuffled,other")
+    code, output, err = run_cli(*arguments, "--frames", "shown,blank,shuffled,other")
     assert code == 0, err
     assert results(out).keys() == {"shown", "blank", "shuffled", "other"}
     assert all(
         len(counts) == 1 for counts in tokens(out, records_in).values()
     )  # blanks cost as much
-    rows = [line.split() for line in shown.splitlines()]
+    rows = [line.split() for line in output.splitlines()]
     assert [TINY + ",", "blank", "frames", "nieh_full"] in [row[:4] for row in rows]
-    assert "Gain over the same model's run on blank frames, in points" in shown
-    _, shown, err = run(*arguments)
+    assert "Gain over the same model's run on blank frames, in points" in output
+    _, output, err = run_cli(*arguments)
     assert (
         "0 evaluated now, 5 resumed" in err
     )  # the run on true frames is the one without the option
-    assert "Gain over" not in shown
+    assert "Gain over" not in output
 
 
-def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run):
+def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run_cli):
     arguments = [
         "--model",
         "oracle",
@@ -48,10 +48,10 @@ def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run):
         "--output",
         tmp_path / "o",
     ]
-    for given, said in (
+    for names, expected in (
         ("none", "--frames none: there are shown, blank"),
         (",", "--frames is empty; give a name"),
     ):
-        code, out, err = run(*arguments, "--frames", given)
+        code, out, err = run_cli(*arguments, "--frames", names)
         assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
-        assert said in err
+        assert expected in err

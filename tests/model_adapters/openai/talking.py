@@ -68,8 +68,8 @@ def chatting(answer: Answer = talkative) -> Iterator[str]:
 def opened(answer: Answer = talkative, **options: object) -> Iterator[Any]:
     """A model behind such a server; nothing is left open."""
     with chatting(answer) as url:
-        given = {name: str(value) for name, value in {"retries": 0, **options}.items()}
-        model: Any = load("openai", {"base_url": url, "model": "m", **given}, 0)
+        settings = {name: str(value) for name, value in {"retries": 0, **options}.items()}
+        model: Any = load("openai", {"base_url": url, "model": "m", **settings}, 0)
         try:
             yield model
         finally:
@@ -88,12 +88,12 @@ def images_in(request: dict[str, Any]) -> list[Image.Image]:
     return [Image.open(BytesIO(base64.b64decode(url.partition(",")[2]))) for url in urls]
 
 
-def kept(asked: list[dict[str, Any]], answer: Callable[..., Any] = talkative) -> Answer:
+def kept(requests: list[dict[str, Any]], answer: Callable[..., Any] = talkative) -> Answer:
     """Answers likewise, and keeps what was asked, with its head under "headers" (names in lower
     case)."""
 
     def keep(request: dict[str, Any], handler: BaseHTTPRequestHandler) -> Any:
-        asked.append(
+        requests.append(
             request | {"headers": {name.lower(): value for name, value in handler.headers.items()}}
         )
         return answer(request, handler)

@@ -390,9 +390,9 @@ def test_without_one_each_wait_is_longer(monkeypatch: pytest.MonkeyPatch) -> Non
     assert max(waited) <= 75
 
 
-@pytest.mark.parametrize("asked", ["100000", "9" * 400])
-def test_a_wait_without_end_is_not_kept(asked: str) -> None:
-    message = _refused(_sends(429, b"come back later", {"Retry-After": asked}), retries=3)
+@pytest.mark.parametrize("retry_after", ["100000", "9" * 400])
+def test_a_wait_without_end_is_not_kept(retry_after: str) -> None:
+    message = _refused(_sends(429, b"come back later", {"Retry-After": retry_after}), retries=3)
     assert "answers 429 Too Many Requests: 'come back later', and asks to wait " in message
     assert "run the same command again then" in message
 

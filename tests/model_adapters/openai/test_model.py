@@ -46,8 +46,8 @@ def test_it_keeps_the_contract_of_choices_where_the_server_holds_replies_to_them
 
 
 def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]) -> None:
-    asked: list[dict[str, Any]] = []
-    with opened(kept(asked)) as model:
+    requests: list[dict[str, Any]] = []
+    with opened(kept(requests)) as model:
         talk = model.conversation()
         talk.append("Be brief.", role="system")
         talk.append("Look:", frames[0], frames[1], "What is it?")
@@ -55,7 +55,7 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
         talk.append("A mug.", role="assistant")
         talk.append("Where?")
         talk.reply(up_to(7, temperature=0.5, top_p=0.9, seed=2**63 + 5, stop=tuple("abcdef")))
-    first, second = asked
+    first, second = requests
     assert {name for name in first if name != "headers"} == {
         "model",
         "messages",
@@ -70,8 +70,8 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
         "image_url",
         "text",
     ]
-    for shown, frame in zip(images_in(first), frames, strict=False):
-        assert (np.asarray(shown) == np.asarray(frame.load())).all()
+    for image, frame in zip(images_in(first), frames, strict=False):
+        assert (np.asarray(image) == np.asarray(frame.load())).all()
     assert second["messages"][:2] == first["messages"]
     assert second["messages"][2:] == [
         {"role": "assistant", "content": "A mug."},
@@ -88,7 +88,7 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
 
 
 def test_what_a_server_does_not_take_is_not_sent() -> None:
-    asked: list[dict[str, Any]] = []
+    requests: list[dict[str, Any]] = []
     without = {
         "send_seed": False,
         "send_stop": False,
@@ -96,12 +96,12 @@ def test_what_a_server_does_not_take_is_not_sent() -> None:
         "send_repetition_penalty": False,
     }
     with opened(
-        kept(asked, says("x")), max_tokens_field="max_completion_tokens", **without
+        kept(requests, says("x")), max_tokens_field="max_completion_tokens", **without
     ) as model:
         _ask(
             model, "What?", decoding=up_to(5, temperature=0.5, stop=("b",), repetition_penalty=1.0)
         )
-    assert {name for name in asked[0] if name != "headers"} == {
+    assert {name for name in requests[0] if name != "headers"} == {
         "model",
         "messages",
         "max_completion_tokens",
@@ -109,34 +109,34 @@ def test_what_a_server_does_not_take_is_not_sent() -> None:
 
 
 def test_a_penalty_is_sent_where_one_is_asked_for() -> None:
-    asked: list[dict[str, Any]] = []
-    with opened(kept(asked, says("x"))) as model:
+    requests: list[dict[str, Any]] = []
+    with opened(kept(requests, says("x"))) as model:
         _ask(model, "What?", decoding=up_to(5, repetition_penalty=1.0))
         _ask(model, "What?", decoding=up_to(5))
-    assert [request.get("repetition_penalty") for request in asked] == [1.0, None]
+    assert [request.get("repetition_penalty") for request in requests] == [1.0, None]
 
 
 @pytest.mark.parametrize(("sent", "expected"), [(True, [False, None]), (False, [None, None])])
 def test_special_tokens_are_asked_for_where_one_may_stop_a_reply(
     sent: bool, expected: list[bool | None]
 ) -> None:
-    asked: list[dict[str, Any]] = []
-    with opened(kept(asked, says("x")), send_skip_special_tokens=sent) as model:
+    requests: list[dict[str, Any]] = []
+    with opened(kept(requests, says("x")), send_skip_special_tokens=sent) as model:
         for stop in (("<|act|>",), ()):
             _ask(model, "What?", decoding=up_to(5, stop=stop))
         assert model.identity().get("send_skip_special_tokens") == (None if sent else False)
-    assert [request.get("skip_special_tokens") for request in asked] == expected
+    assert [request.get("skip_special_tokens") for request in requests] == expected
 
 
 def test_the_key_goes_into_the_head_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OTHER_KEY", f" {KEY}\n")
-    asked: list[dict[str, Any]] = []
-    with opened(kept(asked), api_key_env="OTHER_KEY") as model:
+    requests: list[dict[str, Any]] = []
+    with opened(kept(requests), api_key_env="OTHER_KEY") as model:
         _ask(model, "What?")
-        shown = [repr(model), str(vars(model)), str(model.identity()), repr(model._secret)]
-    assert asked[0]["headers"].pop("authorization") == f"Bearer {KEY}"
-    assert KEY not in repr(asked)
-    assert KEY not in "".join(shown)
+        descriptions = [repr(model), str(vars(model)), str(model.identity()), repr(model._secret)]
+    assert requests[0]["headers"].pop("authorization") == f"Bearer {KEY}"
+    assert KEY not in repr(requests)
+    assert KEY not in "".join(descriptions)
 
 
 @pytest.mark.parametrize("value", ["", "  ", "two words", "schlüssel-schlüssel"])
@@ -215,17 +215,17 @@ def waits(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
 
 
 def test_what_is_in_flight_ends_when_the_model_is_closed() -> None:
-    asked, done = threading.Event(), threading.Event()
+    request_came, done = threading.Event(), threading.Event()
 
     def answer(_request: Any, _handler: Any) -> None:
-        asked.set()
+        request_came.set()
         done.wait(20)
 
     try:
         with ThreadPoolExecutor(1) as pool:
             with opened(answer) as model:
                 waiting = pool.submit(_ask, model, "What?")
-                assert asked.wait(10)
+                assert request_came.wait(10)
             with pytest.raises(ModelError, match="is no longer waited for: the model is closed"):
                 waiting.result(10)
             with pytest.raises(ModelError, match="gets no more requests: the model is closed"):

@@ -11,16 +11,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from infthor_eval.formats.frames import FrameRef
 from model_adapters import Policy
 
-__all__ = ["Answer", "asked_image", "policy_answers", "send", "serving"]
+__all__ = ["Answer", "asked_image", "no_proxy", "policy_answers", "send", "serving"]
 
 # Gets the request and its handler; gives what is sent as JSON, or None where it has answered by
 # itself.
 Answer = Callable[[dict[str, Any], BaseHTTPRequestHandler], Any]
+
+
+@pytest.fixture(autouse=True)
+def no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No proxy on the way to the servers that tests start."""
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
 
 
 @contextmanager

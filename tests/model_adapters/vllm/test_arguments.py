@@ -241,7 +241,7 @@ def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("settings", "message"),
     [
         ({"dtype": "int8"}, "dtype=int8 is not auto, bfloat16"),
         ({"gpu_memory_utilization": "0"}, "gpu_memory_utilization=0.0 is not above 0"),
@@ -260,15 +260,15 @@ def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
         ({"device": "cpu"}, "has no option device"),
     ],
 )
-def test_options_that_cannot_be_are_refused_at_once(given: dict[str, str], message: str) -> None:
+def test_options_that_cannot_be_are_refused_at_once(settings: dict[str, str], message: str) -> None:
     with pytest.raises(UsageError, match=message):
-        check_options("qwen2.5-vl@vllm", given)
+        check_options("qwen2.5-vl@vllm", settings)
 
 
-@pytest.mark.parametrize("given", [{"ensemble": "loud"}, {"dtype": "int8"}, {"execute": "0"}])
-def test_a_policys_options_are_refused_likewise(given: dict[str, str]) -> None:
-    with pytest.raises(UsageError, match=next(iter(given))):
-        check_options("openvla@vllm", given)
+@pytest.mark.parametrize("settings", [{"ensemble": "loud"}, {"dtype": "int8"}, {"execute": "0"}])
+def test_a_policys_options_are_refused_likewise(settings: dict[str, str]) -> None:
+    with pytest.raises(UsageError, match=next(iter(settings))):
+        check_options("openvla@vllm", settings)
 
 
 @pytest.mark.parametrize("name", ["qwen2.5-vl", "llava-onevision", "pixtral", "openvla"])

@@ -90,19 +90,21 @@ def rows_of(log):
         return [json.loads(line) for line in lines]
 
 
-def asked(text):
+def make_asked_question(text):
     return Question("t", text, (0,), ("yes",))
 
 
 @pytest.mark.parametrize("case", GOLDEN["published-logs"], ids=lambda case: case["question"])
 def test_the_logs_prompt_is_the_published_text(case):
-    assert question_text(VIEWS, asked(case["question"]), PUBLISHED_LOGS) == case["text"]
+    assert (
+        question_text(VIEWS, make_asked_question(case["question"]), PUBLISHED_LOGS) == case["text"]
+    )
 
 
 @pytest.mark.parametrize("case", GOLDEN["published-main"], ids=lambda case: case["mode"])
 def test_the_prompt_of_main_is_the_published_text(case):
     context = CONTEXTS[{"full_traj": "trajectory"}.get(case["mode"], case["mode"])]
-    assert question_text(context.intro, asked(case["question"])) == case["text"]
+    assert question_text(context.intro, make_asked_question(case["question"])) == case["text"]
 
 
 @needs_logs
@@ -114,7 +116,10 @@ def test_the_logs_prompt_has_the_logged_number_of_tokens_in_every_row():
         n_rows += 1
         n_text = row["ctx_n_tokens"] - 123 * row["n_imgs"]
         for prompt in n:
-            n[prompt] += n_tokens(question_text(VIEWS, asked(row["question"]), prompt)) == n_text
+            n[prompt] += (
+                n_tokens(question_text(VIEWS, make_asked_question(row["question"]), prompt))
+                == n_text
+            )
     # All fourteen logs, by hand: 6,133 of 6,133 rows on images; 2,606 of 2,606 on videos are main's
     # prompt of films.
     assert (n_rows, n) == (3909, {PUBLISHED_LOGS: 3909, PUBLISHED_MAIN: 0})
@@ -125,10 +130,12 @@ def test_the_tokens_of_the_prompts_own_words_are_those_of_the_vocabulary():
     question = "Where is Statue now?"  # a token for each word and for the mark
     n_question = len(question.split()) + 1
     of_frames = {
-        name: n_tokens(question_text(VIEWS, asked(question), name)) for name in module._OF_FRAMES
+        name: n_tokens(question_text(VIEWS, make_asked_question(question), name))
+        for name in module._OF_FRAMES
     }
     of_films = {
-        name: n_tokens(question_text(FILM, asked(question), name)) for name in module._OF_FILMS
+        name: n_tokens(question_text(FILM, make_asked_question(question), name))
+        for name in module._OF_FILMS
     }
     assert {name: n - n_question for name, n in of_frames.items()} == module._OF_FRAMES
     assert {name: n - n_question for name, n in of_films.items()} == module._OF_FILMS
@@ -145,7 +152,7 @@ def reply(n_context_tokens, n_frames=10, mode="full_traj"):
     return LoggedReply(
         1,
         "yes",
-        published=asked("Where is Statue now?"),
+        published=make_asked_question("Where is Statue now?"),
         mode=mode,
         n_frames=n_frames,
         n_context_tokens=n_context_tokens,

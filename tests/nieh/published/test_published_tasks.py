@@ -108,16 +108,16 @@ def test_whole_trajectories_run_where_they_fit_and_are_refused_where_they_do_not
 # -- the option
 
 
-def asked(prepared, **options):
+def first_prompt(prepared, **options):
     """The prompt of the first request as samples tell it, and the run."""
     outcome = execute(prepared(**options))
     return next(iter(outcome.samples)).prompt.rpartition("<image>")[2], outcome
 
 
 def test_the_option_sets_the_words_and_the_runs_identity(prepared, data):
-    default, without = asked(prepared)
-    same, named = asked(prepared, suite_options={"prompt": "published-main"})
-    other, logs = asked(prepared, suite_options={"prompt": "published-logs"})
+    default, without = first_prompt(prepared)
+    same, named = first_prompt(prepared, suite_options={"prompt": "published-main"})
+    other, logs = first_prompt(prepared, suite_options={"prompt": "published-logs"})
     assert default == same == question_text(CONTEXTS["clues"].intro, QUESTIONS[0])
     assert other == question_text("", QUESTIONS[0], "published-logs")
     assert named.folder == without.folder != logs.folder
@@ -142,7 +142,7 @@ def test_lm_evals_docs_keep_the_words(make_nieh_set):
 
 
 @pytest.mark.parametrize(
-    ("tasks", "prompt", "said"),
+    ("tasks", "prompt", "expected"),
     [
         (
             ("nieh_published_full",),
@@ -156,6 +156,6 @@ def test_lm_evals_docs_keep_the_words(make_nieh_set):
         ),
     ],
 )
-def test_a_prompt_without_effect_is_refused(prepared, tasks, prompt, said):
-    with pytest.raises(UsageError, match=said):
+def test_a_prompt_without_effect_is_refused(prepared, tasks, prompt, expected):
+    with pytest.raises(UsageError, match=expected):
         prepared(tasks=tasks, suite_options={"prompt": prompt})

@@ -12,7 +12,7 @@ from infthor_eval.nieh.results.summary import summarise
 from infthor_eval.nieh.results.tables import overview, tables
 from infthor_eval.runs import RunHeader, RunSummary, Tokens
 
-from ..made import identity, record
+from ...helpers.nieh_runs import make_config, make_record
 
 
 def recall(n_frames, build_s=2.0, recall_s=0.5):
@@ -26,14 +26,14 @@ def run_of(
     budget="1k",
     scores=(1, 0, 1, 0),
 ):
-    config = identity(context="memory")
+    config = make_config(context="memory")
     config["tasks"]["nieh_gt"]["sources"] = {
         "memory": {"name": memory, "options": {}, "privileged": privileged}
     }
     if budget is not None:
         config["budget"] = budget
     records = [
-        record(
+        make_record(
             number,
             "mug" if score else "no",
             recall=recall(number, build_s=2.0 if number % 4 else 4.0),
@@ -51,7 +51,7 @@ def test_a_run_is_summed_up_with_its_memory_and_what_that_took():
         name="last", privileged=False, budget=1000, n_frames=1.5, n_tokens=150.0
     )
     assert summary.took == {"nieh_gt": MemoryTimes(build_s=2.5, recall_s=0.5)}
-    without = summarise(identity(), [record(1, "mug")])
+    without = summarise(make_config(), [make_record(1, "mug")])
     assert without.took == {}
     assert without.tasks["nieh_gt"].memory is None
 
@@ -80,8 +80,8 @@ def test_the_table_has_what_was_right_recalled_and_spent():
 def test_it_is_among_all_tables_only_where_there_is_a_memory():
     for of_runs in (overview, tables):
         assert "Memories" in [table.title for table in of_runs([run_of()])]
-        header = RunHeader(suite="nieh", name="x", config=identity())
-        plain = RunSummary(header, summarise(identity(), [record(1, "mug")]))
+        header = RunHeader(suite="nieh", name="x", config=make_config())
+        plain = RunSummary(header, summarise(make_config(), [make_record(1, "mug")]))
         assert "Memories" not in [table.title for table in of_runs([plain])]
 
 

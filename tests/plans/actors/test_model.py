@@ -17,17 +17,14 @@ from infthor_eval.plans.plan import plans_of, tasks_of
 from infthor_eval.runs import execute
 from model_adapters.backend import BackendConversation
 
-from ..cut import CANDLE, FORK, cut, write
+from ...helpers.prompts import join_parts
+from ...helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 from ..scripting import ScriptedModel, done_so_far, goal_asked, plan_asked
 
 pytestmark = pytest.mark.usefixtures("shared_simulator")
 
 QWEN, LLAVA = "qwen2.5-vl-tiny", "llava-onevision-tiny"
 FIRST = "<|goal|>Your main goal: put a fork in the drawer<|goal|>"
-
-
-def text(parts):
-    return "".join(part if isinstance(part, str) else "<image>" for part in parts)
 
 
 def frames(parts):
@@ -84,36 +81,39 @@ def brief(task_files):
 
 def test_the_experts_own_words_carry_every_plan_out(acting, tmp_path):
     """Ten cabinets and drawers, two candles: the words mean the plan's own."""
-    folder = write(tmp_path / "two", cut(FORK, 6), cut(CANDLE, 4))
+    folder = write_trajectories(
+        tmp_path / "two", cut_trajectory(FORK, 6), cut_trajectory(CANDLE, 4)
+    )
     outcome, model = acting(as_expert(folder), data=folder)
     assert set(endings(outcome)) == {"done"}
     assert all(record.payload.reward == record.payload.max_reward for record in outcome.records)
-    assert len(model.asked) == sum(len(record.payload.steps) for record in outcome.records)
+    assert len(model.requests) == sum(len(record.payload.steps) for record in outcome.records)
 
 
 def test_a_model_reads_the_sequence_that_it_was_trained_on(acting, data):
     outcome, model = acting(as_expert(data))
     (trajectory,) = iter_trajectories(data)
     plans = plans_of(trajectory, Words.PUBLISHED)
-    beginnings = [parts for parts, _ in model.asked if not done_so_far(parts)]
+    beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
     whole = FIRST + "<image>"
     for plan, parts in zip(plans, beginnings, strict=True):
-        assert text(parts) == f"{whole}<|plan|>Plan: {plan.text}<|plan|><|act|>"
+        assert join_parts(parts) == f"{whole}<|plan|>Plan: {plan.text}<|plan|><|act|>"
         whole += f"<|plan|>Plan: {plan.text}<|plan|>"
         whole += "".join(
             f"<|act|>{action}<|act|><image>"
             for action in expert_texts(trajectory, plan, Words.PUBLISHED)
         )
-    for (before, _), (after, _) in pairwise(model.asked):
+    for (before, _), (after, _) in pairwise(model.requests):
         if done_so_far(after):  # within a plan it grows by the action and what is seen then
             action = done_so_far(after)[-1]
-            assert text(after) == f"{text(before)}{action}<|act|><image><|act|>"
+            assert join_parts(after) == f"{join_parts(before)}{action}<|act|><image><|act|>"
             assert frames(after)[:-1] == frames(before)
-    assert {(asked.max_new_tokens, asked.temperature, asked.stop) for _, asked in model.asked} == {
-        (10, 1.0, ("<|act|>",))
-    }
-    assert len({asked.seed for _, asked in model.asked}) == len(
-        model.asked
+    assert {
+        (decoding.max_new_tokens, decoding.temperature, decoding.stop)
+        for _, decoding in model.requests
+    } == {(10, 1.0, ("<|act|>",))}
+    assert len({decoding.seed for _, decoding in model.requests}) == len(
+        model.requests
     )  # each action has draws of its own
     tokens = [record.tokens for record in outcome.records]
     assert [(count.reply, count.cached) for count in tokens] == [
@@ -129,11 +129,12 @@ def test_the_history_is_the_true_one_whatever_the_model_did(acting, data, tmp_pa
     )
 
     def beginnings(model):
-        return [parts for parts, _ in model.asked if not done_so_far(parts)]
+        return [parts for parts, _ in model.requests if not done_so_far(parts)]
 
     def seen(model):
         return [
-            [text(parts), *(frame.digest for frame in frames(parts))] for parts in beginnings(model)
+            [join_parts(parts), *(frame.digest for frame in frames(parts))]
+            for parts in beginnings(model)
         ]
 
     assert len(seen(right)) == 4
@@ -154,17 +155,17 @@ FAULTS = [
 
 
 def test_replies_that_are_no_action_here_are_counted_by_their_fault(acting, tmp_path):
-    data = write(tmp_path / "one", cut(FORK, 1))
+    data = write_trajectories(tmp_path / "one", cut_trajectory(FORK, 1))
     for number, (reply, ended, message) in enumerate(FAULTS):
         outcome, model = acting(
-            lambda *_, said=reply: said, data=data, output=tmp_path / str(number)
+            lambda *_, text=reply: text, data=data, output=tmp_path / str(number)
         )
         (record,) = outcome.records
         assert outcome.summary.summary.tasks["infthor_plans"].endings == {ended: 1}
         (step,) = record.payload.steps
         assert (step.reply, step.action, step.call, step.reward) == (reply, "", None, 0)
         assert step.message.endswith(message)
-        assert len(model.asked) == 1
+        assert len(model.requests) == 1
         assert [sample.reply for sample in outcome.samples] == [reply]
 
 
@@ -174,8 +175,8 @@ def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_hist
     _, model = acting(
         lambda parts, _: " RotateRight \n" if len(done_so_far(parts)) < 2 else "", limit=1
     )
-    first = [parts for parts, _ in model.asked[:3]]
-    assert text(first[2]).endswith(
+    first = [parts for parts, _ in model.requests[:3]]
+    assert join_parts(first[2]).endswith(
         "<|act|>RotateRight<|act|><image><|act|>RotateRight<|act|><image><|act|>"
     )
 
@@ -198,7 +199,7 @@ def test_a_model_that_fails_fails_its_plan_alone(acting):
 
 def test_replies_are_held_to_what_is_possible_where_that_is_asked(acting, brief):
     outcome, model = acting(lambda parts, decoding: decoding.choices[-1], constrained=True)
-    for _, decoding in model.asked:
+    for _, decoding in model.requests:
         assert {"MoveAhead", "RotateLeft", "NoOp"} <= set(decoding.choices)
         assert decoding.max_new_tokens >= 64
     assert not {"no action", "unknown object", "not in view", "not possible"} & set(
@@ -226,7 +227,7 @@ def test_plans_and_actions_are_in_the_words_that_are_asked_for(acting, data, wor
         lambda parts, _: known[plan_asked(parts)][len(done_so_far(parts))], words=words
     )
     assert set(endings(outcome)) == {"done"}
-    assert {plan_asked(parts) for parts, _ in model.asked} == set(known)
+    assert {plan_asked(parts) for parts, _ in model.requests} == set(known)
     assert [record.payload.plan for record in outcome.records] == list(known)
 
 
@@ -237,32 +238,35 @@ def test_a_preamble_is_told_before_everything_else(acting, task_files, data):
     )
     _, model = acting(lambda *_: "")
     assert all(
-        text(parts).startswith(f"You are a robot. {FIRST}<image>") for parts, _ in model.asked
+        join_parts(parts).startswith(f"You are a robot. {FIRST}<image>")
+        for parts, _ in model.requests
     )
 
 
 def test_grey_frames_take_the_places_of_all(acting, data):
-    _, shown = acting(as_expert(data))
+    _, plain = acting(as_expert(data))
     _, blank = acting(as_expert(data), frames="blank")
-    assert [text(parts) for parts, _ in blank.asked] == [text(parts) for parts, _ in shown.asked]
-    assert len({frame.digest for parts, _ in blank.asked for frame in frames(parts)}) == 1
-    assert frames(blank.asked[0][0])[0].load().size == (300, 300)
+    assert [join_parts(parts) for parts, _ in blank.requests] == [
+        join_parts(parts) for parts, _ in plain.requests
+    ]
+    assert len({frame.digest for parts, _ in blank.requests for frame in frames(parts)}) == 1
+    assert frames(blank.requests[0][0])[0].load().size == (300, 300)
 
 
 # -- what a model is given of the past
 
 
 def test_the_last_plans_that_fit_are_whole_and_begin_with_their_goal(acting, tmp_path):
-    data = write(tmp_path / "six", cut(FORK, 6))
+    data = write_trajectories(tmp_path / "six", cut_trajectory(FORK, 6))
     _, full = acting(lambda *_: "", data=data)
-    wholes = [text(parts) for parts, _ in full.asked]
+    wholes = [join_parts(parts) for parts, _ in full.requests]
     second = "<|goal|>Your main goal: put two slices of tomato on the dining table<|goal|>"
     for limit in (25, 60, 10_000):
         _, model = acting(
             lambda *_: "", data=data, history=f"last:{limit}", output=tmp_path / str(limit)
         )
-        for number, (parts, _) in enumerate(model.asked):
-            window, whole = text(parts), wholes[number]
+        for number, (parts, _) in enumerate(model.requests):
+            window, whole = join_parts(parts), wholes[number]
             assert count(parts) <= limit
             assert window.endswith("<|plan|><|act|>")
             goal = FIRST if window.startswith(FIRST) else second
@@ -277,7 +281,7 @@ def test_the_last_plans_that_fit_are_whole_and_begin_with_their_goal(acting, tmp
                     segments[-n_shown - 1 :]
                 )
                 assert len(more.replace("<image>", " image ").split()) > limit
-    assert [text(parts) for parts, _ in model.asked] == wholes
+    assert [join_parts(parts) for parts, _ in model.requests] == wholes
 
 
 def count(parts):
@@ -300,33 +304,33 @@ def test_tokens_that_nobody_counts_cannot_be_limited(acting, monkeypatch):
 
 
 def test_the_state_in_words_takes_the_place_of_the_history(acting, tmp_path):
-    data = write(tmp_path / "six", cut(FORK, 6))
+    data = write_trajectories(tmp_path / "six", cut_trajectory(FORK, 6))
     _, model = acting(as_expert(data), data=data, history="text")
-    beginnings = [parts for parts, _ in model.asked if not done_so_far(parts)]
+    beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
     assert [len(frames(parts)) for parts in beginnings] == [1] * 6
-    assert text(beginnings[0]).startswith(f"{FIRST} State: ")
+    assert join_parts(beginnings[0]).startswith(f"{FIRST} State: ")
     for parts, plan in zip(beginnings, ("go to the cabinet", "pick up the Fork"), strict=False):
-        assert text(parts).endswith(
+        assert join_parts(parts).endswith(
             f"; Last agent's view: <image><|plan|>Plan: {plan}<|plan|><|act|>"
         )
-    assert "fork" in text(beginnings[3]).partition("State: ")[2].lower()  # it is in the hand
-    assert text(beginnings[4]).startswith("<|goal|>Your main goal: put two slices of tomato")
+    assert "fork" in join_parts(beginnings[3]).partition("State: ")[2].lower()  # it is in the hand
+    assert join_parts(beginnings[4]).startswith("<|goal|>Your main goal: put two slices of tomato")
     assert beginnings[1][1].digest != beginnings[0][1].digest
 
 
 def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(acting, data, make_clip):
     _, full = acting(as_expert(data))
-    histories = [frames(parts) for parts, _ in full.asked if not done_so_far(parts)]
+    histories = [frames(parts) for parts, _ in full.requests if not done_so_far(parts)]
     _, model = acting(as_expert(data), history="frames:3", retriever=str(make_clip()))
-    beginnings = [parts for parts, _ in model.asked if not done_so_far(parts)]
+    beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
     for parts, history in zip(beginnings, histories, strict=True):
         earlier, now = [frame.digest for frame in history[:-1]], history[-1].digest
-        *shown, present = [frame.digest for frame in frames(parts)]
+        *digests, present = [frame.digest for frame in frames(parts)]
         assert present == now
-        assert len(shown) == min(3, len(earlier))
+        assert len(digests) == min(3, len(earlier))
         rest = iter(earlier)
-        assert all(frame in rest for frame in shown)
-        assert text(parts).startswith("<image>" * len(shown) + FIRST + "<image><|plan|>")
+        assert all(frame in rest for frame in digests)
+        assert join_parts(parts).startswith("<image>" * len(digests) + FIRST + "<image><|plan|>")
 
 
 HISTORIES = {
@@ -378,9 +382,9 @@ def watched(monkeypatch):
     seen, reply = [], BackendConversation.reply
 
     def kept(talk, decoding):
-        found = reply(talk, decoding)
-        seen.append((list(talk.turns[-1].parts), found))
-        return found
+        answer = reply(talk, decoding)
+        seen.append((list(talk.turns[-1].parts), answer))
+        return answer
 
     monkeypatch.setattr(BackendConversation, "reply", kept)
     return seen
@@ -389,7 +393,7 @@ def watched(monkeypatch):
 @pytest.fixture
 def short(tmp_path):
     """Two plans of a few actions."""
-    return write(tmp_path / "short", cut(CANDLE, 2))
+    return write_trajectories(tmp_path / "short", cut_trajectory(CANDLE, 2))
 
 
 @pytest.mark.parametrize(
@@ -409,7 +413,7 @@ def test_sharing_what_was_encoded_changes_no_reply(prepared, tmp_path, short, br
 
 
 def test_a_seed_draws_the_same_replies_and_another_others(prepared, tmp_path):
-    data = write(tmp_path / "one", cut(FORK, 3))
+    data = write_trajectories(tmp_path / "one", cut_trajectory(FORK, 3))
 
     def drawn(seed, folder):
         return says(execute(prepared(QWEN, data=data, seed=seed, output=tmp_path / folder)))
@@ -445,7 +449,7 @@ def test_what_was_seen_is_encoded_once(prepared, short, monkeypatch, watched, br
 
 
 def test_histories_of_a_tiny_model(prepared, tmp_path, watched, make_clip):
-    data = write(tmp_path / "few", cut(CANDLE, 5))
+    data = write_trajectories(tmp_path / "few", cut_trajectory(CANDLE, 5))
     options = {"retriever": str(make_clip())}
     for history, more in (("full", {}), ("last:700", {}), ("text", {}), ("frames:2", options)):
         watched.clear()
@@ -482,12 +486,12 @@ def test_a_memory_stands_in_for_the_history(acting, data):
     _, full = acting(as_expert(data))
     _, model = acting(as_expert(data), history="memory", memory="last", memory_args="k=2")
     histories, beginnings = (
-        [parts for parts, _ in asked if not done_so_far(parts)]
-        for asked in (full.asked, model.asked)
+        [parts for parts, _ in model_requests if not done_so_far(parts)]
+        for model_requests in (full.requests, model.requests)
     )
-    for history, given in zip(histories, beginnings, strict=True):
+    for history, beginning in zip(histories, beginnings, strict=True):
         seen = [frame.digest for frame in frames(history)]
-        shown = [frame.digest for frame in frames(given)]
-        assert shown[-1] == seen[-1]
-        assert len(shown) <= 3
-        assert set(shown) <= set(seen)
+        digests = [frame.digest for frame in frames(beginning)]
+        assert digests[-1] == seen[-1]
+        assert len(digests) <= 3
+        assert set(digests) <= set(seen)

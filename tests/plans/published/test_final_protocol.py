@@ -12,7 +12,8 @@ from infthor_eval.plans.actors.habits import expert_texts
 from infthor_eval.plans.plan import plans_of
 from infthor_eval.runs import execute
 
-from ..cut import FORK, cut, write
+from ...helpers.prompts import join_parts
+from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 from ..scripting import ScriptedModel
 
 pytestmark = pytest.mark.usefixtures("shared_simulator")
@@ -21,14 +22,10 @@ QWEN = "qwen2.5-vl-tiny"
 FIRST = "<|goal|>Your main goal: put a fork in the drawer<|goal|><image>"
 
 
-def text(parts):
-    return "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
-
-
 @pytest.fixture
 def final(tmp_path):
     """A kitchen whose final task has two plans, after a task of four."""
-    return write(tmp_path / "final", cut(FORK, 6, final=True))
+    return write_trajectories(tmp_path / "final", cut_trajectory(FORK, 6, final=True))
 
 
 @pytest.fixture
@@ -45,8 +42,8 @@ def experts(final):
 def acting(prepared, monkeypatch, final):
     """Runs a model that says these texts one after the other; gives the payloads and the model."""
 
-    def acting(said, **changes):
-        rest = iter(said)
+    def acting(replies, **changes):
+        rest = iter(replies)
         model = ScriptedModel(lambda *_: next(rest))
         monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
         settings = {
@@ -66,25 +63,27 @@ def test_the_interleaved_form_ends_after_its_first_plan(acting, experts):
     assert (first.ended, second.ended) == ("done", "not attempted")
     (task,) = outcome.summary.summary.tasks.values()
     assert (task.n_plans, task.n_tried, task.success["total"].mean) == (2, 1, 0.5)
-    parts, decoding = model.asked[0]
-    shown = text(parts)
-    assert shown.startswith(f"{FIRST}<|act|><|act|>")
-    assert "<|plan|>" not in shown
-    assert shown.count("<|goal|>Your main goal: ") == 2
-    assert shown.endswith("<|goal|><image><|act|>")
+    parts, decoding = model.requests[0]
+    prompt = join_parts(parts)
+    assert prompt.startswith(f"{FIRST}<|act|><|act|>")
+    assert "<|plan|>" not in prompt
+    assert prompt.count("<|goal|>Your main goal: ") == 2
+    assert prompt.endswith("<|goal|><image><|act|>")
     frames = [part for part in parts if isinstance(part, FrameRef)]
     assert frames[0].digest == frames[-1].digest  # the scene's first frame stands behind each goal
     assert (decoding.max_new_tokens, decoding.temperature, decoding.stop) == (32, 0.0, ("<|act|>",))
     assert decoding.repetition_penalty is None
-    assert [told.startswith("You are an embodied AI agent") for told in model.told] == [True]
-    grown = text(model.asked[1][0])
-    assert grown == f"{shown}{experts[4][0]}<|act|><image><|act|>"
+    assert [
+        system_text.startswith("You are an embodied AI agent") for system_text in model.system_parts
+    ] == [True]
+    grown = join_parts(model.requests[1][0])
+    assert grown == f"{prompt}{experts[4][0]}<|act|><image><|act|>"
 
 
 def test_a_failed_first_plan_ends_it_too(acting):
     (first, second), model, _ = acting(["fly"])
     assert (first.ended, second.ended) == ("no action", "not attempted")
-    assert len(model.asked) == 1
+    assert len(model.requests) == 1
 
 
 def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(acting):
@@ -93,7 +92,7 @@ def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(acting):
     )
     assert (first.ended, second.ended) == ("no action", "step limit")
     assert len(second.steps) == 201
-    prompts = [text(parts) for parts, _ in model.asked]
+    prompts = [join_parts(parts) for parts, _ in model.requests]
     assert (
         len({prompt.partition("Current state: ")[0] for prompt in prompts}) == 1
     )  # the memory is not renewed
@@ -101,11 +100,11 @@ def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(acting):
         assert prompt.startswith("Your task is: put two slices of tomato")
         assert ".\nState: You are in the middle of a room. Your hands are free." in prompt
         assert prompt.endswith(";\nCurrent state: <image> Next action: ")
-    assert model.asked[0][1].stop == ()
-    shown = [parts[-2].digest for parts, _ in model.asked]
-    assert shown[0] != shown[1]  # it has turned left,
-    assert shown[1] == shown[2]  # and the next plan begins there
-    assert any("Available actions: RotateLeft" in told for told in model.told)
+    assert model.requests[0][1].stop == ()
+    digests = [parts[-2].digest for parts, _ in model.requests]
+    assert digests[0] != digests[1]  # it has turned left,
+    assert digests[1] == digests[2]  # and the next plan begins there
+    assert any("Available actions: RotateLeft" in system_text for system_text in model.system_parts)
 
 
 def test_the_state_in_the_file_is_taken_where_there_is_one(acting, final):
@@ -114,14 +113,16 @@ def test_the_state_in_the_file_is_taken_where_there_is_one(acting, final):
     first = document["sub_trajs"][-1]["low_pddl_idx"][0]
     path.write_text(json.dumps(document | {"state_summary": {str(first): "All is well"}}))
     _, model, _ = acting(["fly", "fly"], history="text")
-    assert "State: You are in the middle of a room. All is well;\n" in text(model.asked[0][0])
+    assert "State: You are in the middle of a room. All is well;\n" in join_parts(
+        model.requests[0][0]
+    )
 
 
 def test_frames_are_remembered_by_clip(acting, make_clip):
     _, model, _ = acting(["fly", "fly"], history="frames:3", retriever=str(make_clip()))
-    shown = text(model.asked[0][0])
-    assert shown.startswith("Your task is: ")
-    assert shown.endswith(
+    prompt = join_parts(model.requests[0][0])
+    assert prompt.startswith("Your task is: ")
+    assert prompt.endswith(
         ".\nPrevious states: <image><image><image>Current state: <image> Next action: "
     )
 
@@ -134,8 +135,8 @@ def test_frames_that_the_file_names_are_remembered_in_the_published_size(acting,
     retrieved = {str(first): {"top20": ["000000000.png", "000000002.png", "000000005.png"]}}
     path.write_text(json.dumps(document | {"images": images, "retrieved_image": retrieved}))
     _, model, _ = acting(["fly", "fly"], history="retrieved:20")
-    parts = model.asked[0][0]
-    assert text(parts).endswith(
+    parts = model.requests[0][0]
+    assert join_parts(parts).endswith(
         ".\nPrevious states: <image><image><image>Current state: <image> Next action: "
     )
     assert [part.path.stem for part in parts if isinstance(part, FrameRef)][:3] == [
@@ -143,7 +144,9 @@ def test_frames_that_the_file_names_are_remembered_in_the_published_size(acting,
         "000000002-336",
         "000000005-336",
     ]
-    assert [told.count("previous states (history)") for told in model.told] == [1]
+    assert [
+        system_text.count("previous states (history)") for system_text in model.system_parts
+    ] == [1]
 
 
 def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(acting, final):
@@ -152,7 +155,7 @@ def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(acting
         json.dumps(json.loads(path.read_text()) | {"retrieved_image": {"0": {"top20": []}}})
     )
     _, model, outcome = acting([], history="retrieved:20")
-    assert model.asked == []
+    assert model.requests == []
     for record in outcome.records:
         assert record.failure.startswith(f'trajectory {FORK}: retrieved_image["')
         assert record.failure.endswith(
@@ -166,7 +169,7 @@ def test_files_that_name_no_frames_are_refused_before_the_work(acting):
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "expected"),
     [
         (
             {"history": "last:100"},
@@ -179,10 +182,10 @@ def test_files_that_name_no_frames_are_refused_before_the_work(acting):
         ),
     ],
 )
-def test_what_the_scripts_have_not_is_refused(acting, changes, said):
+def test_what_the_scripts_have_not_is_refused(acting, changes, expected):
     with pytest.raises(UsageError) as caught:
         acting([], **changes)
-    assert str(caught.value) == said
+    assert str(caught.value) == expected
 
 
 def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepared, final, experts, monkeypatch):
@@ -220,8 +223,8 @@ def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(acting
     )  # later than anybody may know
     path.write_text(json.dumps(json.loads(path.read_text()) | {"object_log": entries}))
 
-    said = [text for texts in experts[4:] for text in texts]
-    plans, model, outcome = acting(said, protocol="default", rewards="default")
+    replies = [text for texts in experts[4:] for text in texts]
+    plans, model, outcome = acting(replies, protocol="default", rewards="default")
     assert plans[0].ended == "done" and {plan.conditions[1] for plan in plans} == {
         4
     }  # two slices, both there
@@ -230,7 +233,7 @@ def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(acting
         False,
         [],
     )  # tokens up to each frame: a word is one, a frame is one
-    for part in model.asked[0][0]:
+    for part in model.requests[0][0]:
         n_tokens += 1 if isinstance(part, FrameRef) else len(part.split())
         if isinstance(part, FrameRef) and (not up_to or not after_goal):
             up_to.append(n_tokens)

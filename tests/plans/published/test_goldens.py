@@ -53,8 +53,8 @@ def lines(name: str, folder: Path = GOLDENS) -> Iterator[dict[str, Any]]:
 
 
 def thing(record: dict[str, Any]) -> ThorObject:
-    given = {"name": "", "position": Vector(), "objectType": record["objectId"].split("|")[0]}
-    return msgspec.convert(given | record, ThorObject)
+    required = {"name": "", "position": Vector(), "objectType": record["objectId"].split("|")[0]}
+    return msgspec.convert(required | record, ThorObject)
 
 
 def test_every_text_is_the_published_one():
@@ -202,8 +202,8 @@ class _Loop:
             self.line["agent"][str(plan.high)], 1
         ):
             frames = [int(str(part.path)) for part in parts if isinstance(part, FrameRef)]
-            shown = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
-            self.prompts.append([plan.high, shown, frames])
+            prompt = "".join("<image>" if isinstance(part, FrameRef) else part for part in parts)
+            self.prompts.append([plan.high, prompt, frames])
             try:
                 call = published_call(text, self.objects, self.held)
             except LookupError:
@@ -268,7 +268,7 @@ def by_hand(document: dict[str, Any]) -> list[tuple[str, list[int]]]:
     def name(object_id: str) -> str:
         return object_id[: object_id.index("|")]
 
-    def said(high: dict[str, Any]) -> str:
+    def plan_in_words(high: dict[str, Any]) -> str:
         kind, planner = high["discrete_action"]["action"], high["planner_action"]
         if kind == "GotoLocation":
             return f"go to the {high['discrete_action']['args'][0]}"
@@ -296,7 +296,8 @@ def by_hand(document: dict[str, Any]) -> list[tuple[str, list[int]]]:
         text += f"<|goal|>Your main goal: {task['task_desc']}<|goal|><image>"
         frames.append(0)
         for place in range(*part["high_pddl_idx"]):
-            text += f"<|plan|>Plan: {said(document['plan']['high_pddl'][place])}<|plan|><|act|>"
+            plan = plan_in_words(document["plan"]["high_pddl"][place])
+            text += f"<|plan|>Plan: {plan}<|plan|><|act|>"
             before.append((text, list(frames)))
             for low in document["plan"]["low_actions"]:
                 if low["high_idx"] == place:
@@ -329,5 +330,5 @@ def test_the_history_of_a_published_trajectory_is_the_published_one():
         assert [int(str(part.path)) for part in parts if isinstance(part, FrameRef)] == numbers
         done = zip(expert_texts(trajectory, plan, Words.PUBLISHED), range(*plan.low), strict=True)
         segments.append(
-            replace(segment, steps=tuple((said, frame(number + 1)) for said, number in done))
+            replace(segment, steps=tuple((action, frame(number + 1)) for action, number in done))
         )

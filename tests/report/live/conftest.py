@@ -10,14 +10,14 @@ from infthor_eval.report.live.state import LiveRun
 from infthor_eval.runs import RunHeader
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.suites import find_presenter, find_suite
-from tests.nieh.made import identity
+from tests.helpers.nieh_runs import make_config
 
 N_UNITS = 8
 
 
 def header_of(name: str = "m") -> RunHeader:
     """The header of a run of as many questions."""
-    config = identity(model=name, checkpoint=None, n_parameters=None, simulator="embedded")
+    config = make_config(model=name, checkpoint=None, n_parameters=None, simulator="embedded")
     config["tasks"]["nieh_gt"]["n_samples"] = N_UNITS
     return RunHeader(suite="nieh", name=name, config=config, n_units=N_UNITS)
 

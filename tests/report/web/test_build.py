@@ -23,9 +23,9 @@ def page(make_page, nieh_runs):
 
 def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
     questions = {question.id: question for question in open_set(str(DATA)).questions}
-    asked = [sample for sample in page.samples if sample.task == "nieh_mini_gt"]
-    assert {sample.id for sample in asked} == set(questions)
-    assert len(page.samples) > len(asked)  # the haystack's too, at each depth
+    samples = [sample for sample in page.samples if sample.task == "nieh_mini_gt"]
+    assert {sample.id for sample in samples} == set(questions)
+    assert len(page.samples) > len(samples)  # the haystack's too, at each depth
     for sample in page.samples:
         question = questions[sample.id]
         assert (sample.title, len(sample.results)) == (question.text, len(nieh_runs))
@@ -42,8 +42,10 @@ def test_every_sample_of_every_run_is_there_with_its_frames(page, nieh_runs):
 
 
 def test_absences_show_five_frames_evenly_spaced_and_none_is_a_clue(page):
-    asked = {question.id for question in open_set(str(DATA)).questions if question.absence}
-    absences = [sample for sample in page.samples if sample.id in asked]
+    absence_questions = {
+        question.id for question in open_set(str(DATA)).questions if question.absence
+    }
+    absences = [sample for sample in page.samples if sample.id in absence_questions]
     assert absences
     for sample in absences:
         places = [frame.index for frame in sample.timeline.frames]
@@ -83,7 +85,7 @@ def test_the_sections_have_their_pictures_and_tables(page):
     assert primary_metrics["oracle", "nieh_mini_gt"] == "100.0"
 
 
-def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run):
+def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run_cli):
     words = (
         "--model",
         "oracle",
@@ -94,7 +96,7 @@ def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path
         "--frames",
         "shown,blank",
     )
-    assert run(*words, "--output", tmp_path)[0] == 0
+    assert run_cli(*words, "--output", tmp_path)[0] == 0
     page = make_page(*sorted((tmp_path / "oracle").iterdir()))
     (questions,) = (section for section in page.sections if section.key == "nieh")
     (chart,) = (chart for chart in questions.charts if chart.title == "Gain over blank frames")
@@ -140,9 +142,9 @@ def test_a_run_that_was_stopped_and_has_failures_says_so(make_page, nieh_runs, t
     (copy / "results.json").write_text(json.dumps(results | {"n_missing": 3}))
     page = make_page(copy)
     (table,) = next(section.tables for section in page.sections if section.key == "left-out")
-    told = {row.cells[2]: row.cells[3:] for row in table.rows}
-    assert told["failed"] == ("1", "the frame is gone")
-    assert told["not attempted"][0] == "3"
+    facts = {row.cells[2]: row.cells[3:] for row in table.rows}
+    assert facts["failed"] == ("1", "the frame is gone")
+    assert facts["not attempted"][0] == "3"
     assert sum(sample.results[0].outcome == "failed" for sample in page.samples) == 1
 
 

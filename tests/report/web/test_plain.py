@@ -10,7 +10,7 @@ from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.runs import NOTHING, RunHeader, UnitRecord
 
-from ...runs.toy import Sum, ToySuite
+from ...helpers.toy_suite import Sum, ToySuite
 
 
 def record(a, b, answer, **more):
@@ -88,8 +88,8 @@ def test_a_metric_beyond_a_share_is_shown_as_it_is(scores, is_share):
 
 def test_the_browser_shows_the_fields(page, open_page):
     opened = open_page(page)
-    shown = opened.tab.locator("#sample .details").all_inner_texts()
-    assert [text.split() for text in shown] == [
+    details = opened.tab.locator("#sample .details").all_inner_texts()
+    assert [text.split() for text in details] == [
         ["all", "runs", "numbers", "[1,", "3]"],
         ["right", "answer", "4"],
         ["wrong", "answer", "9"],

@@ -27,14 +27,14 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(client, "_FIRST_WAIT_S", 0.001)
 
 
-def _act(url: str, frame: FrameRef, **given: str) -> Any:
-    policy: Any = load("vla-http", {"url": url, "timeout_s": "600", **given}, 0)
+def _act(url: str, frame: FrameRef, **settings: str) -> Any:
+    policy: Any = load("vla-http", {"url": url, "timeout_s": "600", **settings}, 0)
     return policy.act(frame, "pick up the mug")
 
 
-def _refused(answer: Answer, frame: FrameRef, **given: str) -> str:
+def _refused(answer: Answer, frame: FrameRef, **settings: str) -> str:
     with serving(answer) as url, pytest.raises(ModelError) as caught:
-        _act(url, frame, **given)
+        _act(url, frame, **settings)
     assert f"{url}/act" in str(caught.value)
     assert "\n" not in str(caught.value)
     return str(caught.value)
@@ -45,10 +45,10 @@ def _refused(answer: Answer, frame: FrameRef, **given: str) -> str:
 def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
     image: str, ending: str, plain_frames: Frames
 ) -> None:
-    asked: list[dict[str, Any]] = []
+    requests: list[dict[str, Any]] = []
 
     def answer(request: dict[str, Any], _handler: Any) -> Any:
-        asked.append(request)
+        requests.append(request)
         return ACTION
 
     with serving(answer) as url:
@@ -58,7 +58,7 @@ def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
         (-0.1, -0.2, -0.3),
         1.0,
     )
-    (request,) = asked
+    (request,) = requests
     assert request.keys() == {"image", "instruction", "unnorm_key"}
     assert (request["instruction"], request["unnorm_key"]) == ("pick up the mug", "bridge_orig")
     seen = asked_image(request)
@@ -66,10 +66,10 @@ def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
 
 
 def test_without_a_key_none_is_sent(plain_frames: Frames) -> None:
-    asked = []
-    with serving(lambda request, _: asked.append(request) or ACTION) as url:
+    requests = []
+    with serving(lambda request, _: requests.append(request) or ACTION) as url:
         _act(url, plain_frames[0])
-    assert "unnorm_key" not in asked[0]
+    assert "unnorm_key" not in requests[0]
 
 
 def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
@@ -214,7 +214,7 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) 
 
 
 @pytest.mark.parametrize(
-    ("given", "message"),
+    ("settings", "message"),
     [
         ({"url": "localhost:8000"}, "url is not the address of a server"),
         ({"url": "file:///etc/passwd"}, "url is not the address of a server"),
@@ -228,9 +228,9 @@ def test_a_frame_that_is_not_there_is_a_fault_of_the_data(plain_frames: Frames) 
         ({"execute": "0"}, "execute=0"),
     ],
 )
-def test_misuse_is_refused_and_no_secret_told(given: dict[str, str], message: str) -> None:
+def test_misuse_is_refused_and_no_secret_told(settings: dict[str, str], message: str) -> None:
     with pytest.raises(UsageError, match=message) as caught:
-        load("vla-http", given, 0)
+        load("vla-http", settings, 0)
     assert "secret" not in str(caught.value)
 
 

@@ -20,7 +20,7 @@ LAMP = "bedroom-120-seed0"  # its lamp is on before it is gone to, in sub-goal 8
 _KEPT = Path(__file__).parent / "trajectories.jsonl.gz"
 
 
-def whole(name: str) -> Trajectory:
+def read_trajectory(name: str) -> Trajectory:
     """A trajectory that is not cut."""
     return next(item for item in iter_trajectories(_KEPT) if item.traj_id == name)
 
@@ -32,7 +32,7 @@ def _documents() -> dict[str, str]:
         return {json.loads(line)["traj_id"]: line for line in lines}
 
 
-def cut(
+def cut_trajectory(
     name: str, n_plans: int = 4, *, final: bool = False, called: str | None = None
 ) -> dict[str, Any]:
     """The document of a trajectory of the first sub-goals of another.
@@ -62,8 +62,8 @@ def cut(
     return document | {"traj_id": called or name}
 
 
-def write(folder: Path, *documents: dict[str, Any]) -> Path:
-    """Trajectory files of a new folder."""
+def write_trajectories(folder: Path, *documents: dict[str, Any]) -> Path:
+    """Write trajectory files into a new folder, and return it."""
     folder.mkdir(parents=True)
     for document in documents:
         (folder / f"{document['traj_id']}.json").write_text(json.dumps(document))

@@ -1,20 +1,18 @@
 """Journals of arms made by hand: no simulator, no policy."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from infthor_eval.manipulation.kinds import ManipulationKind
 from infthor_eval.manipulation.recorded.runs import ArmRun
-from infthor_eval.manipulation.records import RECORDS, ArmRecord
+from infthor_eval.manipulation.records import ArmRecord
 from infthor_eval.runs import RunHeader, UnitRecord
-from infthor_eval.runs.journals.journal import Journal
 
 TASKS = {"pickup": "arm_pickup", "put": "arm_put"}
 REWARD = 2.0
 
 
-def episode(
+def make_episode_record(
     trajectory: str,
     index: int,
     kind: str = ManipulationKind.PICKUP,
@@ -50,7 +48,7 @@ def episode(
     )
 
 
-def made_run(
+def make_arm_run(
     label: str,
     records: Sequence[UnitRecord[ArmRecord]],
     *,
@@ -80,18 +78,9 @@ def made_run(
     return ArmRun(label, RunHeader(suite="manipulation", name=label, config=identity), records)
 
 
-def planner_run(
+def make_arm_planner_run(
     records: Sequence[UnitRecord[ArmRecord]], label: str = "planner-arm", **about: Any
 ) -> ArmRun:
-    return made_run(
+    return make_arm_run(
         label, records, model={"name": "planner-arm", "baseline": "planner-arm"}, **about
     )
-
-
-def write_run(run: ArmRun, output: Path, name: str = "arm-0123") -> Path:
-    """Write its journal as the driver does; returns the run's folder."""
-    folder = output / run.label / name
-    with Journal(folder, run.header, RECORDS) as journal:
-        for record in run.records:
-            journal.append(record)
-    return folder

@@ -15,11 +15,11 @@ def two_nodes() -> Iterator[tuple[Any, Any]]:
 
     ray.shutdown()  # whatever a test before this one was connected to
     node = {"num_cpus": 1, "object_store_memory": 100 * 2**20}
-    made = Cluster(initialize_head=True, head_node_args=node)
+    cluster = Cluster(initialize_head=True, head_node_args=node)
     try:
-        second = made.add_node(**node)
-        ray.init(address=made.address, log_to_driver=False, logging_level="error")
-        yield made, second
+        second = cluster.add_node(**node)
+        ray.init(address=cluster.address, log_to_driver=False, logging_level="error")
+        yield cluster, second
     finally:
         ray.shutdown()
-        made.shutdown()
+        cluster.shutdown()

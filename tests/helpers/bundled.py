@@ -6,5 +6,5 @@ BUNDLED = packaged_folder("sets/nieh_mini")
 
 
 def bundled_name(scene: str) -> str:
-    (found,) = (BUNDLED / "metadata").glob(f"{scene}-seed*")
-    return found.name
+    (folder,) = (BUNDLED / "metadata").glob(f"{scene}-seed*")
+    return folder.name

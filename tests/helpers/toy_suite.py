@@ -69,7 +69,7 @@ class Prepared:
         return self.create()
 
 
-def suite_of(create):
+def make_suite(create):
     """A toy suite with another bound evaluation."""
     return type("OtherToySuite", (ToySuite,), {"prepare": lambda self, request: Prepared(create)})()
 

@@ -1,20 +1,18 @@
 """Journals of plans made by hand: no simulator, no model."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from infthor_eval.episodes.records import DONE
 from infthor_eval.plans.recorded.runs import PlansRun
-from infthor_eval.plans.records import RECORDS, PlanRecord, StepRecord
+from infthor_eval.plans.records import PlanRecord, StepRecord
 from infthor_eval.runs import RunHeader, Tokens, UnitRecord
-from infthor_eval.runs.journals.journal import Journal
 
 TASK = "infthor_plans"
 RULES = {"name": "default"}
 
 
-def identity(
+def make_plans_config(
     trajectories: Sequence[str],
     model: Mapping[str, Any] | None = None,
     simulator: str = "embedded",
@@ -40,7 +38,7 @@ def identity(
     }
 
 
-def plan(
+def make_plan_record(
     trajectory: str,
     index: int,
     steps: tuple[int, int],
@@ -83,22 +81,13 @@ def plan(
     )
 
 
-def made_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
+def make_plans_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
     names = list(dict.fromkeys(record.cluster for record in records))
-    header = RunHeader(suite="plans", name=label, config=identity(names, **about))
+    header = RunHeader(suite="plans", name=label, config=make_plans_config(names, **about))
     return PlansRun(label, header, records)
 
 
-def planner_run(
+def make_planner_run(
     records: Sequence[UnitRecord[PlanRecord]], label: str = "planner", **about: Any
 ) -> PlansRun:
-    return made_run(label, records, model={"name": "planner", "baseline": "planner"}, **about)
-
-
-def write_run(run: PlansRun, output: Path, name: str = "infthor_plans-0123") -> Path:
-    """Write its journal as the driver does; returns the run's folder."""
-    folder = output / run.label / name
-    with Journal(folder, run.header, RECORDS) as journal:
-        for record in run.records:
-            journal.append(record)
-    return folder
+    return make_plans_run(label, records, model={"name": "planner", "baseline": "planner"}, **about)

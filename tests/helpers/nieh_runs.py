@@ -11,7 +11,7 @@ from infthor_eval.runs import RunHeader, RunSummary, Tokens, UnitRecord
 _PAYLOAD = ("question", "question_type", "file", "guess", "shown_clues", "recall")
 
 
-def record(
+def make_record(
     number: int,
     reply: str | None,
     answers: tuple[str, ...] = ("mug",),
@@ -22,13 +22,18 @@ def record(
     """The record of question `q<number>`, scored as a run scores it; one of four trajectories."""
     about = {"question": "?", "question_type": "put_action"}
     about |= {name: changes.pop(name) for name in _PAYLOAD if name in changes}
-    found = {} if reply is None else scores(reply, answers)
-    found = changes.pop("scores", found)
+    own_scores = {} if reply is None else scores(reply, answers)
+    given_scores = changes.pop("scores", own_scores)
     column = Question(
         "t", "?", tuple(range(max(1, n_clues))), answers, absence=n_clues == 0
     ).clue_column
     payload = NiehAnswer(
-        **about, n_clues=n_clues, clue_column=column, answers=answers, reply=reply, scores=found
+        **about,
+        n_clues=n_clues,
+        clue_column=column,
+        answers=answers,
+        reply=reply,
+        scores=given_scores,
     )
     fields = {
         "task": "nieh_gt",
@@ -41,7 +46,7 @@ def record(
     return UnitRecord(**{**fields, **changes})
 
 
-def identity(
+def make_config(
     model: str = "qwen2.5-vl",
     checkpoint: str | None = "Qwen/Qwen2.5-VL-7B-Instruct",
     n_parameters: int | None = 8_292_166_656,
@@ -52,7 +57,8 @@ def identity(
     frames: str = "shown",
     **settings: float,
 ) -> dict[str, Any]:
-    """Of a run of `nieh_gt`; `skipped` are the reasons, `settings` those of the context."""
+    """What identifies a run of `nieh_gt`, as in its header; `skipped` are the reasons, `settings`
+    those of the context."""
     about = {
         "config": {"dataset_kwargs": {"context": context, **settings}},
         "decoding": {"max_new_tokens": 50},
@@ -69,9 +75,9 @@ def identity(
     return {"model": model_identity, "tasks": {"nieh_gt": about}, "frames": frames}
 
 
-def run_of(
-    about: dict[str, Any], records: list[UnitRecord[NiehAnswer]], name: str = "a run"
+def make_run(
+    config: dict[str, Any], records: list[UnitRecord[NiehAnswer]], name: str = "a run"
 ) -> RunSummary:
     """The run with these records, summed up."""
-    found: NiehSummary = summarise(about, records)
-    return RunSummary(RunHeader(suite="nieh", name=name, config=about), found)
+    summary: NiehSummary = summarise(config, records)
+    return RunSummary(RunHeader(suite="nieh", name=name, config=config), summary)

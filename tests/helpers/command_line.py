@@ -1,0 +1,46 @@
+"""The command line, run in this process, and what it is to say."""
+
+import re
+from collections.abc import Callable
+
+import pytest
+
+from infthor_eval.cli import main
+
+__all__ = ["CliRunner", "assert_refused", "read_remarks", "run_cli"]
+
+CliRunner = Callable[..., tuple[int, str, str]]
+
+_PROGRESS = re.compile(r".*: [\d,]+ of [\d,]+ \(\d+ %\)(, .* left, .*)?")
+
+
+@pytest.fixture
+def run_cli(capfd: pytest.CaptureFixture[str]) -> CliRunner:
+    """Runs our command in this process; gives its exit code, standard output and standard error."""
+
+    def run_cli(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            main([str(argument) for argument in arguments])
+        return ended.value.code, *capfd.readouterr()
+
+    return run_cli
+
+
+def read_remarks(error_text: str) -> list[str]:
+    """What a command writes on standard error on a fast machine and on a slow one alike: its lines
+    without those on progress, which come where it takes more than ten seconds."""
+    return [
+        line for line in error_text.splitlines() if line.strip() and not _PROGRESS.fullmatch(line)
+    ]
+
+
+def assert_refused(ended: tuple[int, str, str], *expected: str, code: int = 2) -> None:
+    """Hold that a command ended with an exit code, without output, and with one line that says
+    all that is expected."""
+    ended_with, output, error_text = ended
+    assert (ended_with, output) == (code, "")
+    assert "Traceback" not in error_text
+    (line,) = error_text.splitlines()
+    assert line.startswith("infthor-eval: ")
+    for words in expected:
+        assert words in line
