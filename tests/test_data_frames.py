@@ -86,9 +86,8 @@ def test_every_column_is_documented() -> None:
     page = (ROOT / "docs/formats.md").read_text()
     documented = page[page.index("## Samples as a table") :]
     names = {column.name for columns in (ENVELOPE, *COLUMNS.values()) for column in columns}
-    guesses = {
-        name for name in names if name.startswith(("guess_", "above_guessing_"))
-    }  # one for each scorer
+    # One for each scorer.
+    guesses = {name for name in names if name.startswith(("guess_", "above_guessing_"))}
     wanted = {
         "run",
         "suite",

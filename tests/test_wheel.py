@@ -84,9 +84,8 @@ def test_it_runs_in_an_empty_folder(command, tmp_path):
     )
     table = command(*words)
     assert "Qwen2.5-VL 7B" in table  # the published numbers came with it
-    assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {
-        "results"
-    }  # the first: $XDG_CACHE_HOME
+    # The first: $XDG_CACHE_HOME.
+    assert {path.name for path in tmp_path.iterdir()} - {"cache"} == {"results"}
 
 
 def test_plans_and_scenes_run_too(command, tmp_path):

@@ -20,7 +20,7 @@ from model_adapters import (
 from model_adapters.check.model import model_checks
 from model_adapters.check.policy import policy_checks
 from model_adapters.check.questions import start_conversation
-from tests.model_adapters.test_check_policy import Scripted
+from tests.model_adapters.check.test_policy import Scripted
 
 from .blocks import ROOT, written_files
 

@@ -31,6 +31,7 @@ from model_adapters.protocols import Decoding
 
 from ..conftest import QUESTIONS
 from ..helpers.command_line import assert_refused
+from ..helpers.questions import make_question
 from ..helpers.refusals import assert_raises_one_line
 from .test_files import IMAGES
 
@@ -254,7 +255,7 @@ def test_a_question_that_is_too_long_fails_alone(make_nieh_set, tmp_path, run_cl
 def test_a_haystack_without_a_usable_question_ends_the_same_way(
     make_nieh_set, tmp_path, run_cli, model
 ):
-    data = make_nieh_set([Question("t", "q", (99,), ("a",))], size=56)
+    data = make_nieh_set([make_question(clues=(99,))], size=56)
     arguments = [
         "--model",
         model,
@@ -269,10 +270,7 @@ def test_a_haystack_without_a_usable_question_ends_the_same_way(
 
 
 def test_a_context_is_measured_by_a_frame_that_can_be_read(make_nieh_set, tmp_path, run_cli):
-    questions = [
-        Question("t", "Is there a mug?", (1,), ("yes",)),
-        Question("u", "Is there a mug?", (1,), ("yes",)),
-    ]
+    questions = [make_question(), make_question("u")]
     data = make_nieh_set(questions, size=56)
     _frame(data, "t", 1).write_bytes(b"\xff\xd8\xff\xe0")
     arguments = ["--model", "qwen2.5-vl-tiny", "--tasks", "nieh_truncate_head_8k", "--data", data]

@@ -2,9 +2,10 @@
 
 import pytest
 
-from infthor_eval.formats.question import Question
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.tables import Column, Row, Table
+
+from ..helpers.questions import make_question
 
 NASTY = {
     "closing markup": "a[/b]c",
@@ -102,7 +103,7 @@ def test_ls_shows_names_as_text(tmp_path, run_cli, task_files, name):
 
 
 def test_a_name_that_is_no_unicode_ends_nothing(make_nieh_set, tmp_path, run_cli):
-    data = make_nieh_set([Question("t", "q", (1,), ("a",))], size=56)
+    data = make_nieh_set([make_question(clues=(1,))], size=56)
     output = tmp_path / "\udcff"
     code, out, err = run_cli(
         "--model", "oracle", "--tasks", "nieh_gt", "--data", data, "--output", output

@@ -185,9 +185,8 @@ def test_at_dead_ends_1_2_and_4_subgoals_are_dropped(simulator, monkeypatch):
 
 def test_an_accepted_task_ends_the_row_of_failures(simulator, monkeypatch):
     tries = iter(range(10_000))
-    _Failing(
-        monkeypatch, lambda _: next(tries) % 4 < 2
-    )  # what fails of itself is among the other two
+    # What fails of itself is among the other two.
+    _Failing(monkeypatch, lambda _: next(tries) % 4 < 2)
     generated = generate(TrajectorySettings("living-room-2", 5, 60, 6, max_fail=4), simulator)
     assert (
         generated.statistics.roll_backs == [] and generated.statistics.reasons["made to fail"] >= 6

@@ -20,10 +20,7 @@ class RecordedRun(Protocol):
 
 
 def write_journal(
-    folder: Path,
-    header: RunHeader,
-    records: Sequence[UnitRecord[Any]],
-    types: RecordTypes[Any],
+    folder: Path, header: RunHeader, records: Sequence[UnitRecord[Any]], types: RecordTypes[Any]
 ) -> Path:
     """Write the journal of a run as the driver does; returns the run's folder."""
     with Journal(folder, header, types) as journal:

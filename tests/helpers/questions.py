@@ -12,8 +12,8 @@ __all__ = ["make_question", "make_samples_on_clues"]
 
 def make_question(
     traj_id: str = "t",
-    text: str = "Where is it?",
-    answer: str = "Shelf",
+    text: str = "Is there a mug?",
+    answer: str = "yes",
     clues: Iterable[int] = (1,),
     **columns: Any,
 ) -> Question:

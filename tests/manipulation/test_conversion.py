@@ -177,9 +177,8 @@ def test_a_short_step_is_not_cut_and_the_scale_comes_before_the_cut():
     assert call["offset"] == pytest.approx({"x": -0.02, "y": 0.02, "z": 0.01})
     (call,) = Conversion(translation_scale=2.0, max_step=0.1).calls(step((0.01, 0.02, 0.02)))
     assert call["offset"] == pytest.approx({"x": -0.04, "y": 0.04, "z": 0.02})
-    (call,) = Conversion(translation_scale=10.0, max_step=0.06).calls(
-        step((0.01, 0.02, 0.02))
-    )  # 0.3 m cut to 0.06
+    # 0.3 m cut to 0.06.
+    (call,) = Conversion(translation_scale=10.0, max_step=0.06).calls(step((0.01, 0.02, 0.02)))
     assert call["offset"] == pytest.approx({"x": -0.04, "y": 0.04, "z": 0.02})
 
 

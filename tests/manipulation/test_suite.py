@@ -265,9 +265,8 @@ def test_an_episode_whose_object_is_missing_counts_for_nobody(prepared, tmp_path
     recorded = document["plan"]["low_actions"][9]["api_action"]
     recorded["objectId"] = "Elephant|+00.00|+00.00|+00.00"
     outcome = execute(prepared("still", data=write_trajectories(tmp_path / "elephant", document)))
-    assert all(
-        "Elephant" in record.excluded for record in outcome.records
-    )  # what comes after is not known either
+    # What comes after is not known either.
+    assert all("Elephant" in record.excluded for record in outcome.records)
     assert by_key(outcome)[PICK, MUG, 9].payload.instruction == "pick up the elephant"
     assert outcome.summary.summary.tasks[PICK].success is None
 
@@ -369,10 +368,11 @@ def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
     records = by_key(outcome)
     assert sorted(records) == [("far", MUG, 9), ("near", MUG, 9)]
     assert records["far", MUG, 9].payload.done
+    # A small sphere.
     assert (
         records["near", MUG, 9].payload.start_distance
         > records["far", MUG, 9].payload.start_distance
-    )  # a small sphere
+    )
     rows = [
         row for row in outcome.run.suite.tables([outcome.summary])[0].rows if not row.is_published
     ]

@@ -96,14 +96,10 @@ def test_the_numbers_of_pick_ups():
     task = summed().tasks[PICK]
     assert (task.kind, task.radius, task.n_trajectories, task.n_failed) == ("pickup", 0.5, 2, 1)
     assert task.excluded == {"no such scene": 1}
-    assert (task.success.mean, task.success.n) == (
-        0.25,
-        4,
-    )  # a failure of the policy's is no success
-    assert (task.inside.mean, task.inside.n) == (
-        pytest.approx(2 / 3),
-        3,
-    )  # it is not known of the failed one
+    # A failure of the policy's is no success.
+    assert (task.success.mean, task.success.n) == (0.25, 4)
+    # It is not known of the failed one.
+    assert (task.inside.mean, task.inside.n) == (pytest.approx(2 / 3), 3)
     assert task.closest == pytest.approx((0.1 + 0.4 + 0.7) / 3)
     assert task.steps == pytest.approx((2 + 4 + 0) / 3)
     assert task.collisions == pytest.approx((2 + 4 + 0) / 3)  # an empty grasp is none
@@ -206,9 +202,8 @@ def test_success_above_the_floor_is_that_of_the_same_episodes():
         episode("b", 7),
     ]
     own_row, floor = own(table("Low-level", run(records=policy), run("still", still)))
-    assert own_row["Pick-up above still"].startswith(
-        "33.3 ["
-    )  # of the three that both have: 2 against 1
+    # Of the three that both have: 2 against 1.
+    assert own_row["Pick-up above still"].startswith("33.3 [")
     assert (own_row["Put above still"], floor["Pick-up above still"]) == ("-", "-")
     (alone,) = own(table("Low-level", run(records=policy)))
     assert alone["Pick-up above still"] == "-"

@@ -135,9 +135,8 @@ def test_states_are_set_either_way(drawers):
     cooked = {
         key for key, item in changed.items() if item.is_cooked and not view.objects[key].is_cooked
     }
-    back = {
-        key: value for key, value in states(view).items() if key not in cooked
-    }  # nobody uncooks a potato
+    # Nobody uncooks a potato.
+    back = {key: value for key, value in states(view).items() if key not in cooked}
     assert {
         key: value for key, value in states(drawers.simulator.view).items() if key not in cooked
     } == back

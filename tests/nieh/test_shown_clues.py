@@ -81,11 +81,8 @@ def test_retrieved_frames_show_the_clues_among_them(make_nieh_set):
     ("fps", "numbers", "expected"),
     [
         (1, (16, 17, 33), clues(2, 3, 16)),
-        (
-            1,
-            (1, 2, 3),
-            clues(0, 3, 46),
-        ),  # positions in the film that is shown, not in the trajectory
+        # Positions in the film that is shown, not in the trajectory.
+        (1, (1, 2, 3), clues(0, 3, 46)),
         (10, (16, 17, 33), clues(3, 3, 16)),
     ],
 )

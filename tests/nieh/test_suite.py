@@ -12,6 +12,7 @@ from infthor_eval.nieh.samples import find_samples
 from infthor_eval.runs import execute, read_run
 from model_adapters import Capabilities, Reply
 
+from ..helpers.questions import make_question
 from .watching import Watcher
 
 TINY = "qwen2.5-vl-tiny"
@@ -185,9 +186,8 @@ def test_a_unit_that_fails_is_recorded_and_the_run_goes_on(prepared, recorder, d
 def test_a_failed_unit_is_tried_again_by_the_next_run(prepared, recorder, data):
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     whole = frame.read_bytes()
-    frame.write_bytes(
-        whole[:60] + bytes(len(whole) - 60)
-    )  # its size is part of the set's fingerprint
+    # Its size is part of the set's fingerprint.
+    frame.write_bytes(whole[:60] + bytes(len(whole) - 60))
     failed = {record.key for record in execute(prepared(TINY)).records if record.failure}
     frame.write_bytes(whole)
     watcher = Watcher()
@@ -210,7 +210,7 @@ def test_a_frame_that_is_no_image_has_the_samples_that_need_it_skipped(prepared,
 def test_a_task_without_its_data_or_without_a_question_is_refused(prepared, make_nieh_set):
     with pytest.raises(UsageError, match="give its folder with --data"):
         prepared(data=None)
-    empty = make_nieh_set([Question("t", "q", (99,), ("a",))], name="empty")
+    empty = make_nieh_set([make_question(clues=(99,))], name="empty")
     with pytest.raises(UsageError, match=r"can be asked \(clue 99 is outside trajectory t"):
         prepared(data=empty)
 
@@ -321,10 +321,7 @@ def test_the_limit_is_of_questions_that_can_be_asked_with_all_their_variants(mak
     assert (
         taken[-1]
         == taken[-2]
-        == (
-            [digit for digit in "4567" for _ in range(5)],
-            [question.text for question in outside],
-        )
+        == ([digit for digit in "4567" for _ in range(5)], [question.text for question in outside])
     )
 
 

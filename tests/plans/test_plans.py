@@ -83,9 +83,8 @@ def test_alfred_plans():
         plans, tasks = plans_of(trajectory, Words.NATURAL), tasks_of(trajectory)
         assert len(tasks) == 1 and tasks[0].task.task_type == trajectory.task_type
         assert tasks[0].text == trajectory.turk_annotations["anns"][0]["task_desc"]
-        assert not any(
-            plan.is_final for plan in plans
-        )  # the sub-goal without an action is none of them
+        # The sub-goal without an action is none of them.
+        assert not any(plan.is_final for plan in plans)
         assert len(plans) == len(trajectory.plan.high_pddl) - (
             "End" in repr(trajectory.plan.high_pddl[-1])
         )

@@ -92,11 +92,8 @@ def test_looks_and_turns_are_steps():
         ("RotateRight", None, kitchen(at=(0, 0), horizon=0.0)),
         ("MoveAhead", None, kitchen(at=(0, 1), horizon=0.0)),
         ("LookDown", None, kitchen(at=(0, 1), horizon=30.0)),
-        (
-            "RotateRight",
-            None,
-            kitchen(at=(0, 1), facing=90, horizon=30.0),
-        ),  # one ahead is lost behind turns
+        # One ahead is lost behind turns.
+        ("RotateRight", None, kitchen(at=(0, 1), facing=90, horizon=30.0)),
         ("LookDown", None, kitchen(at=(0, 1), facing=0, horizon=60.0)),
     ]
     assert run(DEFAULT, target, start, events, grid=CORRIDOR) == [
@@ -263,13 +260,7 @@ PUTS = [
         ],
         [(0.0, GOES_ON), (0.0, GOES_ON)],
     ),
-    (
-        "open already",
-        STOW,
-        OPEN_FRIDGE,
-        [("PutObject", FRIDGE, IN_FRIDGE)],
-        [(2.0, DONE)],
-    ),
+    ("open already", STOW, OPEN_FRIDGE, [("PutObject", FRIDGE, IN_FRIDGE)], [(2.0, DONE)]),
     (
         "onto a closed lid",
         ON_THE_LID,

@@ -329,10 +329,7 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
     assert [
         (record.cluster, record.payload.index, record.payload.is_final)
         for record in outcome.records
-    ] == [
-        (FORK, 4, True),
-        (FORK, 5, True),
-    ]
+    ] == [(FORK, 4, True), (FORK, 5, True)]
     task = summary(outcome, "infthor_final")
     assert (task.n_plans, task.n_trajectories, task.success["total"].mean) == (2, 1, 1)
     (table, *_) = outcome.run.suite.tables([outcome.summary])

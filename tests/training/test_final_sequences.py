@@ -195,11 +195,8 @@ def test_a_trajectory_without_a_memory_is_left_out_and_told(
 
 def test_actions_that_cannot_be_used_are_left_out_and_told(make_set, encoder, golden):
     retrieved = golden[0]["trajectory"]["retrieved_image"]
-    wrong = {
-        "7": {"top20": []},
-        "99": {"top20": []},
-        "3": {"top20": ["000000099.png"]},
-    }  # 7 is between two tasks
+    # 7 is between two tasks.
+    wrong = {"7": {"top20": []}, "99": {"top20": []}, "3": {"top20": ["000000099.png"]}}
     data = read_training_data(
         recipe("frames"), encoder, [make_set(retrieved_image=retrieved | wrong)]
     )

@@ -101,10 +101,8 @@ def test_processes_that_share_sequences_and_are_killed_end_with_the_weights_of_o
     killed = started(recipe, 2, bundled_set, tmp_path / "killed")
     wait_until(lambda: list((tmp_path / "killed" / "states").glob("step-00000?")), killed)
     launching = psutil.Process(killed.pid)
-    for process in (
-        *launching.children(recursive=True),
-        launching,
-    ):  # each worker has a session of its own
+    # Each worker has a session of its own.
+    for process in (*launching.children(recursive=True), launching):
         process.kill()
     killed.communicate()
     assert not (tmp_path / "killed" / "checkpoint").exists()

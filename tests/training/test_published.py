@@ -44,10 +44,7 @@ def test_weights_are_taken_over_whatever_stands_before_their_names(tmp_path, pre
 @pytest.mark.parametrize(
     ("model", "renamed"),
     [
-        (
-            "qwen2.5-vl-tiny",
-            [("model.visual.", "visual."), ("model.language_model.", "model.")],
-        ),
+        ("qwen2.5-vl-tiny", [("model.visual.", "visual."), ("model.language_model.", "model.")]),
         (
             "llava-onevision-tiny",
             [

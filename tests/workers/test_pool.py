@@ -76,11 +76,8 @@ def test_a_job_whose_worker_dies_goes_to_another_and_loses_only_what_had_not_com
     events = list(shared.run(3, jobs.__getitem__))
     (lost,) = of(events, WorkerLost)
     assert (lost.job, "worker" in lost.reason) == (1, True)
-    assert counts(events, 1) in (
-        [0, 1, 0, 1, 2, 3],
-        [0, 0, 1, 2, 3],
-        [0, 1, 2, 3],
-    )  # what was sent may die with it
+    # What was sent may die with it.
+    assert counts(events, 1) in ([0, 1, 0, 1, 2, 3], [0, 0, 1, 2, 3], [0, 1, 2, 3])
     assert (counts(events, 0), counts(events, 2)) == ([0, 1, 2], [0, 1])
 
 

@@ -10,6 +10,7 @@ from infthor_eval.cli.commands import doctor as checks
 from infthor_eval.formats.question import Question
 
 from ...helpers.bundled import BUNDLED
+from ...helpers.questions import make_question
 
 TOKEN = "hf_of_nobody_0123456789"
 
@@ -98,9 +99,7 @@ def test_a_set_is_read_whole_and_what_can_be_asked_is_said(run_cli):
 
 def test_what_a_set_lacks_is_counted_by_reason(run_cli, make_nieh_set):
     complete = Question("t", "Have you seen a mug?", (1,), ("yes",))
-    root = make_nieh_set(
-        [complete, Question("t", "q", (99,), ("a",)), Question("t", "q", (98,), ("a",))]
-    )
+    root = make_nieh_set([complete, make_question(clues=(99,)), make_question(clues=(98,))])
     (root / "metadata" / "other").mkdir()
     (root / "qa_set_x.csv").write_text(
         "traj_id,question,gt_img_idx,answer\ngone,q,[1],['a']\nt,q,[1,['a']\n"
@@ -118,7 +117,7 @@ def test_what_a_set_lacks_is_counted_by_reason(run_cli, make_nieh_set):
 
 
 def test_a_set_of_which_nothing_can_be_asked_sets_the_exit_code(run_cli, make_nieh_set):
-    root = make_nieh_set([Question("t", "q", (99,), ("a",))])
+    root = make_nieh_set([make_question(clues=(99,))])
     code, by_name = checks_of(run_cli, "--data", str(root))
     assert code == 1
     assert by_name["questions"]["detail"] == "none can be asked"

@@ -119,9 +119,8 @@ def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run_cli
     assert out.startswith("5 samples, ")
     assert out.strip().endswith(f"MB: {tmp_path / 'pages' / 'report.html'}")
     page = (tmp_path / "pages" / "report.html").read_text()
-    assert (
-        "infthor-eval run --model oracle --tasks nieh_gt" in page
-    )  # how it is done again, and where its frames were
+    # How it is done again, and where its frames were.
+    assert "infthor-eval run --model oracle --tasks nieh_gt" in page
     assert "no frames are shown" not in page
 
 

@@ -8,6 +8,7 @@ from infthor_eval.formats.question import Question
 
 from ...helpers.files import find_one
 from ...helpers.processes import finish, start_cli
+from ...helpers.questions import make_question
 from ...helpers.waiting import wait_until
 
 MANY = [
@@ -73,7 +74,7 @@ def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, 
 def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(
     make_nieh_set, tmp_path, run_cli
 ):
-    data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
+    data = make_nieh_set([make_question(clues=(70,))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
     code, out, err = run_cli(
         "--model",

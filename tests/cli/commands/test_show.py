@@ -7,8 +7,8 @@ import math
 
 import pytest
 
-from infthor_eval.formats.question import Question
 from tests.helpers.command_line import assert_refused
+from tests.helpers.questions import make_question
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_the_first_screen_has_one_number_a_task_and_fits(ran):
 
 
 def test_a_task_without_samples_is_a_line(make_nieh_set, tmp_path, run_cli):
-    data = make_nieh_set([Question("t", "Is there a mug?", (70,), ("yes",))], n_frames=140, size=56)
+    data = make_nieh_set([make_question(clues=(70,))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
     code, out, err = run_cli(
         "--model", "oracle", "--tasks", tasks, "--data", data, "--output", tmp_path / "out"

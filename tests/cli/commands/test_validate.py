@@ -10,6 +10,8 @@ from infthor_eval.nieh.suite import NiehSuite
 from infthor_eval.storage.packaged import packaged_folder
 from model_adapters import Capabilities
 
+from ...helpers.questions import make_question
+
 # Of known skill: which answers each scripted model gets right.
 SKILLS = {
     "one-clue": lambda q: len(q.clues) == 1,
@@ -20,7 +22,7 @@ SKILLS = {
     "half": lambda q: len(q.answers) == 2,
 }
 QUESTIONS = [
-    Question("t", "Is there a mug?", (1,), ("yes",)),
+    make_question(),
     Question("t", "What is <b>it</b>?", (2,), ("mug",)),
     Question("t", "Was it there?", (1, 2), ("yes",)),
     Question("t", "Where was it?", (1, 3), ("shelf",)),

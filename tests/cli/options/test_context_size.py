@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from infthor_eval.formats.question import Question
 from infthor_eval.runs import read_header
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
 from ...helpers.files import find_one
+from ...helpers.questions import make_question
 
-ONE = [Question("t", "Is there a mug?", (40,), ("yes",))]
+ONE = [make_question(clues=(40,))]
 
 
 def line_of(text, start):
@@ -171,7 +171,7 @@ def test_an_extension_that_is_too_small_is_reported_as_refused(
 def test_a_context_that_is_cut_to_its_size_is_reported_as_truncated(
     make_nieh_set, tmp_path, run_cli
 ):
-    data = make_nieh_set([*ONE, Question("u", "Is there a mug?", (40,), ("yes",))], n_frames=80)
+    data = make_nieh_set([*ONE, make_question("u", clues=(40,))], n_frames=80)
     for number in range(60, 80):  # one of the two trajectories is short enough
         (data / "metadata" / "u" / "img" / f"{number:09d}.png").unlink()
     metadata = data / "metadata" / "u" / "metadata.json"
@@ -202,9 +202,8 @@ def test_the_longest_request_is_reported_as_it_is_sent(
         tmp_path / "out",
     ]
     _, _, err = run_cli(*arguments)
-    longest = (
-        max(record.tokens.context for record in records_in(tmp_path / "out")) + 50
-    )  # and the room for the reply
+    # And the room for the reply.
+    longest = max(record.tokens.context for record in records_in(tmp_path / "out")) + 50
     assert f"the longest request {longest:,} tokens" in line_of(err, "nieh_full: 2 contexts")
 
 

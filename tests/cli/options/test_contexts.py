@@ -216,9 +216,8 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
     for name in ("killed", "whole"):
         finish(start(tmp_path / name))
     assert journal.read_bytes().count(b'"type":"nieh_note"') == 6
-    assert (
-        journal.read_bytes().count(b'\n{"type":"artifact","') == 6 + 6
-    )  # and what was recalled for each question
+    # And what was recalled for each question.
+    assert journal.read_bytes().count(b'\n{"type":"artifact","') == 6 + 6
     results = [
         find_one(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")
     ]

@@ -24,16 +24,14 @@ def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run_
     code, output, err = run_cli(*arguments, "--frames", "shown,blank,shuffled,other")
     assert code == 0, err
     assert results(out).keys() == {"shown", "blank", "shuffled", "other"}
-    assert all(
-        len(counts) == 1 for counts in tokens(out, records_in).values()
-    )  # blanks cost as much
+    # Blanks cost as much.
+    assert all(len(counts) == 1 for counts in tokens(out, records_in).values())
     rows = [line.split() for line in output.splitlines()]
     assert [TINY + ",", "blank", "frames", "nieh_full"] in [row[:4] for row in rows]
     assert "Gain over the same model's run on blank frames, in points" in output
     _, output, err = run_cli(*arguments)
-    assert (
-        "0 evaluated now, 5 resumed" in err
-    )  # the run on true frames is the one without the option
+    # The run on true frames is the one without the option.
+    assert "0 evaluated now, 5 resumed" in err
     assert "Gain over" not in output
 
 

@@ -46,9 +46,8 @@ CLOSED = (
     r"Is the .+ open now\?",
     r"Is the .+ (in|on) the .+\?",
 )
-RARE = {
-    "container_content"
-}  # of what is the only one of its type and never changes; `test_readings` has some
+# Of what is the only one of its type and never changes; `test_readings` has some.
+RARE = {"container_content"}
 TABLE_3 = {
     "object_presence": (r"Is there any .+ in this room\?", r"Have you seen .+\?"),
     "open_state": (r"Was the .+ open\?",),

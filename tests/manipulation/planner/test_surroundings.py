@@ -58,10 +58,8 @@ def is_solid(around, belief, *point):
     return distances.size > 0 and bool(distances.min() < 0)
 
 
-LEFT, RIGHT = (
-    (-0.2, 1.1, 1.3),
-    (0.2, 1.1, 1.3),
-)  # before the opening, whose right is that of who looks into it
+# Before the opening, whose right is that of who looks into it.
+LEFT, RIGHT = ((-0.2, 1.1, 1.3), (0.2, 1.1, 1.3))
 
 
 @pytest.mark.parametrize(("kind", "origin", "door"), [

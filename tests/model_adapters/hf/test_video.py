@@ -230,7 +230,5 @@ def test_the_pixels_of_long_videos_are_shared_by_their_frames(tiny: Any) -> None
     300 tokens."""
     large = (1400, 1400)
     tokens = [tiny._loaded.family.video.n_tokens(ClipShape(large, 0, n, 1.0)) for n in (2, 384)]
-    assert tokens == [
-        27 * 27,
-        17 * 17,
-    ]  # 768 tokens and 300 are the most, in whole rows and columns
+    # 768 tokens and 300 are the most, in whole rows and columns.
+    assert tokens == [27 * 27, 17 * 17]

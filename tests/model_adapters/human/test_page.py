@@ -202,9 +202,8 @@ def test_two_tabs_answer_one_question_once(
     one = session("--tasks", "nieh_gt", "--data", data, "--limit", 2)
     one.await_answered(0)
     other = one.new_tab(browser)
-    other.route(
-        "**/state.json*", lambda route: route.abort()
-    )  # it does not learn that the question was answered
+    # It does not learn that the question was answered.
+    other.route("**/state.json*", lambda route: route.abort())
     first = one.question
     one.tab.locator("#text").fill("first")
     one.tab.keyboard.press("Enter")

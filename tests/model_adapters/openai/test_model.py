@@ -78,12 +78,8 @@ def test_a_request_is_what_was_said_and_how_it_is_decoded(frames: list[FrameRef]
         {"role": "user", "content": "Where?"},
     ]
     assert (second["temperature"], second["top_p"], second["seed"]) == (0.5, 0.9, 5)
-    assert second["stop"] == [
-        "a",
-        "b",
-        "c",
-        "d",
-    ]  # more are not taken; the reply is cut here in any case
+    # More are not taken; the reply is cut here in any case.
+    assert second["stop"] == ["a", "b", "c", "d"]
     assert "authorization" not in first["headers"]
 
 

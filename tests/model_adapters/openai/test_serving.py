@@ -51,9 +51,8 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     root = tmp_path_factory.mktemp("served")
     folder = root / "idefics3"
     save("idefics3", folder)
-    settings = (
-        folder / "generation_config.json"
-    )  # without do_sample this server draws at no temperature
+    # Without do_sample this server draws at no temperature.
+    settings = folder / "generation_config.json"
     settings.write_text(json.dumps(json.loads(settings.read_text()) | {"do_sample": True}))
     port = free_port()
     command = [sys.executable, "-c", SERVE, "serve", "--host", "127.0.0.1", "--port", str(port)]

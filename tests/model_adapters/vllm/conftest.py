@@ -16,9 +16,8 @@ from .double import Double
 def vllm(monkeypatch: pytest.MonkeyPatch) -> Double:
     """The double, found by whoever imports vLLM."""
     double = Double()
-    monkeypatch.setenv(
-        "VLLM_LOGGING_STREAM", "ext://sys.stderr"
-    )  # else the adapter sets it for all tests to come
+    # Else the adapter sets it for all tests to come.
+    monkeypatch.setenv("VLLM_LOGGING_STREAM", "ext://sys.stderr")
     for name, module in double.modules().items():
         monkeypatch.setitem(sys.modules, name, module)
     return double

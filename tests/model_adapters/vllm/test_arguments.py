@@ -111,10 +111,7 @@ def test_every_option_arrives_under_vllms_name() -> None:
         "mm_encoder_attn_backend": "TORCH_SDPA",
         "max_model_len": 9_999,
         "trust_remote_code": True,
-        "limit_mm_per_prompt": {
-            "image": {"count": 12, "width": 640, "height": 640},
-            "video": 0,
-        },
+        "limit_mm_per_prompt": {"image": {"count": 12, "width": 640, "height": 640}, "video": 0},
         "mm_processor_kwargs": {"use_fast": False},
         "hf_overrides": {
             "text_config": {
@@ -250,10 +247,7 @@ def test_three_axes_of_another_family_are_not_extended_unknown() -> None:
         ({"tensor_parallel_size": "0"}, "tensor_parallel_size=0 is not from 1"),
         ({"max_frames": "0"}, "max_frames=0 is not from 1"),
         ({"mm_processor_cache_gb": "-1"}, "mm_processor_cache_gb=-1.0 is not from 0"),
-        (
-            {"data_parallel_size": "2"},
-            "external_launcher in vLLM; use --workers 2 instead",
-        ),
+        ({"data_parallel_size": "2"}, "external_launcher in vLLM; use --workers 2 instead"),
         ({"rope": "yarn"}, "rope=yarn is not TYPE:FACTOR"),
         ({"prompt": "loud"}, "prompt=loud is not chat or plain"),
         ({"max_pixels": "0"}, "max_pixels=0 is not between"),

@@ -271,10 +271,8 @@ def test_other_frames_are_no_warm_prefix(start: Start, frames: list[FrameRef]) -
     first = model.answer(user(*frames[:3], "What?"), up_to(2))
     other = model.answer(user(*frames[3:], "What?"), up_to(2))
     again = model.answer(user(*frames[:3], "Where?"), up_to(2))
-    assert (first.n_cached_tokens, other.n_cached_tokens) == (
-        0,
-        16,
-    )  # a block of the template's own words
+    # A block of the template's own words.
+    assert (first.n_cached_tokens, other.n_cached_tokens) == (0, 16)
     assert again.n_cached_tokens == 48
 
 

@@ -47,9 +47,8 @@ def test_actions_are_those_of_the_native_port(
     ]
     actions = [[each.act(frame, text) for frame, text in requests] for each in (ours, theirs)]
     assert actions[0] == actions[1]
-    assert (
-        len(set(actions[0])) > 1 or not constrained
-    )  # without, it writes words, which are clipped
+    # Without, it writes words, which are clipped.
+    assert len(set(actions[0])) > 1 or not constrained
 
 
 def test_it_keeps_the_contract_of_policies(policy: Callable[..., Any]) -> None:

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from infthor_eval.errors import UsageError
 from infthor_eval.formats.frames import FrameRef
 from infthor_eval.formats.nieh_set import SkippedQuestion
-from infthor_eval.formats.question import Question
 from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings, Sample
 from infthor_eval.nieh.contexts.haystack import sampling_pool
+
+from ...helpers.questions import make_question
 
 GOLDEN = Path(__file__).parents[2] / "goldens" / "haystack_multi.jsonl.gz"
 DEPTHS = (0, 0.2, 0.4, 0.6, 0.8)
@@ -32,13 +33,11 @@ class Frames:
         return tuple(self.all[index] for index in question.clues)
 
 
-def question_on(clues):
-    return Question("t", "Where is it?", tuple(clues), ("Shelf",))
-
-
 def windows(n_frames, clues, seed=0, **settings):
     return CONTEXTS["haystack"].samples(
-        Frames(n_frames), question_on(clues), ContextSettings(seed=seed, **settings)
+        Frames(n_frames),
+        make_question("t", "Where is it?", "Shelf", clues),
+        ContextSettings(seed=seed, **settings),
     )
 
 
@@ -171,7 +170,7 @@ def test_more_clues_that_follow_each_other_lie_at_the_last_depth_every_time():
 
 def test_a_question_without_a_needle_is_asked_once_outside_the_depths():
     def find_only_sample(n_frames):
-        question = Question("t", "Is there a mug?", (3, 60), ("no",), absence=True)
+        question = make_question(answer="no", clues=(3, 60), absence=True)
         settings = ContextSettings(ctx_size=10, tokens_per_frame=1000)
         (sample,) = CONTEXTS["haystack"].samples(Frames(n_frames), question, settings)
         return sample
@@ -194,7 +193,7 @@ def test_the_smallest_and_the_fullest_windows():
 
 @pytest.mark.parametrize(("n_frames", "starts"), [(10, {0}), (11, {0, 1})])
 def test_a_window_without_a_needle_lies_anywhere_inside_the_trajectory(n_frames, starts):
-    question = Question("t", "Is there a mug?", (3,), ("no",), absence=True)
+    question = make_question(answer="no", clues=(3,), absence=True)
     seeded = (ContextSettings(ctx_size=10, tokens_per_frame=1000, seed=seed) for seed in range(20))
     samples = [
         CONTEXTS["haystack"].samples(Frames(n_frames), question, settings)[0] for settings in seeded
@@ -221,7 +220,7 @@ def test_what_does_not_fit_says_why():
 
 def test_a_kilo_token_is_the_published_one_unless_told_otherwise():
     def n_frames(context, **settings):
-        question = Question("t", "q", (999,), ("a",))
+        question = make_question(clues=(999,))
         settings = ContextSettings(ctx_size=8, tokens_per_frame=121, **settings)
         samples = CONTEXTS[context].samples(Frames(1000), question, settings)
         return next(len(sample.frames) for sample in samples if isinstance(sample, Sample))

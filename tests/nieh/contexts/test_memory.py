@@ -14,8 +14,10 @@ from infthor_eval.nieh.docs import doc_of, doc_parts, sample_of
 from infthor_eval.nieh.records import NiehRecall
 from infthor_eval.nieh.samples import find_samples, open_set
 
+from ...helpers.questions import make_question
+
 QUESTIONS = [
-    Question("t", "Is there a mug?", (1,), ("yes",)),
+    make_question(),
     Question("t", "Where was the plate?", (0, 5), ("Sink",)),
     Question("u", "Is there a mug?", (2,), ("no",)),
 ]

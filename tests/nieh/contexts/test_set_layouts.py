@@ -15,15 +15,8 @@ from ...helpers.bundled import BUNDLED, bundled_name
 from ..test_requests import EXPECTED, as_text
 
 NAME = bundled_name("kitchen-1")
-LONG = (
-    "_16k",
-    "_32k",
-    "_64k",
-    "_128k",
-    "_256k",
-    "_512k",
-    "_1m",
-)  # haystacks of more frames than there are
+# Haystacks of more frames than there are.
+LONG = ("_16k", "_32k", "_64k", "_128k", "_256k", "_512k", "_1m")
 TASKS = sorted(task for task in EXPECTED if not task.endswith((*LONG, "_mini_gt", "_mini_full")))
 PUBLISHED_FIELDS = ("img_idx", "img_filename", "step", "object_log")
 

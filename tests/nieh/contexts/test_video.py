@@ -10,10 +10,9 @@ from infthor_eval.nieh.contexts import CONTEXTS, ContextSettings
 from infthor_eval.nieh.docs import doc_of, doc_parts, doc_prompt, sample_of
 from infthor_eval.nieh.samples import find_samples, open_set
 
-QUESTIONS = [
-    Question("a", "Is there a mug?", (1,), ("yes",)),
-    Question("b", "Is there a sink?", (0,), ("no",)),
-]
+from ...helpers.questions import make_question
+
+QUESTIONS = [make_question("a"), Question("b", "Is there a sink?", (0,), ("no",))]
 
 
 @pytest.fixture

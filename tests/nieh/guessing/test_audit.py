@@ -21,7 +21,7 @@ PRESENCE, OPEN = "Is Mug on the Bed?", "Where is Mug now?"
 def audited(text, answer, *scores, file="", clues=(1,), number=0):
     """A question with the scores of the first guessers; the others get 0."""
     right = (*scores, *[0.0] * (len(GUESSERS) - len(scores)))
-    return AuditedQuestion(make_question(f"t{number}", text, answer, clues, file), right)
+    return AuditedQuestion(make_question(f"t{number}", text, answer, clues, file=file), right)
 
 
 def test_a_group_tells_its_answers_and_its_best_guesser():

@@ -73,10 +73,7 @@ def test_a_context_counts_less_the_more_different_answers_it_has(n_y, guess):
         for sample in make_samples_on_clues(
             make_question("new", "a", "?"), make_question("new", "e", "?")
         )
-    ] == [
-        guess,
-        "x",
-    ]
+    ] == [guess, "x"]
 
 
 def test_own_answers_are_taken_away_before_counting():

@@ -12,12 +12,13 @@ from pathlib import Path
 import pytest
 import regex
 
-from infthor_eval.formats.question import Question
 from infthor_eval.formats.reply_logs import LoggedReply, read_reply_log
 from infthor_eval.nieh.contexts import CONTEXTS
 from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN, question_text
 from infthor_eval.nieh.published import asked_prompt as module
 from infthor_eval.nieh.published.asked_prompt import asked_prompt
+
+from ...helpers.questions import make_question
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "goldens" / "prompts.json").read_text())
 REPLIES = Path(__file__).parents[3] / "../shared/data/published_sets/replies"
@@ -49,13 +50,8 @@ PIECES = regex.compile(
     r"(?i:'s|'t|'re|'ve|'m|'ll|'d)|[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}| "
     r"?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"
 )
-TEMPLATE = (
-    "system\nYou are a helpful assistant.",
-    "\n",
-    "user\n",
-    "\n",
-    "assistant\n",
-)  # between 5 special tokens
+# Between 5 special tokens.
+TEMPLATE = ("system\nYou are a helpful assistant.", "\n", "user\n", "\n", "assistant\n")
 N_SPECIAL = 5
 
 
@@ -90,21 +86,17 @@ def rows_of(log):
         return [json.loads(line) for line in lines]
 
 
-def make_asked_question(text):
-    return Question("t", text, (0,), ("yes",))
-
-
 @pytest.mark.parametrize("case", GOLDEN["published-logs"], ids=lambda case: case["question"])
 def test_the_logs_prompt_is_the_published_text(case):
     assert (
-        question_text(VIEWS, make_asked_question(case["question"]), PUBLISHED_LOGS) == case["text"]
+        question_text(VIEWS, make_question("t", case["question"]), PUBLISHED_LOGS) == case["text"]
     )
 
 
 @pytest.mark.parametrize("case", GOLDEN["published-main"], ids=lambda case: case["mode"])
 def test_the_prompt_of_main_is_the_published_text(case):
     context = CONTEXTS[{"full_traj": "trajectory"}.get(case["mode"], case["mode"])]
-    assert question_text(context.intro, make_asked_question(case["question"])) == case["text"]
+    assert question_text(context.intro, make_question("t", case["question"])) == case["text"]
 
 
 @needs_logs
@@ -117,7 +109,7 @@ def test_the_logs_prompt_has_the_logged_number_of_tokens_in_every_row():
         n_text = row["ctx_n_tokens"] - 123 * row["n_imgs"]
         for prompt in n:
             n[prompt] += (
-                n_tokens(question_text(VIEWS, make_asked_question(row["question"]), prompt))
+                n_tokens(question_text(VIEWS, make_question("t", row["question"]), prompt))
                 == n_text
             )
     # All fourteen logs, by hand: 6,133 of 6,133 rows on images; 2,606 of 2,606 on videos are main's
@@ -130,11 +122,11 @@ def test_the_tokens_of_the_prompts_own_words_are_those_of_the_vocabulary():
     question = "Where is Statue now?"  # a token for each word and for the mark
     n_question = len(question.split()) + 1
     of_frames = {
-        name: n_tokens(question_text(VIEWS, make_asked_question(question), name))
+        name: n_tokens(question_text(VIEWS, make_question("t", question), name))
         for name in module._OF_FRAMES
     }
     of_films = {
-        name: n_tokens(question_text(FILM, make_asked_question(question), name))
+        name: n_tokens(question_text(FILM, make_question("t", question), name))
         for name in module._OF_FILMS
     }
     assert {name: n - n_question for name, n in of_frames.items()} == module._OF_FRAMES
@@ -152,7 +144,7 @@ def reply(n_context_tokens, n_frames=10, mode="full_traj"):
     return LoggedReply(
         1,
         "yes",
-        published=make_asked_question("Where is Statue now?"),
+        published=make_question("t", "Where is Statue now?"),
         mode=mode,
         n_frames=n_frames,
         n_context_tokens=n_context_tokens,

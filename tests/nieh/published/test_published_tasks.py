@@ -73,9 +73,8 @@ def ask(prepared, model, task, **options):
 def check(record, n_tokens):
     assert record.failure is None
     assert set(record.payload.scores) == {"reference"}
-    assert record.tokens.context == pytest.approx(
-        n_tokens, abs=150
-    )  # a text of about a hundred tiny tokens
+    # A text of about a hundred tiny tokens.
+    assert record.tokens.context == pytest.approx(n_tokens, abs=150)
 
 
 @MODELS

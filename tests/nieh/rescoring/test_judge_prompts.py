@@ -28,10 +28,8 @@ def test_the_published_prompt_is_the_published_text(case):
         ('{"score": true}', None),
         ('{"score": "1"}', None),
         ('{"score": NaN}', None),
-        (
-            '{"correct": true}',
-            None,
-        ),  # what the published parser reads, and its prompt never asks for
+        # What the published parser reads, and its prompt never asks for.
+        ('{"correct": true}', None),
         ("{score: 1}", None),
         ("1.0", None),
         ("", None),

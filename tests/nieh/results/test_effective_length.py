@@ -22,18 +22,12 @@ from ...helpers.nieh_runs import make_config, make_record, make_run
         (0.8, {"8": 0.8, "16": 0.7, "32": 0.6, "64": 0.5}, "16K"),  # 85 % of 0.8 is 0.68
         (1.0, {"8": 0.85, "16": 0.849}, "8K"),
         (0.6, {"8": 0.51}, "8K, all that were asked"),
-        (
-            20 / 29,
-            {"8": 17 / 29, "16": 0.1},
-            "8K",
-        ),  # the border itself, which rounding puts a hair below
+        # The border itself, which rounding puts a hair below.
+        (20 / 29, {"8": 17 / 29, "16": 0.1}, "8K"),
         (0.8, {"8": 0.9, "16": 0.9}, "16K, all that were asked"),
         (0.8, {"8": 0.1, "16": 0.9}, "below 8K"),
-        (
-            0.8,
-            {"8": 0.8, "16": 0.1, "32": 0.9},
-            "8K",
-        ),  # what is got back beyond a loss does not count
+        # What is got back beyond a loss does not count.
+        (0.8, {"8": 0.8, "16": 0.1, "32": 0.9}, "8K"),
         (0.8, {"8": None, "16": 0.8, "32": 0.2}, "16K"),
         (0.8, {"8": None}, "-"),
         (0.8, {}, "-"),

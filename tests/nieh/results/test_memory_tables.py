@@ -111,7 +111,4 @@ def test_the_picture_has_a_curve_for_each_memory_over_its_budgets():
     assert chart.title == "nieh_gt: accuracy by tokens of what a memory recalls"
     assert re.findall(
         r"(?:^|; )(\S+) 50\.0 % at 150 tokens, 50\.0 % at 150 tokens", chart.description
-    ) == [
-        "last",
-        "oracle*",
-    ]
+    ) == ["last", "oracle*"]

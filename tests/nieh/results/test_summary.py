@@ -249,8 +249,7 @@ def test_lengths_have_their_own_scores_above_guessing():
 @pytest.mark.parametrize("names", [DISTANCES, LENGTHS])
 def test_bins_follow_each_other_without_a_gap(names):
     ends = [tuple(map(int, name.split("-"))) for name in names[:-1]]
-    step = (
-        1 if names is DISTANCES else 0
-    )  # the last frame of a bin is in its name, the last token is not
+    # The last frame of a bin is in its name, the last token is not.
+    step = 1 if names is DISTANCES else 0
     assert all(before[1] + step == after[0] for before, after in pairwise(ends))
     assert (ends[0][0], names[-1]) == (0, f">={ends[-1][1] + step}")

@@ -112,9 +112,8 @@ def test_a_model_reads_the_sequence_that_it_was_trained_on(acting, data):
         (decoding.max_new_tokens, decoding.temperature, decoding.stop)
         for _, decoding in model.requests
     } == {(10, 1.0, ("<|act|>",))}
-    assert len({decoding.seed for _, decoding in model.requests}) == len(
-        model.requests
-    )  # each action has draws of its own
+    # Each action has draws of its own.
+    assert len({decoding.seed for _, decoding in model.requests}) == len(model.requests)
     tokens = [record.tokens for record in outcome.records]
     assert [(count.reply, count.cached) for count in tokens] == [
         (len(record.payload.steps), 0) for record in outcome.records
@@ -397,8 +396,7 @@ def short(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("model", "ways"),
-    [(QWEN, ("greedy", "constrained")), (LLAVA, ("constrained",))],
+    ("model", "ways"), [(QWEN, ("greedy", "constrained")), (LLAVA, ("constrained",))]
 )
 def test_sharing_what_was_encoded_changes_no_reply(prepared, tmp_path, short, brief, model, ways):
     for way in ways:  # replies are drawn unless they are greedy

@@ -93,9 +93,8 @@ def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(acting):
     assert (first.ended, second.ended) == ("no action", "step limit")
     assert len(second.steps) == 201
     prompts = [join_parts(parts) for parts, _ in model.requests]
-    assert (
-        len({prompt.partition("Current state: ")[0] for prompt in prompts}) == 1
-    )  # the memory is not renewed
+    # The memory is not renewed.
+    assert len({prompt.partition("Current state: ")[0] for prompt in prompts}) == 1
     for prompt in prompts:
         assert prompt.startswith("Your task is: put two slices of tomato")
         assert ".\nState: You are in the middle of a room. Your hands are free." in prompt
@@ -218,21 +217,16 @@ def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(acting
         {"visible": [name.capitalize()] if number in (1, seen) else []}
         for number in range(first + 1)
     ]
-    entries += [{"visible": [name]}] * (
-        len(trajectory.plan.low_actions) - first
-    )  # later than anybody may know
+    # Later than anybody may know.
+    entries += [{"visible": [name]}] * (len(trajectory.plan.low_actions) - first)
     path.write_text(json.dumps(json.loads(path.read_text()) | {"object_log": entries}))
 
     replies = [text for texts in experts[4:] for text in texts]
     plans, model, outcome = acting(replies, protocol="default", rewards="default")
-    assert plans[0].ended == "done" and {plan.conditions[1] for plan in plans} == {
-        4
-    }  # two slices, both there
-    n_tokens, after_goal, up_to = (
-        0,
-        False,
-        [],
-    )  # tokens up to each frame: a word is one, a frame is one
+    # Two slices, both there.
+    assert plans[0].ended == "done" and {plan.conditions[1] for plan in plans} == {4}
+    # Tokens up to each frame: a word is one, a frame is one.
+    n_tokens, after_goal, up_to = (0, False, [])
     for part in model.requests[0][0]:
         n_tokens += 1 if isinstance(part, FrameRef) else len(part.split())
         if isinstance(part, FrameRef) and (not up_to or not after_goal):

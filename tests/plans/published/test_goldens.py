@@ -38,9 +38,8 @@ from infthor_eval.thor.published_actions import ground_published, published_call
 from infthor_eval.thor.view import ThorObject, Vector
 
 GOLDENS = Path(__file__).parents[3] / "../shared/data/published_goldens"
-OURS = (
-    Path(__file__).parents[2] / "goldens"
-)  # outputs of the same functions on inputs made for these tests
+# Outputs of the same functions on inputs made for these tests.
+OURS = Path(__file__).parents[2] / "goldens"
 RULES = reward_rules("published")
 
 
@@ -98,9 +97,8 @@ class _Story:
         )
 
 
-@pytest.mark.parametrize(
-    "every", [20, 1]
-)  # a part of them each time, all of them with the slow tests
+# A part of them each time, all of them with the slow tests.
+@pytest.mark.parametrize("every", [20, 1])
 def test_every_step_earns_and_ends_as_published(every):
     check_rewards(islice(lines("plan_rewards"), None, None, every))
 
@@ -140,11 +138,8 @@ def check_rewards(stories: Iterable[dict[str, Any]]) -> None:
 def read(document: dict[str, Any]) -> Any:
     """A golden trajectory, with what its lines leave out."""
     scene = {"floor_plan": "FloorPlan1"} | document["scene"]
-    goal = {
-        "goal": "pick_and_place_simple",
-        "pickup": "Mug",
-        "receptacle": "CounterTop",
-    }  # read, and not asked for
+    # Read, and not asked for.
+    goal = {"goal": "pick_and_place_simple", "pickup": "Mug", "receptacle": "CounterTop"}
     tasks = [task | {"task_info": task["task_info"] | goal} for task in document["sub_tasks"]]
     parts = [part | {"sub_traj_idx": number} for number, part in enumerate(document["sub_trajs"])]
     whole = document | {"scene": scene, "sub_tasks": tasks, "sub_trajs": parts}
@@ -209,9 +204,8 @@ class _Loop:
             except LookupError:
                 call = None
             self.sent.append([] if call is None else [call])
-            if (
-                answer == "done"
-            ):  # after an error of the service, the loop takes the last event for the present one
+            # After an error of the service, the loop takes the last event for the present one.
+            if answer == "done":
                 last = frame(1000 * (plan.high + 1) + number)
             failed = answer == "refused" or call is None or "receptacleObjectId" in call
             steps.append(StepRecord(reply=text, reward=0.0 if failed else reward))

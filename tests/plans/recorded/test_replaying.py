@@ -53,9 +53,8 @@ def test_a_plan_is_its_start_and_its_actions_as_they_were_recorded(recorded, ses
     assert [frame.number for frame in replayed] == [
         n for plan in plans for n in range(len(plan.payload.steps) + 1)
     ]
-    assert [frame.note for frame in replayed] == [""] * len(
-        replayed
-    )  # the world went where it went then
+    # The world went where it went then.
+    assert [frame.note for frame in replayed] == [""] * len(replayed)
     assert all(frame.observation.frame.shape == (300, 300, 3) for frame in replayed)
     first, walk, end = replayed[0], replayed[1 : len(plans[0].payload.steps)], replayed[-1]
     assert (first.title.number, first.title.n_plans, first.title.text) == (1, 12, "go to the mug")
@@ -64,9 +63,8 @@ def test_a_plan_is_its_start_and_its_actions_as_they_were_recorded(recorded, ses
         None,
         plans[0].payload.max_reward,
     )
-    assert [len(frame.observation.walked) for frame in walk] == list(
-        range(2, len(walk) + 2)
-    )  # MoveAhead each time
+    # MoveAhead each time.
+    assert [len(frame.observation.walked) for frame in walk] == list(range(2, len(walk) + 2))
     assert (end.action, end.ending, end.done, end.observation.held) == (
         "PickupObject Mug",
         "done",
@@ -86,9 +84,8 @@ def test_the_map_has_what_the_plan_is_about_and_where_it_leads(recorded, session
     assert going.goal.at in going.floor
     assert putting.goal is None
     assert {"Bed", "Dresser", "ArmChair"} <= {thing.name for thing in putting.objects}
-    assert not {"Floor", "Pillow", "Mug"} & {
-        thing.name for thing in putting.objects
-    }  # the mug is in the hand
+    # The mug is in the hand.
+    assert not {"Floor", "Pillow", "Mug"} & {thing.name for thing in putting.objects}
 
 
 def test_rewards_add_up_over_the_trajectory(recorded, session):

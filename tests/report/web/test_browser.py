@@ -223,12 +223,8 @@ def test_a_frame_opens_large_with_its_step_and_the_arrows_go_on(page, open_page)
     assert enlarged(tab)["in view"] == ", ".join(facts.objects)
     assert enlarged(tab)["agent"] == facts.pose
     enlarged_frames = [enlarged(tab)["frame"]]
-    for key in (
-        "ArrowRight",
-        "ArrowLeft",
-        "ArrowLeft",
-        "ArrowLeft",
-    ):  # the first one has none before it
+    # The first one has none before it.
+    for key in ("ArrowRight", "ArrowLeft", "ArrowLeft", "ArrowLeft"):
         tab.keyboard.press(key)
         enlarged_frames.append(enlarged(tab)["frame"])
     at = [f"{frame.index}, a clue" if frame.is_clue else str(frame.index) for frame in frames]

@@ -79,9 +79,8 @@ class Deadly(Sums):
                 if len(list(self.folder.glob(f"{unit.key.id}-*"))) < self.kills[unit.key.id]:
                     counted.touch()
                     os.kill(os.getpid(), signal.SIGKILL)
-            time.sleep(
-                0.0 if known else 0.1
-            )  # or one worker would be done before the other is there
+            # Or one worker would be done before the other is there.
+            time.sleep(0.0 if known else 0.1)
             yield known or unit.record("f", Sum(unit.payload.numbers, sum(unit.payload.numbers)))
 
 
@@ -278,12 +277,8 @@ def test_a_result_from_other_inputs_is_named_in_the_record_that_takes_its_place(
     run(request(tmp_path), ToySuite())
     records = run(request(tmp_path), make_suite(Changed))[0].records
     changed = "its inputs changed since attempt 1: a frame, a text or a trajectory is another now"
-    assert [record.faults for record in records] == [
-        (changed,),
-        (changed,),
-        (),
-        (),
-    ]  # the others had failed
+    # The others had failed.
+    assert [record.faults for record in records] == [(changed,), (changed,), (), ()]
 
 
 @pytest.mark.parametrize("again", [False, True])

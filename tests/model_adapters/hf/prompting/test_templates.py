@@ -103,10 +103,8 @@ def test_ids_and_replies_are_those_of_transformers_on_the_bare_sequence(
     conversations: list[tuple[Turn, ...]],
     answer_plainly: Any,
 ) -> None:
-    names = (
-        *FAMILIES,
-        *OTHERS.keys() - {"gemma3-line-breaks"},
-    )  # like gemma3 but for its vocabulary
+    # Like gemma3 but for its vocabulary.
+    names = (*FAMILIES, *OTHERS.keys() - {"gemma3-line-breaks"})
     folders = {name: _without_template(checkpoints[name], tmp_path / name) for name in names}
     models = {name: [_load(name, folders[name], share_prefix="false")] for name in names}
     for name in (*FAMILIES, "llava", "idefics3", "deepseek-vl-1.3b"):

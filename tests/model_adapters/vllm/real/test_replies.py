@@ -68,9 +68,8 @@ def test_of_continuations_the_others_find_the_prefix_of_the_first(
         replies.append(talk.replies(continuations, up_to(8)))
     assert [facts(reply) for reply in replies[0]] == [facts(reply) for reply in replies[1]]
     assert replies[0][0].n_cached_tokens == 0
-    assert all(
-        reply.n_cached_tokens >= 128 for reply in replies[0][1:]
-    )  # a block of vLLM's on a CPU
+    # A block of vLLM's on a CPU.
+    assert all(reply.n_cached_tokens >= 128 for reply in replies[0][1:])
 
 
 def test_a_reply_is_held_to_choices(

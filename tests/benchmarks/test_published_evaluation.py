@@ -9,7 +9,7 @@ import pytest
 
 from infthor_eval.errors import UsageError
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
 @pytest.fixture
@@ -134,9 +134,8 @@ def test_a_trajectory_is_encoded_once_and_windows_by_what_they_share(
 def test_the_haystack_is_the_harness_own(simulation: Any, shape: Any) -> None:
     options = simulation._arguments(["--text-tokens", "0"])
     mode = simulation.Mode("haystack", simulation._haystack_of(1, 0))
-    wide = replace(
-        shape, frame_tokens=100
-    )  # windows of 10 frames, which begin 0, 2, 4, 6, 8 before the clue
+    # Windows of 10 frames, which begin 0, 2, 4, 6, 8 before the clue.
+    wide = replace(shape, frame_tokens=100)
     trajectory = simulation.Trajectory(15, ((5,), (5,)))
     requests, n_missing = simulation.requests(trajectory, mode, wide, options)
     assert n_missing == 4  # two begin before the trajectory, for each of the two questions
@@ -155,9 +154,8 @@ def test_a_run_counts_what_is_too_long_and_what_no_node_has_room_for(
     small = replace(
         machine, memory=100, usable=1.0, gpus_per_node=32, attention="flash_attention_2"
     )
-    trajectories = [
-        simulation.Trajectory(n, ((0,), (1,))) for n in (10, 19, 20, 30)
-    ]  # 198 tokens fit on 32 GPUs, 98 on 16
+    # 198 tokens fit on 32 GPUs, 98 on 16.
+    trajectories = [simulation.Trajectory(n, ((0,), (1,))) for n in (10, 19, 20, 30)]
     rates = costs.Rates(token=36.0, pair=0.0, step=0.0, cached_token=0.0)
     full = simulation.modes(options)[1]
     one = simulation.run(full, shape, trajectories[:2], rates, small, options)

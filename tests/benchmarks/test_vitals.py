@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from .helpers.benchmarks import FOLDER, load_benchmark
+from ..helpers.benchmarks import FOLDER, load_benchmark
 
 VITALS = load_benchmark("vitals")
 PRINTS = 'import json; print(json.dumps({"a": {"b": [3, 4.5]}, "yes": True}))'

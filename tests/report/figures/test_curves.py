@@ -19,11 +19,11 @@ from infthor_eval.report.figures.curves import draw_curves
 from infthor_eval.report.figures.style import looks_of
 from infthor_eval.runs import read_run
 
-from ..helpers.journals import write_run
-from ..helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
-from ..helpers.trajectories import CANDLE, cut_trajectory, write_trajectories
+from ...helpers.journals import write_run
+from ...helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
+from ...helpers.trajectories import CANDLE, cut_trajectory, write_trajectories
 
-EXAMPLE = Path(__file__).parents[2] / "docs" / "figure7_panels.yaml"
+EXAMPLE = Path(__file__).parents[3] / "docs" / "figure7_panels.yaml"
 
 
 def records(reward: float, *, tokens: bool = True):
@@ -274,9 +274,8 @@ def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run_cli, mo
         for name in (FT[32], f"{FT[32]}-longrope4", f"{FT[32]}-yarn4")
     }
     plain, longrope, yarn = replies.values()
-    assert (
-        plain == longrope != yarn
-    )  # as the published logs; contexts are within the original length
+    # As the published logs; contexts are within the original length.
+    assert plain == longrope != yarn
     assert not any("continuation" in word or "differ" in word for word in words)
 
 

@@ -19,7 +19,7 @@ from infthor_eval.formats.frames import FrameRef
 from model_adapters import check_adapter, load
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
-from ..asking import up_to
+from ...asking import up_to
 
 
 @pytest.fixture(scope="module")

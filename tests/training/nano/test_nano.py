@@ -26,7 +26,7 @@ from infthor_eval.training.nano.stages import train_small_model
 from infthor_eval.training.nano.synthetic_plans import SyntheticPlans
 from model_adapters import check_adapter, load
 
-from ..helpers.bundled import bundled_name
+from ...helpers.bundled import bundled_name
 
 SMALL = NanoRecipe(
     title="small",

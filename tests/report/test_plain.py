@@ -10,7 +10,7 @@ from infthor_eval.report.runs import ReportRun
 from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.runs import NOTHING, RunHeader, UnitRecord
 
-from ...helpers.toy_suite import Sum, ToySuite
+from ..helpers.toy_suite import Sum, ToySuite
 
 
 def record(a, b, answer, **more):

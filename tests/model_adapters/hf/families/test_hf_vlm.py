@@ -22,7 +22,7 @@ from model_adapters.tiny.pixtral import PixtralTiny
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny, save_tiny_checkpoint
 from model_adapters.tiny.twin import HIDDEN
 
-from ..asking import up_to, user
+from ...asking import up_to, user
 
 
 def _load(folder: Path, **options: str) -> Any:
