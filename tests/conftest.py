@@ -16,7 +16,10 @@ from infthor_eval.formats.question import Question
 from infthor_eval.runs import Catalog
 
 from .helpers.browser import browser, open_page  # noqa: F401 - fixtures
-from .helpers.command_line import run_cli  # noqa: F401 - a fixture
+from .helpers.command_line import (
+    option_words,
+    run_cli,  # noqa: F401 - a fixture
+)
 from .helpers.simulators import simulator  # noqa: F401 - a fixture
 from .helpers.trajectories import MUG, cut_trajectory, write_trajectories
 from .processor_times import read_slow_tests
@@ -102,16 +105,7 @@ def scripted_data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def scripted_run(tmp_path_factory: pytest.TempPathFactory, scripted_data: Path) -> Path:
     """The folder of a run of plans: the baseline `scripted` in one trajectory."""
     output = tmp_path_factory.mktemp("scripted")
-    words = (
-        "--model",
-        "scripted",
-        "--tasks",
-        "infthor_plans",
-        "--data",
-        scripted_data,
-        "--output",
-        output,
-    )
+    words = option_words(model="scripted", tasks="infthor_plans", data=scripted_data, output=output)
     with pytest.raises(SystemExit) as ended:
         main([str(word) for word in words])
     assert ended.value.code == 0

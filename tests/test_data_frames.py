@@ -21,6 +21,7 @@ from infthor_eval.report.suites.nieh_columns import NIEH_COLUMNS
 from infthor_eval.runs import RunHeader, UnitRecord
 from infthor_eval.runs.stored.search import read_results
 from infthor_eval.suites import find_presenter, find_suite
+from tests.helpers.command_line import option_words
 from tests.helpers.journals import write_journal
 from tests.helpers.nieh_runs import make_config, make_record
 
@@ -40,18 +41,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folders = {}
     for suite, (model, task, limit) in TASKS.items():
         with pytest.raises(SystemExit) as ended:
-            main(
-                [
-                    "--model",
-                    model,
-                    "--tasks",
-                    task,
-                    "--limit",
-                    limit,
-                    "--output",
-                    str(output / suite),
-                ]
-            )
+            main(option_words(model=model, tasks=task, limit=limit, output=str(output / suite)))
         assert ended.value.code == 0
         (folders[suite],) = (output / suite / model).iterdir()
     return folders

@@ -13,6 +13,7 @@ from infthor_eval.errors import InfthorError, UsageError
 from infthor_eval.report.plain import PlainPresenter
 from infthor_eval.runs import Catalog
 from infthor_eval.suites import find_presenter, find_suite, options_class, suite_code, suite_names
+from tests.helpers.command_line import option_words
 
 ROOT = Path(__file__).parents[1]
 SUITE = """
@@ -70,15 +71,7 @@ def command(package, *arguments):
 
 def test_a_suite_of_another_package_runs_with_its_task_and_its_options(package):
     done = command(
-        package,
-        "--model",
-        "adder",
-        "--tasks",
-        "sums",
-        "--abacus",
-        "bone",
-        "--output",
-        package / "out",
+        package, *option_words(model="adder", tasks="sums", abacus="bone", output=package / "out")
     )
     assert done.returncode == 1, done.stderr  # two of its sums cannot be done
     assert "the abacus is broken" in done.stderr

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from .helpers.benchmarks import load_benchmark
+from .helpers.command_line import option_words
 
 BUILDING = load_benchmark("wheel_size")
 
@@ -74,12 +75,7 @@ def test_what_runs_is_the_installed_code(installed, tmp_path):
 def test_it_runs_in_an_empty_folder(command, tmp_path):
     assert "nieh_haystack_128k" in command("ls", "tasks")
     words = (
-        "--model",
-        "blind,oracle,qwen2.5-vl-nano",
-        "--tasks",
-        "nieh_mini_gt",
-        "--limit",
-        "20",
+        *option_words(model="blind,oracle,qwen2.5-vl-nano", tasks="nieh_mini_gt", limit="20"),
         "--full",
     )
     table = command(*words)

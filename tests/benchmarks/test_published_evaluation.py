@@ -9,6 +9,8 @@ import pytest
 
 from infthor_eval.errors import UsageError
 
+from ..helpers.command_line import option_words
+
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
 
@@ -179,16 +181,9 @@ def test_a_run_counts_what_is_too_long_and_what_no_node_has_room_for(
 def test_the_same_seed_gives_the_same_table(
     simulation: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [
-        "--trajectories",
-        "3",
-        "--haystack",
-        "8",
-        "--prefill",
-        "pixtral=1000:9000,9000:6000",
-        "--decode",
-        "pixtral=9",
-    ]
+    words = option_words(
+        trajectories="3", haystack="8", prefill="pixtral=1000:9000,9000:6000", decode="pixtral=9"
+    )
     options = simulation._arguments(words)
     trajectories = simulation.draw(options)
     assert trajectories == simulation.draw(options)

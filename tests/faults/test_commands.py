@@ -7,29 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from ..helpers.command_line import assert_refused
+from ..helpers.command_line import assert_refused, option_words
 
 RUN = ["--model", "oracle", "--tasks", "nieh_gt", "--data", "SET"]
 VIDEO = ["--model", "oracle", "--tasks", "nieh_video", "--data", "SET", "--output", "OUT"]
-PUBLISHED = [
-    "--model",
-    "oracle",
-    "--tasks",
-    "nieh_published_full",
-    "--data",
-    "SET",
-    "--output",
-    "OUT",
-]
+PUBLISHED = option_words(model="oracle", tasks="nieh_published_full", data="SET", output="OUT")
 TINY = [
-    "--model",
-    "qwen2.5-vl-tiny",
-    "--tasks",
-    "nieh_gt",
-    "--data",
-    "SET",
-    "--output",
-    "OUT",
+    *option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data="SET", output="OUT"),
     "--model-args",
 ]
 GENERATE = ["generate", "--scene", "kitchen-1", "--min-steps", 1]
@@ -118,12 +102,7 @@ TYPED = [
         [
             "validate",
             "SET",
-            "--models",
-            "oracle",
-            "--out",
-            "OUT",
-            "--scorer",
-            "strict",
+            *option_words(models="oracle", out="OUT", scorer="strict"),
             "--scorer",
             "strict",
         ],
@@ -179,17 +158,7 @@ TYPED = [
         "share the generation of data, which only the recipe tiny without --data does",
     ),
     (
-        [
-            "train",
-            "--recipe",
-            "final_text",
-            "--data",
-            "SET",
-            "--out",
-            "OUT",
-            "--set",
-            "prompt=plain",
-        ],
+        ["train", *option_words(recipe="final_text", data="SET", out="OUT", set="prompt=plain")],
         "final_text.yaml: not a recipe (actions of the form text follow a system prompt; set "
         "prompt to chat); fix the",
     ),

@@ -30,7 +30,7 @@ from model_adapters.hf.cached.model import TransformersModel
 from model_adapters.protocols import Decoding
 
 from ..conftest import QUESTIONS
-from ..helpers.command_line import assert_refused
+from ..helpers.command_line import assert_refused, option_words
 from ..helpers.questions import make_question
 from ..helpers.refusals import assert_raises_one_line
 from .test_files import IMAGES
@@ -152,16 +152,7 @@ def test_what_is_damaged_in_a_set_costs_its_own_questions(make_nieh_set, tmp_pat
     damage, n_answered, n_skipped = SETS[name]
     data = make_nieh_set(size=56)
     damage(data)
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "out")
     code, _, err = run_cli(*arguments)
     assert code == 0, err
     assert f"{n_answered} evaluated now" in err
@@ -192,14 +183,9 @@ def test_a_frame_that_no_model_can_take_fails_alone(
 ):
     data = make_nieh_set(size=56)
     LATE[name](data)
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--model-args",
-        f"batch_size={batch_size}",
-        "--tasks",
-        "nieh_gt",
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", model_args=f"batch_size={batch_size}", tasks="nieh_gt"
+    )
     code, _, err = run_cli(*arguments, "--data", data, "--output", tmp_path / "out")
     assert code == 1
     assert "5 evaluated now" in err
@@ -236,16 +222,9 @@ def test_a_question_that_is_too_long_fails_alone(make_nieh_set, tmp_path, run_cl
     long = Question("traj_b", "Is there " + "a very large " * 2000 + "sink?", (0,), ("no",))
     data = make_nieh_set([*SOUND, long], size=56)
     model_args = f"batch_size={batch_size},max_tokens=1000"
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--model-args",
-        model_args,
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", model_args=model_args, tasks="nieh_gt", data=data
+    )
     code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 1
     assert "nieh_gt: 1 sample(s) failed" in err
@@ -256,16 +235,9 @@ def test_a_haystack_without_a_usable_question_ends_the_same_way(
     make_nieh_set, tmp_path, run_cli, model
 ):
     data = make_nieh_set([make_question(clues=(99,))], size=56)
-    arguments = [
-        "--model",
-        model,
-        "--tasks",
-        "nieh_haystack_8k",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model=model, tasks="nieh_haystack_8k", data=data, output=tmp_path / "out"
+    )
     assert_refused(run_cli(*arguments), "can be asked (clue 99 is outside trajectory t (6 frames))")
 
 
@@ -326,14 +298,7 @@ def test_a_disk_that_is_full_while_trajectories_are_made_keeps_those_that_are(
 ):
     arguments = [
         "generate",
-        "--scene",
-        "kitchen-1",
-        "--min-steps",
-        1,
-        "--min-subgoals",
-        1,
-        "--out",
-        tmp_path,
+        *option_words(scene="kitchen-1", min_steps=1, min_subgoals=1, out=tmp_path),
     ]
     assert run_cli(*arguments)[0] == 0
     first = (tmp_path / "kitchen-1-seed0.json").read_bytes()

@@ -5,7 +5,7 @@ import pytest
 from infthor_eval.runs import Catalog
 from infthor_eval.suites import find_suite
 
-from ..helpers.command_line import assert_refused
+from ..helpers.command_line import assert_refused, option_words
 
 SETTING = "own.yaml: dataset_kwargs:"
 HEAD = "include: _nieh.yaml\ntask: own\n"
@@ -140,16 +140,9 @@ def test_a_larger_document_is_read_where_the_limit_is_raised(
     make_nieh_set, tmp_path, run_cli, task_files, monkeypatch
 ):
     (task_files / "nieh" / "own.yaml").write_text(CLUES + "}\na: &a [1, 1, 1, 1]\nb: [*a, *a]\n")
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "own",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="oracle", tasks="own", data=make_nieh_set(size=56), output=tmp_path / "out"
+    )
     monkeypatch.setenv("INFTHOR_EVAL_MAX_YAML_NODES", "10")
     assert_refused(run_cli(*arguments), "has more than 10 values")
     monkeypatch.delenv("INFTHOR_EVAL_MAX_YAML_NODES")

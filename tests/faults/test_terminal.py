@@ -5,6 +5,7 @@ import pytest
 from infthor_eval.report.terminal import print_table, table_console
 from infthor_eval.tables import Column, Row, Table
 
+from ..helpers.command_line import option_words
 from ..helpers.questions import make_question
 
 NASTY = {
@@ -66,12 +67,9 @@ def test_what_is_said_of_a_skipped_question_is_text(make_nieh_set, tmp_path, run
 @pytest.mark.parametrize("name", NASTY)
 def test_an_error_is_text(tmp_path, run_cli, name):
     code, out, err = run_cli(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        tmp_path / NASTY[name].replace("/", "|"),
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=tmp_path / NASTY[name].replace("/", "|")
+        )
     )
     assert (code, out) == (2, "")
     assert _is_clean(err)

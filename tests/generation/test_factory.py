@@ -27,6 +27,8 @@ from infthor_eval.thor.recorder import object_log
 from infthor_eval.thor.restore import restore
 from infthor_eval.thor.simulator import Simulator
 
+from ..helpers.command_line import option_words
+
 SHARED = Path(__file__).parents[2] / "../shared/data"
 
 
@@ -234,14 +236,7 @@ def test_a_pool_of_tasks_that_is_exhausted_begins_again(simulator):
 def test_the_same_bytes_come_out_after_a_kill_with_roll_backs(run_cli, tmp_path):
     words = [
         "generate",
-        "--scene",
-        "kitchen-5",
-        "--seed",
-        "5",
-        "--min-steps",
-        "150",
-        "--min-subgoals",
-        "1",
+        *option_words(scene="kitchen-5", seed="5", min_steps="150", min_subgoals="1"),
     ]
     words += ["--max-fail", "1"]
     assert run_cli(*words, "--out", tmp_path / "whole")[0] == 0

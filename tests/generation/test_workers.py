@@ -2,6 +2,8 @@
 
 from infthor_eval.storage.digests import digest_of_file
 
+from ..helpers.command_line import option_words
+
 SCENES = ("--scene", "kitchen-1", "--scene", "bedroom-2", "--min-steps", 20, "--min-subgoals", 1)
 
 
@@ -26,10 +28,7 @@ def test_the_files_are_the_same_whoever_makes_them(run_cli, tmp_path):
             run_cli(
                 "questions",
                 out / "set",
-                "--out",
-                out / "set" / "qa_set_q.csv",
-                "--workers",
-                workers,
+                *option_words(out=out / "set" / "qa_set_q.csv", workers=workers),
             )[0]
             == 0
         )

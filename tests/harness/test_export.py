@@ -10,20 +10,14 @@ from lm_eval.utils import (
 )
 
 from tests.harness.conftest import samples
+from tests.helpers.command_line import option_words
 from tests.helpers.files import find_one
 
 
 def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run_cli):
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path,
-    ]
+    arguments = option_words(
+        model="oracle", tasks="nieh", data=make_nieh_set(size=56), output=tmp_path
+    )
     assert run_cli(*arguments)[0] == 0
     names = [str(path) for path in find_one(tmp_path, "lm_eval").rglob("*.json*")]
     (results,) = get_results_filenames(names)
@@ -46,14 +40,7 @@ def test_datasets_reads_the_samples(make_nieh_set, tmp_path, run_cli):
     from datasets import load_dataset
 
     run_cli(
-        "--model",
-        "blind",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path,
+        *option_words(model="blind", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path)
     )
     rows = load_dataset(
         "json", data_files=str(find_one(tmp_path, "samples_*.jsonl")), split="train"
@@ -76,16 +63,7 @@ def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path,
-    ]
+    arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path)
     assert run_cli(*arguments)[0] == 1
     rows = samples(tmp_path)["nieh_gt"]
     assert len(rows) == 5

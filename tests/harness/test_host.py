@@ -8,6 +8,7 @@ import pytest
 
 from infthor_eval.storage.packaged import packaged_folder
 from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, samples
+from tests.helpers.command_line import option_words
 
 PEERS = Path(sys.prefix) / "test-peers"
 SHIM = Path(__file__).parents[1] / "peers"
@@ -20,16 +21,9 @@ def ours(make_nieh_set, tmp_path, run_cli):
 
     def ours(model, *options):
         data = make_nieh_set()
-        arguments = [
-            "--model",
-            model,
-            "--tasks",
-            "nieh_gt,nieh_full",
-            "--data",
-            data,
-            "--output",
-            tmp_path / "ours",
-        ]
+        arguments = option_words(
+            model=model, tasks="nieh_gt,nieh_full", data=data, output=tmp_path / "ours"
+        )
         code, _, err = run_cli(*arguments, *options)
         assert code == 0, err
         return data, samples(tmp_path / "ours")

@@ -11,6 +11,7 @@ import pytest
 from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import read_run
 from tests.harness.conftest import OURS, samples
+from tests.helpers.command_line import option_words
 from tests.helpers.files import find_one
 from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
 
@@ -53,16 +54,9 @@ def short(task_files):
 
 def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run_cli, start):
     data = write_trajectories(tmp_path / "data", cut_trajectory(MUG, 6))
-    arguments = [
-        "--model",
-        TINY,
-        "--tasks",
-        "manipulathor_pickup",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "ours",
-    ]
+    arguments = option_words(
+        model=TINY, tasks="manipulathor_pickup", data=data, output=tmp_path / "ours"
+    )
     code, _, err = run_cli(*arguments)
     assert code == 0, err
     _, records = read_run(find_one(tmp_path / "ours", "journal").parent, RECORDS)

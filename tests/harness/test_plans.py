@@ -11,6 +11,7 @@ from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.storage.packaged import packaged_folder
 from tests.harness.conftest import LM_EVAL, samples
+from tests.helpers.command_line import option_words
 from tests.helpers.files import find_one
 from tests.helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
 
@@ -29,16 +30,7 @@ def test_one_request_a_trajectory_and_what_our_own_run_finds(tmp_path, task_file
         "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {plans: all, max_steps: 3}\n"
     )
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 3), cut_trajectory(MUG, 2))
-    arguments = [
-        "--model",
-        TINY,
-        "--tasks",
-        "infthor_plans",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "ours",
-    ]
+    arguments = option_words(model=TINY, tasks="infthor_plans", data=data, output=tmp_path / "ours")
     code, _, err = run_cli(*arguments, "--greedy", "--constrained")
     assert code == 0, err
     _, records = read_run(find_one(tmp_path / "ours", "journal").parent, RECORDS)

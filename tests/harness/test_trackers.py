@@ -8,22 +8,16 @@ from unittest.mock import create_autospec
 import pytest
 from huggingface_hub import HfApi
 
+from ..helpers.command_line import option_words
 from . import tracker_doubles
 
 
 @pytest.fixture
 def run_words(make_nieh_set, tmp_path):
     """The words of a run of five questions."""
-    return [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
-    ]
+    return option_words(
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+    )
 
 
 @pytest.fixture

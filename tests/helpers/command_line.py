@@ -7,7 +7,7 @@ import pytest
 
 from infthor_eval.cli import main
 
-__all__ = ["CliRunner", "assert_refused", "read_remarks", "run_cli"]
+__all__ = ["CliRunner", "assert_refused", "option_words", "read_remarks", "run_cli"]
 
 CliRunner = Callable[..., tuple[int, str, str]]
 
@@ -24,6 +24,15 @@ def run_cli(capfd: pytest.CaptureFixture[str]) -> CliRunner:
         return ended.value.code, *capfd.readouterr()
 
     return run_cli
+
+
+def option_words(**options: object) -> list[str]:
+    """The words of options as they are typed: `max_steps=3` is `--max-steps 3`."""
+    return [
+        word
+        for name, value in options.items()
+        for word in (f"--{name.replace('_', '-')}", str(value))
+    ]
 
 
 def read_remarks(error_text: str) -> list[str]:

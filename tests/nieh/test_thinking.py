@@ -7,6 +7,7 @@ import pytest
 from infthor_eval.formats.question import Question
 from model_adapters import Reply
 from model_adapters.built_in import BUILT_IN, BuiltIn
+from tests.helpers.command_line import option_words
 from tests.model_adapters.toy_adapter import Talk, Toy
 
 QUESTIONS = tuple(
@@ -73,16 +74,7 @@ def test_thoughts_are_taken_off_and_kept(make_nieh_set, tmp_path, run_cli):
 
 def test_thoughts_have_a_budget_of_their_own(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(QUESTIONS, size=56)
-    arguments = [
-        "--model",
-        "toy",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(model="toy", tasks="nieh_gt", data=data, output=tmp_path / "out")
     assert run_cli(*arguments, "--max-thinking-tokens", 1000)[0] == 0
     assert {limit for limit, _ in LIMITS} == {1050}
     assert "0 evaluated now" not in run_cli(*arguments)[2]  # another run
@@ -100,18 +92,9 @@ def test_a_stop_string_ends_the_answer_and_not_the_thoughts(
         "include: _nieh.yaml\ntask: own\ndataset_kwargs: {context: clues}\n"
         'generation_kwargs: {until: ["\\n"], max_gen_toks: 20, do_sample: false}\n'
     )
-    arguments = [
-        "--model",
-        "toy",
-        "--tasks",
-        "own",
-        "--include-path",
-        tmp_path,
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="toy", tasks="own", include_path=tmp_path, data=data, output=tmp_path / "out"
+    )
     code, _, err = run_cli(*arguments, "--max-thinking-tokens", 100)
     assert code == 0, err
     assert LIMITS == [(120, ())]

@@ -9,6 +9,7 @@ import pytest
 from infthor_eval.formats.nieh_set import NiehSet
 from model_adapters import check_adapter
 from model_adapters.built_in import BUILT_IN, BuiltIn
+from tests.helpers.command_line import option_words
 from tests.model_adapters.toy_adapter import Talk, Toy
 
 from ..helpers.bundled import BUNDLED
@@ -71,16 +72,9 @@ def test_an_error_in_its_code_has_its_place_and_its_traceback_is_kept(
 
 def test_a_context_that_is_measured_in_tokens_wants_their_number(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(n_frames=70, size=56)
-    arguments = [
-        "--model",
-        "toy",
-        "--tasks",
-        "nieh_truncate_head_8k",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="toy", tasks="nieh_truncate_head_8k", data=data, output=tmp_path / "out"
+    )
     code, _, err = run_cli(*arguments)
     assert (code, len(err.strip().splitlines())) == (2, 1)
     assert "a size in tokens, which toy does not count; give --tokens-per-frame" in err

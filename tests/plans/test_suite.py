@@ -11,6 +11,7 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.published import PublishedRow, PublishedTable
 from infthor_eval.runs import execute
 
+from ..helpers.command_line import option_words
 from ..helpers.refusals import read_one_line
 from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
@@ -220,15 +221,8 @@ def test_where_all_is_left_out_the_exit_code_says_so(run_cli, tmp_path):
     document = cut_trajectory(MUG, 2)
     document["scene"]["floor_plan"] = "FloorPlan7"
     data = write_trajectories(tmp_path / "elsewhere", document)
-    arguments = (
-        "--model",
-        "scripted",
-        "--tasks",
-        "infthor_plans",
-        "--data",
-        str(data),
-        "--output",
-        str(tmp_path / "o"),
+    arguments = option_words(
+        model="scripted", tasks="infthor_plans", data=str(data), output=str(tmp_path / "o")
     )
     code, out, err = run_cli("run", *arguments)
     assert code == 1
@@ -363,16 +357,9 @@ def test_where_no_trajectory_has_a_final_task_that_is_said(prepared, run_cli, da
         prepared(tasks=("infthor_final",))
     read_one_line(caught)
     code, out, err = run_cli(
-        "--model",
-        "planner",
-        "--tasks",
-        "infthor_final",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "o",
-        "--limit",
-        3,
+        *option_words(
+            model="planner", tasks="infthor_final", data=data, output=tmp_path / "o", limit=3
+        )
     )
     assert (code, out) == (2, "")
     assert len(err.strip().splitlines()) == 1

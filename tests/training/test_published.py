@@ -9,6 +9,8 @@ from infthor_eval.training.published import import_weights
 from infthor_eval.training.starting_model import load_starting_model
 from model_adapters import load
 
+from ..helpers.command_line import option_words
+
 
 def tiny(seed):
     return load_starting_model("llava-onevision-tiny", {}, "plain", seed)
@@ -81,12 +83,7 @@ def test_a_chat_keeps_the_chat_template(tmp_path, run_cli):
     words = (
         "import-checkpoint",
         folder,
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--prompt",
-        "chat",
-        "--out",
-        tmp_path / "out",
+        *option_words(model="qwen2.5-vl-tiny", prompt="chat", out=tmp_path / "out"),
     )
     code, _, err = run_cli(*words)
     assert code == 0, err
@@ -101,10 +98,7 @@ def test_the_command_writes_what_the_adapter_loads(tmp_path, run_cli):
     words = [
         "import-checkpoint",
         folder,
-        "--model",
-        "llava-onevision-tiny",
-        "--out",
-        tmp_path / "out",
+        *option_words(model="llava-onevision-tiny", out=tmp_path / "out"),
     ]
     code, output, err = run_cli(*words)
     assert (code, "0 kept, 0 other tensors ignored" in output) == (0, True), err

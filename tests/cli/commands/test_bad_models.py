@@ -11,6 +11,7 @@ from infthor_eval.formats.question import Question
 from model_adapters.tiny.qwen2_5_vl import Qwen25VLTiny
 
 from ...conftest import QUESTIONS
+from ...helpers.command_line import option_words
 from ...model_adapters.checkpoints import save
 
 
@@ -33,16 +34,7 @@ def ask(make_nieh_set, tmp_path, run_cli):
             f"{key}={value}"
             for key, value in {"pretrained": folder, "device": "cpu", **model_args}.items()
         )
-        arguments = [
-            "--model",
-            model,
-            "--model-args",
-            settings,
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            data,
-        ]
+        arguments = option_words(model=model, model_args=settings, tasks="nieh_gt", data=data)
         return run_cli(*arguments, "--output", tmp_path / "out", *options)
 
     return ask
@@ -147,16 +139,9 @@ def test_a_context_beyond_the_limit_is_recorded_with_its_tokens_and_the_limit(
     make_nieh_set, tmp_path, run_cli, records_in
 ):
     data = make_nieh_set()
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--model-args",
-        "max_tokens=600",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", model_args="max_tokens=600", tasks="nieh", data=data
+    )
     code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
     records = records_in(tmp_path / "out")
     failed = [record for record in records if record.failure]
@@ -177,16 +162,9 @@ def test_a_question_with_the_models_image_token_fails_alone(
 ):
     bad = Question("traj_b", "What is <|image_pad|>?", (3,), ("mug",))
     data = make_nieh_set([*QUESTIONS, bad], size=56)
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+    )
     assert run_cli(*arguments)[0] == 1
     (failed,) = [record for record in records_in(tmp_path / "out") if record.failure]
     assert failed.payload.question == bad.text
@@ -236,16 +214,9 @@ def test_out_of_memory_in_mid_run_costs_the_contexts_that_are_too_large(
     install("cramped", f"{__name__}:Cramped")
     long = Question("traj_a", "What did you see?", (0, 1, 2, 3, 4), ("mug",))
     data = make_nieh_set([QUESTIONS[0], long, *QUESTIONS[3:]])
-    arguments = [
-        "--model",
-        "cramped",
-        "--model-args",
-        f"batch_size={batch_size}",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-    ]
+    arguments = option_words(
+        model="cramped", model_args=f"batch_size={batch_size}", tasks="nieh", data=data
+    )
     code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 1
     assert "Traceback" not in err

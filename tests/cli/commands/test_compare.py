@@ -5,6 +5,7 @@ from msgspec.structs import replace
 
 from infthor_eval.plans.records import StepRecord
 
+from ...helpers.command_line import option_words
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_plans_run
 
@@ -42,14 +43,9 @@ def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
 
 def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_path, run_cli):
     run_cli(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out"
+        )
     )
     (ours,) = (tmp_path / "out" / "oracle").iterdir()
     old = tmp_path / "old"
@@ -110,18 +106,9 @@ def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(
 ):
     data = make_nieh_set(size=56)
     for seed in (0, 1):
-        arguments = [
-            "--model",
-            "random",
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            data,
-            "--output",
-            tmp_path,
-            "--seed",
-            seed,
-        ]
+        arguments = option_words(
+            model="random", tasks="nieh_gt", data=data, output=tmp_path, seed=seed
+        )
         assert run_cli(*arguments)[0] == 0
     folders = sorted(
         (tmp_path / "random").iterdir(),
@@ -133,15 +120,8 @@ def test_runs_of_one_name_are_told_apart_by_the_options_that_differ(
 
 
 def test_blank_frames_are_part_of_the_name(make_nieh_set, tmp_path, run_cli):
-    words = (
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path,
-        "--frames",
-        "shown,blank",
+    words = option_words(
+        tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path, frames="shown,blank"
     )
     assert run_cli("--model", "oracle", *words)[0] == 0
     folders = sorted(

@@ -12,6 +12,8 @@ from infthor_eval.cli import main
 from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.formats.qa_csv import read_questions
 
+from ...helpers.command_line import option_words
+
 
 def _print(*arguments: object) -> dict:
     """What our command prints with --json, in a fixture of the module, which has no `run`."""
@@ -149,15 +151,8 @@ def test_a_set_of_another_version_is_neither_continued_nor_evaluated(
     for arguments in (
         ("replay", made_folder / "trajectories", "--out", tmp_path / "set"),
         ("questions", tmp_path / "set", "--out", tmp_path / "set/qa_set_new.csv"),
-        (
-            "--model",
-            "oracle",
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            tmp_path / "set",
-            "--output",
-            tmp_path / "runs",
+        option_words(
+            model="oracle", tasks="nieh_gt", data=tmp_path / "set", output=tmp_path / "runs"
         ),
     ):
         code, _, err = run_cli(*arguments)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from ...helpers.command_line import option_words
+
 EXAMPLES = Path(__file__).parents[3] / "examples" / "memories"
 
 
@@ -42,29 +44,11 @@ def test_a_broken_memory_has_a_line_for_each_clause(tmp_path, run_cli):
             "no task of nieh_mini_gt leaves",
         ),
         (
-            (
-                "--model",
-                "oracle",
-                "--tasks",
-                "nieh_mini_memory",
-                "--memory",
-                "last",
-                "--budget",
-                "0",
-            ),
+            option_words(model="oracle", tasks="nieh_mini_memory", memory="last", budget="0"),
             "--budget 0: give",
         ),
         (
-            (
-                "--model",
-                "oracle",
-                "--tasks",
-                "nieh_mini_memory",
-                "--memory",
-                "last",
-                "--retriever",
-                "x",
-            ),
+            option_words(model="oracle", tasks="nieh_mini_memory", memory="last", retriever="x"),
             "--retriever:",
         ),
     ],
@@ -86,15 +70,8 @@ def test_all_are_listed_with_their_options(run_cli):
 
 
 def test_a_run_for_each_memory_and_budget_with_a_table_of_all(tmp_path, run_cli):
-    typed = (
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_mini_memory",
-        "--limit",
-        4,
-        "--output",
-        tmp_path,
+    typed = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_mini_memory", limit=4, output=tmp_path
     )
     code, out, err = run_cli(*typed, "--memory", "last,oracle", "--budget", "30,1k")
     assert code == 0, err
@@ -127,15 +104,8 @@ def test_a_memory_that_fails_fails_its_questions_alone(tmp_path, run_cli):
     path = tmp_path / "mine.py"
     fails = "        if len(query.text) % 2:\n            raise KeyError('mug')\n        room ="
     path.write_text((EXAMPLES / "changes.py").read_text().replace("        room =", fails))
-    typed = (
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_mini_memory",
-        "--limit",
-        12,
-        "--output",
-        tmp_path / "out",
+    typed = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_mini_memory", limit=12, output=tmp_path / "out"
     )
     _, _, err = run_cli(*typed, "--memory", f"{path}:Changes")
     (journal,) = (tmp_path / "out").rglob("worker-0.jsonl")

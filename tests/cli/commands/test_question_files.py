@@ -9,6 +9,8 @@ import pytest
 from infthor_eval.formats.qa_csv import write_questions
 from infthor_eval.formats.question import PublishedColumns, Question
 
+from ...helpers.command_line import option_words
+
 PUBLISHED = Path(__file__).parents[3] / "../shared/data/published_sets"
 FILES = ("qa_set_nieh_single_clue.csv", "qa_set_nsieh_multi_clue.csv")
 
@@ -28,15 +30,8 @@ def results_of(output, model):
 
 def test_baselines_run_on_them(alone, tmp_path, run_cli):
     out = tmp_path / "out"
-    words = (
-        "--model",
-        "oracle,blind,blind-count,random",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        alone,
-        "--output",
-        out,
+    words = option_words(
+        model="oracle,blind,blind-count,random", tasks="nieh_gt", data=alone, output=out
     )
     code, _, err = run_cli(*words)
     assert code == 0, err
@@ -74,10 +69,7 @@ def test_further_forms_are_refused_in_the_published_words(make_nieh_set, tmp_pat
     words = (
         "questions",
         make_nieh_set(size=56),
-        "--out",
-        tmp_path / "a.csv",
-        "--words",
-        "published",
+        *option_words(out=tmp_path / "a.csv", words="published"),
         "--further",
     )
     code, out, err = run_cli(*words)
@@ -165,23 +157,9 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
         (
             "import-replies",
             log,
-            "--data",
-            tmp_path,
-            "--model",
-            "m",
-            "--output",
-            tmp_path / "out",
+            *option_words(data=tmp_path, model="m", output=tmp_path / "out"),
         ): 1,
-        (
-            "--model",
-            "oracle",
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            tmp_path,
-            "--output",
-            tmp_path / "out",
-        ): 0,
+        option_words(model="oracle", tasks="nieh_gt", data=tmp_path, output=tmp_path / "out"): 0,
     }
     for command, code in commands.items():
         ended, _, err = run_cli(*command)

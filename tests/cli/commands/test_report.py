@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from ...helpers.command_line import assert_refused
+from ...helpers.command_line import assert_refused, option_words
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
 
@@ -57,14 +57,9 @@ def test_what_is_no_run_of_plans_is_refused(folders, make_nieh_set, tmp_path, ru
         f"{tmp_path}: no journal in it; give the folder of a run",
     )
     run_cli(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "nieh",
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "nieh"
+        )
     )
     (nieh_run,) = (tmp_path / "nieh" / "oracle").iterdir()
     assert_refused(
@@ -102,14 +97,12 @@ def test_misuse_is_one_line(folders, tmp_path, run_cli):
 
 def test_a_page_is_written_and_its_size_is_told(make_nieh_set, tmp_path, run_cli):
     run_cli(
-        "--model",
-        "oracle,blind",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
+        *option_words(
+            model="oracle,blind",
+            tasks="nieh_gt",
+            data=make_nieh_set(size=56),
+            output=tmp_path / "out",
+        )
     )
     runs = [
         folder for model in ("oracle", "blind") for folder in (tmp_path / "out" / model).iterdir()
@@ -131,12 +124,7 @@ def test_replays_are_counted_with_the_time_left_also_where_there_is_no_terminal(
     code, out, err = run_cli(
         "report",
         scripted_run,
-        "--data",
-        scripted_data,
-        "--episodes",
-        3,
-        "--out",
-        tmp_path / "report.html",
+        *option_words(data=scripted_data, episodes=3, out=tmp_path / "report.html"),
     )
     assert code == 0
     assert "12 samples, " in out

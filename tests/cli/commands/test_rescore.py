@@ -10,6 +10,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.storage.digests import fingerprint
 
+from ...helpers.command_line import option_words
 from ...helpers.nieh_runs import make_record
 from .rescored import REPLIES, lines_of, row, scores_in
 
@@ -114,14 +115,7 @@ def test_a_run_of_ours_has_the_scores_that_it_had(make_nieh_set, run_cli, rescor
     data = make_nieh_set(size=56)
     assert (
         run_cli(
-            "--model",
-            "oracle",
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            data,
-            "--output",
-            tmp_path / "first",
+            *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "first")
         )[0]
         == 0
     )

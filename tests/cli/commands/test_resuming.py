@@ -8,6 +8,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_header, read_run
 from infthor_eval.runs.journals.journal import Journal
 
+from ...helpers.command_line import option_words
 from ...helpers.files import find_one
 
 
@@ -17,16 +18,7 @@ def ask(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
 
     def ask(*options, model="qwen2.5-vl-tiny"):
-        arguments = [
-            "--model",
-            model,
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            data,
-            "--output",
-            tmp_path / "out",
-        ]
+        arguments = option_words(model=model, tasks="nieh_gt", data=data, output=tmp_path / "out")
         return run_cli(*arguments, *options)
 
     return ask

@@ -6,6 +6,7 @@ import pytest
 
 from infthor_eval.formats.question import Question
 
+from ...helpers.command_line import option_words
 from ...helpers.files import find_one
 from ...helpers.processes import finish, start_cli
 from ...helpers.questions import make_question
@@ -31,16 +32,7 @@ def test_the_table_shows_every_model_task_and_scorer_beside_the_published_rows(
     make_nieh_set, tmp_path, run_cli
 ):
     data = make_nieh_set(size=56)
-    arguments = [
-        "--model",
-        "oracle,blind",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(model="oracle,blind", tasks="nieh", data=data, output=tmp_path / "out")
     code, out, _ = run_cli(*arguments, "--full")
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
@@ -58,15 +50,7 @@ def test_frames_of_the_embedded_simulator_are_labelled(make_nieh_set, tmp_path, 
     data = make_nieh_set(size=56)
     (data / "set.json").write_text('{"simulator": "embedded"}')
     _, out, _ = run_cli(
-        "run",
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
+        "run", *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path / "out")
     )
     assert "embedded simulator: not comparable" in " ".join(out.split())
 
@@ -77,15 +61,7 @@ def test_the_haystack_is_shown_by_depth_and_counts_what_does_not_fit(
     data = make_nieh_set([make_question(clues=(70,))], n_frames=140, size=56)
     tasks = "nieh_haystack_8k,nieh_haystack_1m"
     code, out, err = run_cli(
-        "--model",
-        "oracle",
-        "--tasks",
-        tasks,
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-        "--full",
+        *option_words(model="oracle", tasks=tasks, data=data, output=tmp_path / "out"), "--full"
     )
     assert code == 0
     rows = [line.split() for line in out.splitlines()]
@@ -118,18 +94,7 @@ def test_a_context_beyond_the_models_limit_is_reported_before_it_is_refused(
 
 def test_limit_evaluates_only_so_many_of_each_task(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    run_cli(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "o",
-        "--limit",
-        2,
-    )
+    run_cli(*option_words(model="oracle", tasks="nieh", data=data, output=tmp_path / "o", limit=2))
     results = json.loads(find_one(tmp_path / "o", "results.json").read_text())
     assert {name: task["n"] for name, task in results["summary"]["tasks"].items()} == {
         "nieh_gt": 2,
@@ -168,14 +133,7 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
         "include: _nieh.yaml\ntask: nieh_own\ndataset_kwargs: {context: clues}\n"
         "process_results: !function own.measure\nmetric_list: [{metric: letters}]\n"
     )
-    arguments = [
-        "--model",
-        "oracle",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(model="oracle", data=make_nieh_set(size=56), output=tmp_path / "out")
     code, out, err = run_cli(*arguments, "--tasks", "nieh_gt,nieh_own", "--full")
     assert code == 0, err
     rows = [line.split() for line in out.splitlines()]
@@ -220,16 +178,7 @@ def test_a_killed_run_resumes_and_ends_as_an_undisturbed_one(make_nieh_set, tmp_
     n_answers = 2 * repeats * len(MANY)
 
     def start(output):
-        arguments = [
-            "--model",
-            "qwen2.5-vl-tiny",
-            "--tasks",
-            "nieh",
-            "--data",
-            data,
-            "--output",
-            output,
-        ]
+        arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh", data=data, output=output)
         arguments += ["--repeats", repeats]
         return start_cli(*arguments)
 
@@ -276,16 +225,7 @@ BAD = [
         "oracle has no option a",
     ),
     (
-        [
-            "--model",
-            "qwen2.5-vl-tiny",
-            "--tasks",
-            "nieh",
-            "--data",
-            "SET",
-            "--model-args",
-            "dtpe=x",
-        ],
+        option_words(model="qwen2.5-vl-tiny", tasks="nieh", data="SET", model_args="dtpe=x"),
         "mean dtype?",
     ),
     (["--model", "oracle", "--tasks", "nieh", "--data", "SET", "--limit", "0"], "--limit"),
@@ -341,16 +281,9 @@ def test_a_frame_that_breaks_in_mid_run_is_counted_as_failed_and_the_exit_code_s
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+    )
     code, out, err = run_cli(*arguments)
     assert code == 1
     assert "nieh_gt: 2 sample(s) failed, counted as wrong" in err

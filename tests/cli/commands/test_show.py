@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from tests.helpers.command_line import assert_refused
+from tests.helpers.command_line import assert_refused, option_words
 from tests.helpers.questions import make_question
 
 
@@ -16,16 +16,7 @@ def ran(make_nieh_set, tmp_path, run_cli):
     """The folders of runs of the oracle and of the blind on five questions, and what was printed at
     their end."""
     data = make_nieh_set(size=56)
-    arguments = [
-        "--model",
-        "oracle,blind",
-        "--tasks",
-        "nieh",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(model="oracle,blind", tasks="nieh", data=data, output=tmp_path / "out")
 
     def ran(*options):
         code, out, err = run_cli(*arguments, *options)

@@ -9,7 +9,7 @@ import pandas
 import pytest
 
 import infthor_eval
-from tests.helpers.command_line import assert_refused
+from tests.helpers.command_line import assert_refused, option_words
 from tests.helpers.processes import cli_words
 
 
@@ -18,14 +18,7 @@ def folders(make_nieh_set, tmp_path, run_cli):
     """The folders of runs of the oracle and of the blind on five questions."""
     data = make_nieh_set(size=56)
     code, _, err = run_cli(
-        "--model",
-        "oracle,blind",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
+        *option_words(model="oracle,blind", tasks="nieh_gt", data=data, output=tmp_path / "out")
     )
     assert code == 0, err
     return [next((tmp_path / "out" / model).iterdir()) for model in ("oracle", "blind")]

@@ -11,7 +11,7 @@ from infthor_eval.plans.records import RECORDS
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
 
-from ...helpers.command_line import assert_refused, read_remarks
+from ...helpers.command_line import assert_refused, option_words, read_remarks
 from ...helpers.journals import write_journal
 from ...helpers.trajectories import FORK, cut_trajectory
 from ...helpers.trajectories import MUG as NAME
@@ -28,14 +28,7 @@ def test_two_plans_become_an_mp4(scripted_run, scripted_data, tmp_path, run_cli)
     code, output, err = run_cli(
         "watch",
         scripted_run,
-        "--trajectory",
-        NAME,
-        "--plans",
-        "2-3",
-        "--data",
-        scripted_data,
-        "--out",
-        out,
+        *option_words(trajectory=NAME, plans="2-3", data=scripted_data, out=out),
     )
     wanted = n_pictures(scripted_run, 2, 3)
     assert (code, read_remarks(err)) == (0, [])
@@ -86,12 +79,7 @@ def test_what_ends_otherwise_than_recorded_is_said_in_a_line(
     code, output, err = run_cli(
         "watch",
         tmp_path / "run",
-        "--plans",
-        2,
-        "--data",
-        scripted_data,
-        "--out",
-        tmp_path / "a.gif",
+        *option_words(plans=2, data=scripted_data, out=tmp_path / "a.gif"),
     )
     line = (
         "otherwise than recorded: plan 2, action 1: PickupObject Mug earns 2 now, and 9 in the run"
@@ -139,14 +127,9 @@ def test_what_cannot_be_watched_is_one_line(
         run_cli("watch", tmp_path), f"{tmp_path}: no journal in it; give the folder of a run"
     )
     run_cli(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "nieh",
+        *option_words(
+            model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "nieh"
+        )
     )
     (nieh_run,) = (tmp_path / "nieh" / "oracle").iterdir()
     assert_refused(

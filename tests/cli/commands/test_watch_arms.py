@@ -10,7 +10,7 @@ from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.report.recordings.canvas import END_REPEATS, SIZE, TITLE_REPEATS
 from infthor_eval.runs import read_run
 
-from ...helpers.command_line import assert_refused, read_remarks
+from ...helpers.command_line import assert_refused, option_words, read_remarks
 from ...helpers.journals import write_journal
 
 
@@ -19,16 +19,7 @@ def arm_run(tmp_path_factory):
     """Two pick-ups and two puts of one trajectory, by an arm that moves at random: in deltas, as
     policies do."""
     output = tmp_path_factory.mktemp("arms")
-    words = (
-        "--model",
-        "random-arm",
-        "--tasks",
-        "manipulathor_mini",
-        "--limit",
-        2,
-        "--output",
-        output,
-    )
+    words = option_words(model="random-arm", tasks="manipulathor_mini", limit=2, output=output)
     with pytest.MonkeyPatch.context() as patched, pytest.raises(SystemExit) as ended:
         # The first ones, which are of one trajectory; a limit takes them from all.
         patched.setattr(

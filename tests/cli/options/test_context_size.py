@@ -7,6 +7,7 @@ import pytest
 from infthor_eval.runs import read_header
 from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
+from ...helpers.command_line import option_words
 from ...helpers.files import find_one
 from ...helpers.questions import make_question
 
@@ -44,16 +45,9 @@ def test_a_kilo_token_has_the_default_or_the_given_value(
 ):
     data = make_nieh_set(ONE, n_frames=80, size=56)
     tasks = ["nieh_haystack_8k", "nieh_truncate_head_8k"]
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        ",".join(tasks),
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="oracle", tasks=",".join(tasks), data=data, output=tmp_path / "out"
+    )
     code, _, err = run_cli(*arguments, *options)
     assert code == 0, err
     # A baseline is counted as Qwen2.5-VL: 121 tokens a frame.
@@ -80,15 +74,7 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(
     for options in ((), ("--k-tokens", 1024), ("--rope", "yarn:2")):
         assert (
             run_cli(
-                "--model",
-                "qwen2.5-vl-tiny",
-                "--tasks",
-                tasks,
-                "--data",
-                data,
-                "--output",
-                out,
-                *options,
+                *option_words(model="qwen2.5-vl-tiny", tasks=tasks, data=data, output=out), *options
             )[0]
             == 0
         )
@@ -106,16 +92,9 @@ def test_the_kilo_token_and_the_extension_are_part_of_the_run_config(
 
 def test_the_extension_is_the_same_run_whichever_way_it_is_given(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+    )
     assert run_cli(*arguments, "--rope", "linear:2")[0] == 0
     _, _, err = run_cli(*arguments, "--model-args", "rope=linear:2")
     assert "0 evaluated now, 5 resumed from the journal" in err
@@ -125,14 +104,9 @@ def test_what_fits_only_with_rope_is_reported_with_both_limits(
     make_nieh_set, tmp_path, short, run_cli
 ):
     data = make_nieh_set(n_frames=20)
-    arguments = [
-        "--model",
-        "qwen2.5-vl",
-        "--model-args",
-        f"pretrained={short},device=cpu",
-        "--tasks",
-        "nieh",
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl", model_args=f"pretrained={short},device=cpu", tasks="nieh"
+    )
     arguments += ["--data", data, "--output", tmp_path / "out"]
     code, _, err = run_cli(*arguments, "--rope", "yarn:4")
     assert code == 0, err
@@ -151,14 +125,9 @@ def test_an_extension_that_is_too_small_is_reported_as_refused(
     make_nieh_set, tmp_path, short, run_cli
 ):
     data = make_nieh_set(n_frames=20)
-    arguments = [
-        "--model",
-        "qwen2.5-vl",
-        "--model-args",
-        f"pretrained={short},device=cpu",
-        "--rope",
-        "linear:1.5",
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl", model_args=f"pretrained={short},device=cpu", rope="linear:1.5"
+    )
     code, _, err = run_cli(
         *arguments, "--tasks", "nieh_full", "--data", data, "--output", tmp_path / "out"
     )
@@ -191,16 +160,9 @@ def test_the_longest_request_is_reported_as_it_is_sent(
     make_nieh_set, tmp_path, run_cli, records_in, family
 ):
     data = make_nieh_set()
-    arguments = [
-        "--model",
-        f"{family}-tiny",
-        "--tasks",
-        "nieh_full",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model=f"{family}-tiny", tasks="nieh_full", data=data, output=tmp_path / "out"
+    )
     _, _, err = run_cli(*arguments)
     # And the room for the reply.
     longest = max(record.tokens.context for record in records_in(tmp_path / "out")) + 50

@@ -10,6 +10,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_header, read_run
 
+from ...helpers.command_line import option_words
 from ...helpers.files import find_one
 from ...helpers.processes import finish, start_cli
 from ...helpers.waiting import wait_until
@@ -88,14 +89,9 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
         (folder / f"{traj_id}.json").write_text(json.dumps(trajectory))
         log = {"images": [{"low_idx": 0, "image_name": "000000007.png"}]}
         (data / "metadata" / traj_id / "expert_log.json").write_text(json.dumps(log))
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_interleaved,nieh_text_state",
-        "--data",
-        data,
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_interleaved,nieh_text_state", data=data
+    )
     code, _, err = run_cli(*arguments, "--output", out, "--trajectories", folder)
     assert code == 0, err
     assert [doc["frames"] for doc in docs(out, "nieh_interleaved")] == [[0, 7]] * 6
@@ -127,16 +123,7 @@ def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(
     metadata, out = data / "metadata", tmp_path / "out"
     write_video(metadata / "traj_a" / "traj_a_10fps.mp4", range(0, 250, 10))
     (metadata / "traj_b" / "traj_b_10fps.mp4").write_bytes(b"no video")
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_video",
-        "--data",
-        data,
-        "--output",
-        out,
-    ]
+    arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_video", data=data, output=out)
     code, _, err = run_cli(*arguments)
     assert code == 0, err
     assert "nieh_video: 3 sample(s) skipped: " in err
@@ -190,16 +177,9 @@ def test_a_film_is_a_video_where_a_family_takes_it_and_the_run_says_so(
 
 def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_path):
     def start(output):
-        arguments = [
-            "--model",
-            "qwen2.5-vl-tiny",
-            "--tasks",
-            "nieh_memory_notes",
-            "--data",
-            data,
-            "--output",
-            output,
-        ]
+        arguments = option_words(
+            model="qwen2.5-vl-tiny", tasks="nieh_memory_notes", data=data, output=output
+        )
         return start_cli(*arguments)
 
     killed = start(tmp_path / "killed")

@@ -2,6 +2,8 @@
 
 import json
 
+from ...helpers.command_line import option_words
+
 TINY = "qwen2.5-vl-tiny"
 
 
@@ -36,16 +38,9 @@ def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run_
 
 
 def test_unknown_frame_ablations_are_one_line(make_nieh_set, tmp_path, run_cli):
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=8),
-        "--output",
-        tmp_path / "o",
-    ]
+    arguments = option_words(
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=8), output=tmp_path / "o"
+    )
     for names, expected in (
         ("none", "--frames none: there are shown, blank"),
         (",", "--frames is empty; give a name"),

@@ -9,6 +9,8 @@ from infthor_eval.cli.progress.bar import PacedBar, StepBars
 from infthor_eval.cli.progress.pace import Pace, format_duration
 from infthor_eval.terminal import progress_bar
 
+from ...helpers.command_line import option_words
+
 
 def test_resumed_units_do_not_count_for_the_pace():
     pace = Pace(100, 0.0)
@@ -85,16 +87,9 @@ def test_where_there_is_no_terminal_no_bar_is_left():
 
 def test_a_run_in_a_pipe_prints_lines_without_colour(make_nieh_set, tmp_path, run_cli, monkeypatch):
     monkeypatch.setattr("infthor_eval.cli.progress.pace._MIN_INTERVAL_S", 0.0)
-    arguments = [
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path,
-    ]
+    arguments = option_words(
+        model="oracle", tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path
+    )
     _, out, err = run_cli(*arguments)
     lines = err.splitlines()
     assert [line.partition(")")[0] for line in lines[:-1]] == [
@@ -108,16 +103,9 @@ def test_quiet_prints_only_failures(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     frame = data / "metadata" / "traj_a" / "img" / "000000001.png"
     frame.write_bytes(frame.read_bytes()[:50])
-    arguments = [
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path / "out"
+    )
     code, _, err = run_cli(*arguments, "--quiet")
     assert code == 1
     assert err.startswith("nieh_gt: 2 sample(s) failed")

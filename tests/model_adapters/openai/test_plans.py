@@ -10,6 +10,7 @@ import pytest
 
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import UnitRecord, read_run
+from tests.helpers.command_line import option_words
 from tests.helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
 from ..policies.servers import send
@@ -37,16 +38,7 @@ def played(task_files: Path, tmp_path: Path, run_cli: Any) -> Any:
     ) -> tuple[int, list[UnitRecord[Any]], Any]:
         settings = {"base_url": url, "model": "m", "retries": 0, **more}
         typed = ",".join(f"{option}={value}" for option, value in settings.items())
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            typed,
-            "--tasks",
-            "infthor_plans",
-            "--data",
-            data,
-        ]
+        arguments = option_words(model="openai", model_args=typed, tasks="infthor_plans", data=data)
         code, _, err = run_cli(*arguments, "--greedy", "--name", name, "--output", tmp_path / "out")
         assert "Traceback" not in err
         (results,) = (tmp_path / "out" / name).rglob("results.json")

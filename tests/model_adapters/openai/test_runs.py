@@ -15,6 +15,7 @@ import pytest
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
+from ...helpers.command_line import option_words
 from ..policies.servers import send
 from .talking import chatting, completion, kept, says, talkative
 
@@ -29,16 +30,7 @@ def ask(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> Any:
     def ask(url: str, *options: object, **model_args: object) -> tuple[int, str, str]:
         settings = {"base_url": url, "model": "m", "retries": 0, **model_args}
         typed = ",".join(f"{name}={value}" for name, value in settings.items())
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            typed,
-            "--tasks",
-            "nieh_gt",
-            "--data",
-            data,
-        ]
+        arguments = option_words(model="openai", model_args=typed, tasks="nieh_gt", data=data)
         return run_cli(*arguments, "--output", tmp_path / "out", *options)
 
     return ask
@@ -139,16 +131,7 @@ def test_a_cap_is_not_for_models_that_cost_nothing(
     run_cli: Any, make_nieh_set: Any, tmp_path: Path
 ) -> None:
     data = make_nieh_set(size=56)
-    arguments = [
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path / "out",
-        "--max-cost",
-        1,
-    ]
+    arguments = option_words(tasks="nieh_gt", data=data, output=tmp_path / "out", max_cost=1)
     for model in ("qwen2.5-vl-tiny", "oracle"):
         code, _, err = run_cli("--model", model, *arguments)
         assert code == 2
@@ -240,16 +223,9 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(
     data = make_nieh_set(size=56)
     with chatting(answer) as url:
         model_args = f"base_url={url},model=m,max_in_flight={in_flight}"
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            model_args,
-            "--tasks",
-            "nieh_full",
-            "--data",
-            data,
-        ]
+        arguments = option_words(
+            model="openai", model_args=model_args, tasks="nieh_full", data=data
+        )
         command = [
             sys.executable,
             "-c",
@@ -282,16 +258,9 @@ def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any
     data = make_nieh_set(size=56)
     with chatting(lambda *_: completion("a note", (100, 10))) as url:
         model_args = f"base_url={url},model=m,price_per_m_input=1,price_per_m_output=10"
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            model_args,
-            "--tasks",
-            "nieh_memory_notes",
-            "--data",
-            data,
-        ]
+        arguments = option_words(
+            model="openai", model_args=model_args, tasks="nieh_memory_notes", data=data
+        )
         code, out, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 0, err
     _, results = _run(tmp_path / "out")
@@ -307,14 +276,7 @@ def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any
 def test_in_process_models_and_baselines_tell_what_they_read(
     make_nieh_set: Any, tmp_path: Path, run_cli: Any
 ) -> None:
-    arguments = [
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        make_nieh_set(size=56),
-        "--output",
-        tmp_path / "out",
-    ]
+    arguments = option_words(tasks="nieh_gt", data=make_nieh_set(size=56), output=tmp_path / "out")
     assert "requests" not in run_cli("--model", "oracle", *arguments)[1]
     assert "qwen2.5-vl-tiny: 5 requests, " in (
         out := run_cli("--model", "qwen2.5-vl-tiny", *arguments)[1]
@@ -337,16 +299,9 @@ def test_several_trajectories_are_asked_about_at_once(
     data = make_nieh_set(size=56)
     with chatting(answer) as url:
         model_args = f"base_url={url},model=m"
-        arguments = [
-            "--model",
-            "openai",
-            "--model-args",
-            model_args,
-            "--tasks",
-            "nieh_full",
-            "--data",
-            data,
-        ]
+        arguments = option_words(
+            model="openai", model_args=model_args, tasks="nieh_full", data=data
+        )
         code, _, err = run_cli(*arguments, "--output", tmp_path / "out")
     assert code == 0, err
 

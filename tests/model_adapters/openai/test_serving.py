@@ -19,6 +19,7 @@ from infthor_eval.formats.nieh_set import NiehSet
 from infthor_eval.runs import UnitRecord
 from model_adapters import check_adapter, load
 from tests.helpers.bundled import BUNDLED
+from tests.helpers.command_line import option_words
 from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 
 from ..asking import up_to
@@ -92,16 +93,9 @@ def both(
         records = []
         for model, settings in (("openai", served.options | more), ("hf-vlm", here)):
             options = ",".join(f"{name}={value}" for name, value in settings.items())
-            typed = [
-                "--model",
-                model,
-                "--model-args",
-                options,
-                "--name",
-                model,
-                "--output",
-                tmp_path / "out",
-            ]
+            typed = option_words(
+                model=model, model_args=options, name=model, output=tmp_path / "out"
+            )
             code, _, err = run_cli(*typed, *arguments)
             assert code == 0, err
             records.append(records_in(tmp_path / "out" / model))

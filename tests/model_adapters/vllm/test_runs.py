@@ -12,6 +12,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.plans.records import RECORDS as PLAN_RECORDS
 from infthor_eval.runs import read_run
 from model_adapters import name_on_engine
+from tests.helpers.command_line import option_words
 from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
 
 from .double import Double
@@ -27,16 +28,7 @@ def ask(make_nieh_set: Any, checkpoints: dict[str, Path], tmp_path: Path, run_cl
     ) -> tuple[int, str, str]:
         settings = {"pretrained": checkpoints["qwen2.5-vl"], "dtype": "float32", **model_args}
         typed = ",".join(f"{option}={value}" for option, value in settings.items())
-        arguments = [
-            "--model",
-            "qwen2.5-vl",
-            "--model-args",
-            typed,
-            "--tasks",
-            task,
-            "--data",
-            data,
-        ]
+        arguments = option_words(model="qwen2.5-vl", model_args=typed, tasks=task, data=data)
         return run_cli(*arguments, "--name", name, "--output", tmp_path / "out", *options)
 
     return ask
@@ -124,16 +116,9 @@ def test_plans_are_carried_out_alike(
     played = []
     for engine, more in (("vllm", ""), ("transformers", ",device=cpu")):
         model_args = f"pretrained={checkpoints['qwen2.5-vl']},dtype=float32{more}"
-        arguments = [
-            "--model",
-            "qwen2.5-vl",
-            "--model-args",
-            model_args,
-            "--tasks",
-            "infthor_plans",
-            "--data",
-            data,
-        ]
+        arguments = option_words(
+            model="qwen2.5-vl", model_args=model_args, tasks="infthor_plans", data=data
+        )
         output = tmp_path / "out" / engine
         code, _, err = run_cli(*arguments, "--engine", engine, "--constrained", "--output", output)
         assert code == 0, err

@@ -11,6 +11,8 @@ from infthor_eval.nieh.samples import open_set
 from infthor_eval.runs import read_run
 from infthor_eval.storage.packaged import packaged_folder
 
+from ...helpers.command_line import option_words
+
 DATA = packaged_folder("sets/nieh_mini")
 SIZED = "nieh_haystack_8k,nieh_truncate_head_8k"
 TOLD = (
@@ -24,16 +26,7 @@ def ask(run_cli, tmp_path):
 
     def ask(tasks, *options, model="oracle"):
         words = (
-            "--model",
-            model,
-            "--tasks",
-            tasks,
-            "--data",
-            DATA,
-            "--limit",
-            "6",
-            "--output",
-            tmp_path,
+            *option_words(model=model, tasks=tasks, data=DATA, limit="6", output=tmp_path),
             *options,
         )
         assert run_cli(*words)[0] == 0

@@ -14,6 +14,7 @@ from infthor_eval.report.comparison import compare, comparison_table
 from infthor_eval.report.suites.nieh import NiehPresenter
 from infthor_eval.runs.journals.shards import FOLDER
 
+from ...helpers.command_line import option_words
 from ...helpers.nieh_runs import make_config, make_record, make_run
 
 MODEL = ("--model", "qwen2.5-vl-nano", "--tasks", "nieh_gt")
@@ -75,16 +76,7 @@ def test_one_repeat_is_a_run_without_the_option(make_nieh_set, tmp_path, run_cli
 def test_a_baseline_says_the_same_every_time(make_nieh_set, tmp_path, run_cli):
     data = make_nieh_set(size=56)
     code, out, _ = run_cli(
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_gt",
-        "--data",
-        data,
-        "--output",
-        tmp_path,
-        "--repeats",
-        2,
+        *option_words(model="oracle", tasks="nieh_gt", data=data, output=tmp_path, repeats=2)
     )
     assert code == 0 and "Answers that repeat" in out
     (rows,) = tmp_path.rglob("samples_nieh_gt_*.jsonl")

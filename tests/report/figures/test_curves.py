@@ -19,6 +19,7 @@ from infthor_eval.report.figures.curves import draw_curves
 from infthor_eval.report.figures.style import looks_of
 from infthor_eval.runs import read_run
 
+from ...helpers.command_line import option_words
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
 from ...helpers.trajectories import CANDLE, cut_trajectory, write_trajectories
@@ -247,12 +248,7 @@ def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run_cli, mo
         ("replay", "data", "--out", "set"),
         (
             "train",
-            "--recipe",
-            "infthor_32k",
-            "--data",
-            "set",
-            "--out",
-            "trained",
+            *option_words(recipe="infthor_32k", data="set", out="trained"),
             *training,
             "max_steps=1",
         ),
@@ -301,10 +297,7 @@ def _options_of_model(name: str, *task_options: str) -> tuple[str, ...]:
     rope = ("--rope", re.sub(r"(\d+)$", r":\1", extended)) if extended else ()
     options = f"{options},prompt=plain,max_tokens=0"
     return (
-        "--model",
-        model,
-        "--model-args",
-        options,
+        *option_words(model=model, model_args=options),
         *rope,
         "--history",
         "published",

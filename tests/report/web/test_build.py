@@ -13,6 +13,8 @@ from infthor_eval.report.web.build import PageRequest, build_page
 from infthor_eval.storage.packaged import packaged_folder
 from infthor_eval.suites import find_presenter, find_suite
 
+from ...helpers.command_line import option_words
+
 DATA = packaged_folder("sets/nieh_mini")
 
 
@@ -86,16 +88,7 @@ def test_the_sections_have_their_pictures_and_tables(page):
 
 
 def test_a_run_on_blank_frames_beside_another_shows_the_gain(make_page, tmp_path, run_cli):
-    words = (
-        "--model",
-        "oracle",
-        "--tasks",
-        "nieh_mini_gt",
-        "--limit",
-        "12",
-        "--frames",
-        "shown,blank",
-    )
+    words = option_words(model="oracle", tasks="nieh_mini_gt", limit="12", frames="shown,blank")
     assert run_cli(*words, "--output", tmp_path)[0] == 0
     page = make_page(*sorted((tmp_path / "oracle").iterdir()))
     (questions,) = (section for section in page.sections if section.key == "nieh")

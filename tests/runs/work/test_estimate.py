@@ -10,6 +10,7 @@ from infthor_eval.errors import ModelError
 from infthor_eval.runs import Group, Unit, UnitKey, Usage, Workload, estimate_run
 from infthor_eval.runs.work.estimate import Quantities, _MeasuredGroup, estimate_tasks
 
+from ...helpers.command_line import option_words
 from ...helpers.toy_suite import Sum, Sums, ToySuite, make_suite
 from ..toy_command import request
 
@@ -113,15 +114,8 @@ def test_where_every_unit_fails_nothing_is_told(tmp_path, capfd):
 
 
 def test_the_command_prints_units_tokens_time_memory_and_money(run_cli, tmp_path):
-    words = (
-        "--model",
-        "qwen2.5-vl-tiny",
-        "--tasks",
-        "nieh_mini_gt",
-        "--output",
-        tmp_path / "out",
-        "--workers",
-        2,
+    words = option_words(
+        model="qwen2.5-vl-tiny", tasks="nieh_mini_gt", output=tmp_path / "out", workers=2
     )
     code, output, err = run_cli(
         "plan", *words, "--measure", 9, "--price-per-hour", 2.5, "--limit", 6
@@ -137,15 +131,8 @@ def test_the_command_prints_units_tokens_time_memory_and_money(run_cli, tmp_path
 
 
 def test_a_cap_on_what_is_spent_holds_for_one_process_and_says_so(run_cli, tmp_path):
-    words = (
-        "--model",
-        "openai",
-        "--model-args",
-        "model=m",
-        "--tasks",
-        "nieh_mini_gt",
-        "--output",
-        tmp_path,
+    words = option_words(
+        model="openai", model_args="model=m", tasks="nieh_mini_gt", output=tmp_path
     )
     code, _, err = run_cli(*words, "--max-tokens-total", 100, "--workers", 2)
     assert code == 2

@@ -14,6 +14,7 @@ import pytest
 from infthor_eval.runs import UnitRecord
 from infthor_eval.storage.packaged import packaged_folder
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
+from tests.helpers.command_line import option_words
 from tests.helpers.processes import cli_words
 from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 from tests.helpers.waiting import PATIENCE_S, wait_until
@@ -28,14 +29,7 @@ def _arguments(engine: str, output: Path, *more: object) -> list[str]:
     model_args = f"pretrained={packaged_folder(FOLDER)},dtype=float32"
     model_args += ",enforce_eager=true" if engine == "vllm" else ",device=cpu"
     typed = [
-        "--model",
-        "qwen2.5-vl",
-        "--engine",
-        engine,
-        "--model-args",
-        model_args,
-        "--output",
-        output,
+        *option_words(model="qwen2.5-vl", engine=engine, model_args=model_args, output=output),
         *more,
     ]
     return list(map(str, typed))

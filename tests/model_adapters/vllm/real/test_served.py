@@ -17,6 +17,7 @@ from infthor_eval.runs import UnitRecord
 from infthor_eval.storage.packaged import packaged_folder
 from model_adapters import load
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
+from tests.helpers.command_line import option_words
 from tests.helpers.processes import cli_words
 from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 from tests.helpers.waiting import PATIENCE_S, wait_until
@@ -44,10 +45,7 @@ def _server(port: int, log: Path) -> Iterator["subprocess.Popen[bytes]"]:
         sys.executable,
         "-m",
         SERVER,
-        "--model",
-        MODEL,
-        "--dtype",
-        "float32",
+        *option_words(model=MODEL, dtype="float32"),
         "--enforce-eager",
         *limits,
     ]
@@ -87,16 +85,7 @@ def both(
         for model, settings in (("openai", served | more), ("qwen2.5-vl", here)):
             options = ",".join(f"{name}={value}" for name, value in settings.items())
             code, _, err = run_cli(
-                *(
-                    "--model",
-                    model,
-                    "--model-args",
-                    options,
-                    "--name",
-                    model,
-                    "--output",
-                    tmp_path / "out",
-                ),
+                *option_words(model=model, model_args=options, name=model, output=tmp_path / "out"),
                 *arguments,
             )
             assert code == 0, err
@@ -151,16 +140,7 @@ def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_
 ) -> None:
     port, output = free_port(), tmp_path / "out"
     model_args = f"base_url=http://127.0.0.1:{port}/v1,model={MODEL},retries=1,max_in_flight=1"
-    words = [
-        "--model",
-        "openai",
-        "--model-args",
-        model_args,
-        "--tasks",
-        "nieh_mini_full",
-        "--limit",
-        "40",
-    ]
+    words = option_words(model="openai", model_args=model_args, tasks="nieh_mini_full", limit="40")
     command = cli_words(*words, "--output", output)
 
     def n_answered() -> int:
