@@ -53,8 +53,10 @@ def package(tmp_path, monkeypatch):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: Sums\nVersion: 1.0\n")
     points = (
-        "[infthor_eval.suites]\nsums = sums_suite:SumsSuite\n[infthor_eval.tasks]\nsums = "
-        "sums_tasks.here\n"
+        "[infthor_eval.suites]\n"
+        "sums = sums_suite:SumsSuite\n"
+        "[infthor_eval.tasks]\n"
+        "sums = sums_tasks.here\n"
     )
     (info / "entry_points.txt").write_text(points)
     monkeypatch.syspath_prepend(tmp_path)

@@ -203,7 +203,7 @@ TYPED = [
     ids=[f"{n}: {expected}" for n, (_, expected) in enumerate(TYPED)],
 )
 def test_what_cannot_be_meant_is_refused(typed, arguments, expected):
-    assert_refused(typed(*arguments), expected)
+    assert_refused(typed(*arguments), expected, after_notes=True)
 
 
 @pytest.mark.parametrize("arguments", [["ls", "models"], ["ls", "tasks"], RUN, ["--version"]])

@@ -238,7 +238,11 @@ def test_a_haystack_without_a_usable_question_ends_the_same_way(
     arguments = option_words(
         model=model, tasks="nieh_haystack_8k", data=data, output=tmp_path / "out"
     )
-    assert_refused(run_cli(*arguments), "can be asked (clue 99 is outside trajectory t (6 frames))")
+    assert_refused(
+        run_cli(*arguments),
+        "can be asked (clue 99 is outside trajectory t (6 frames))",
+        after_notes=True,
+    )
 
 
 def test_a_context_is_measured_by_a_frame_that_can_be_read(make_nieh_set, tmp_path, run_cli):

@@ -43,13 +43,24 @@ def read_remarks(error_text: str) -> list[str]:
     ]
 
 
-def assert_refused(ended: tuple[int, str, str], *expected: str, code: int = 2) -> None:
+def assert_refused(
+    ended: tuple[int, str, str], *expected: str, code: int = 2, after_notes: bool = False
+) -> None:
     """Hold that a command ended with an exit code, without output, and with one line that says
-    all that is expected."""
+    all that is expected.
+
+    Args:
+        ended: the exit code, standard output and standard error.
+        expected: parts of the line.
+        code: the exit code that it is to have.
+        after_notes: whether it may have written other lines before.
+    """
     ended_with, output, error_text = ended
     assert (ended_with, output) == (code, "")
     assert "Traceback" not in error_text
-    (line,) = error_text.splitlines()
+    *notes, line = error_text.splitlines()
+    assert after_notes or not notes
     assert line.startswith("infthor-eval: ")
+    assert not any(note.startswith("infthor-eval: ") for note in notes)
     for words in expected:
         assert words in line

@@ -361,8 +361,9 @@ def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
     """They share the expert's history; each has its own frames' size and radius."""
     for name, settings in (("near", "radius: 0.06, image_size: 64"), ("far", "radius: 0.5")):
         (task_files / "manipulation" / f"{name}.yaml").write_text(
-            f"include: _manipulation.yaml\ntask: {name}\ndataset_kwargs: {{kind: pickup, "
-            f"{settings}}}\n"
+            "include: _manipulation.yaml\n"
+            f"task: {name}\n"
+            f"dataset_kwargs: {{kind: pickup, {settings}}}\n"
         )
     outcome = execute(prepared("planner-arm", tasks=("near", "far")))
     records = by_key(outcome)

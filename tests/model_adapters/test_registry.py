@@ -162,8 +162,10 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: Dummy-Robot\nVersion: 1.2\n")
     (info / "entry_points.txt").write_text(
-        f"[{registry.ENTRY_POINTS}]\ndummy = dummy_robot.arms.left:Arm\nsingle = "
-        "dummy_module:A\nlost = no_such:A\n"
+        f"[{registry.ENTRY_POINTS}]\n"
+        "dummy = dummy_robot.arms.left:Arm\n"
+        "single = dummy_module:A\n"
+        "lost = no_such:A\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     return tmp_path

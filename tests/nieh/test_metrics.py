@@ -211,8 +211,8 @@ def test_of_our_scorers_a_task_has_those_that_it_lists(own):
 
 def test_baselines_are_measured_by_the_files_function_too(prepared, own):
     own(
-        "def measure(doc, results):\n    return {'letters': results[0] == doc['question'], "
-        "'plain': True}\n"
+        "def measure(doc, results):\n"
+        "    return {'letters': results[0] == doc['question'], 'plain': True}\n"
     )
     (summary,) = execute(prepared(Oracle.name, tasks=("nieh_own",))).summary.summary.tasks.values()
     assert summary.by_clues["total"].scores["letters"].mean == 0.0

@@ -163,8 +163,10 @@ def test_a_model_is_asked_by_trajectory_and_in_the_published_words(prepared, rec
     names = [[part.path.parts[-3] for part in parts[:-1]] for parts in recorder.requests]
     assert names == [["traj_a"] * 6] * 3 + [["traj_b"] * 6] * 2
     assert recorder.requests[0][-1] == (
-        "\nAnswer the question given the agent's views in time order. Do not include explanation "
-        "or reasoning in the answer. Answer with a single word or words.\nQuestion: Is there a mug?"
+        "\n"
+        "Answer the question given the agent's views in time order. Do not include explanation "
+        "or reasoning in the answer. Answer with a single word or words.\n"
+        "Question: Is there a mug?"
     )
     assert set(replies(outcome).values()) == {"first line\nmug"}
     assert {
@@ -353,8 +355,9 @@ def test_baselines_answer_the_same_whatever_runs_beside_them(prepared, make_nieh
             name=name,
         )
         (task_files / "nieh" / f"nieh_{name}.yaml").write_text(
-            f"include: _nieh.yaml\ntask: nieh_{name}\ndataset_kwargs: {{context: clues, data: "
-            f"{root}}}\n"
+            "include: _nieh.yaml\n"
+            f"task: nieh_{name}\n"
+            f"dataset_kwargs: {{context: clues, data: {root}}}\n"
         )
     for model in ("blind", "blind-count", "random"):
         alone = [execute(prepared(model, tasks=(f"nieh_{name}",))) for name in key]

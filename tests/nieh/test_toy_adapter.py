@@ -9,7 +9,7 @@ import pytest
 from infthor_eval.formats.nieh_set import NiehSet
 from model_adapters import check_adapter
 from model_adapters.built_in import BUILT_IN, BuiltIn
-from tests.helpers.command_line import option_words
+from tests.helpers.command_line import assert_refused, option_words
 from tests.model_adapters.toy_adapter import Talk, Toy
 
 from ..helpers.bundled import BUNDLED
@@ -75,9 +75,9 @@ def test_a_context_that_is_measured_in_tokens_wants_their_number(make_nieh_set, 
     arguments = option_words(
         model="toy", tasks="nieh_truncate_head_8k", data=data, output=tmp_path / "out"
     )
-    code, _, err = run_cli(*arguments)
-    assert (code, len(err.strip().splitlines())) == (2, 1)
-    assert "a size in tokens, which toy does not count; give --tokens-per-frame" in err
+    assert_refused(
+        run_cli(*arguments), "a size in tokens, which toy does not count; give --tokens-per-frame"
+    )
     assert run_cli(*arguments, "--tokens-per-frame", 500)[0] == 0
     (samples,) = (tmp_path / "out").rglob("samples_*.jsonl")
     assert {

@@ -11,7 +11,7 @@ from infthor_eval.errors import DataError, UsageError
 from infthor_eval.formats.published import PublishedRow, PublishedTable
 from infthor_eval.runs import execute
 
-from ..helpers.command_line import option_words
+from ..helpers.command_line import assert_refused, option_words
 from ..helpers.refusals import read_one_line
 from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
@@ -356,13 +356,13 @@ def test_where_no_trajectory_has_a_final_task_that_is_said(prepared, run_cli, da
     ) as caught:
         prepared(tasks=("infthor_final",))
     read_one_line(caught)
-    code, out, err = run_cli(
-        *option_words(
-            model="planner", tasks="infthor_final", data=data, output=tmp_path / "o", limit=3
+    assert_refused(
+        run_cli(
+            *option_words(
+                model="planner", tasks="infthor_final", data=data, output=tmp_path / "o", limit=3
+            )
         )
     )
-    assert (code, out) == (2, "")
-    assert len(err.strip().splitlines()) == 1
 
 
 # -- after a failure

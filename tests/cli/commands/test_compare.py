@@ -5,7 +5,7 @@ from msgspec.structs import replace
 
 from infthor_eval.plans.records import StepRecord
 
-from ...helpers.command_line import option_words
+from ...helpers.command_line import assert_refused, option_words
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_plans_run
 
@@ -33,12 +33,11 @@ def test_runs_without_a_shared_unit_and_folders_without_a_run_are_refused(
     for task in ("nieh_gt", "nieh_full"):
         run_cli("--model", "oracle", "--tasks", task, "--data", data, "--output", tmp_path)
     folders = sorted((tmp_path / "oracle").iterdir())
-    code, _, err = run_cli("compare", *folders)
-    assert (code, len(err.splitlines())) == (2, 1)
-    assert "share no unit of the same task" in err
-    code, _, err = run_cli("compare", tmp_path, folders[0])
-    assert (code, len(err.splitlines())) == (2, 1)
-    assert f"{tmp_path}: no journal in it; give the folder of a run" in err
+    assert_refused(run_cli("compare", *folders), "share no unit of the same task")
+    assert_refused(
+        run_cli("compare", tmp_path, folders[0]),
+        f"{tmp_path}: no journal in it; give the folder of a run",
+    )
 
 
 def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_path, run_cli):
@@ -54,11 +53,9 @@ def test_a_run_of_an_earlier_version_is_refused_in_one_line(make_nieh_set, tmp_p
         json.dumps({"format": 1, "identity": {"model": {"name": "oracle"}}}) + "\n"
     )
     for folders in ((old, ours), (ours, old)):
-        code, out, err = run_cli("compare", *folders)
-        assert (code, out, len(err.splitlines())) == (2, "", 1)
-        assert (
-            f"{old}: its journal is of format 1, this version reads 3; run the evaluation again"
-            in err
+        assert_refused(
+            run_cli("compare", *folders),
+            f"{old}: its journal is of format 1, this version reads 3; run the evaluation again",
         )
 
 

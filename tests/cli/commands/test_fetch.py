@@ -10,6 +10,8 @@ import pytest
 
 from infthor_eval.nieh.published.hub_data import NIEH_REPOSITORY
 
+from ...helpers.command_line import assert_refused
+
 COMMIT = "0" * 40
 
 
@@ -97,14 +99,13 @@ def test_fetched_data_are_found_by_the_task_and_not_fetched_again(hub, tmp_path,
 def test_no_access_and_no_network_are_one_line_with_a_hint(hub, tmp_path, run_cli):
     endpoint, handler = hub
     handler.status = 403
-    code, _, err = run_cli("fetch", "nieh", "--endpoint", endpoint, "--dir", tmp_path / "d")
-    assert (code, len(err.strip().splitlines())) == (2, 1)
-    assert "hf auth login" in err
-    code, _, err = run_cli(
-        "fetch", "nieh", "--endpoint", "http://127.0.0.1:9", "--dir", tmp_path / "d"
+    assert_refused(
+        run_cli("fetch", "nieh", "--endpoint", endpoint, "--dir", tmp_path / "d"), "hf auth login"
     )
-    assert (code, len(err.strip().splitlines())) == (2, 1)
-    assert "cannot be fetched" in err
+    assert_refused(
+        run_cli("fetch", "nieh", "--endpoint", "http://127.0.0.1:9", "--dir", tmp_path / "d"),
+        "cannot be fetched",
+    )
 
 
 def test_an_archive_that_points_elsewhere_is_refused(hub, tmp_path, run_cli):

@@ -8,7 +8,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_header, read_run
 from infthor_eval.runs.journals.journal import Journal
 
-from ...helpers.command_line import option_words
+from ...helpers.command_line import assert_refused, option_words
 from ...helpers.files import find_one
 
 
@@ -44,16 +44,15 @@ def test_a_name_appears_in_the_folder_the_table_and_the_results(ask, tmp_path):
 
 @pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "-x\n"])
 def test_a_name_that_cannot_be_a_folders_is_refused(ask, tmp_path, name):
-    code, out, err = ask(f"--name={name}", model="oracle")
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert "names a folder" in err
+    assert_refused(ask(f"--name={name}", model="oracle"), "names a folder")
     assert not (tmp_path / "out").exists()
 
 
 def test_one_name_for_two_models_is_refused(ask, tmp_path):
-    code, out, err = ask("--name", "both", model="oracle,blind")
-    assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert "--name both: names one run, but 2 models are given" in err
+    assert_refused(
+        ask("--name", "both", model="oracle,blind"),
+        "--name both: names one run, but 2 models are given",
+    )
     assert not (tmp_path / "out").exists()
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from infthor_eval.formats.question import Question
 
-from ...helpers.command_line import option_words
+from ...helpers.command_line import assert_refused, option_words
 from ...helpers.files import find_one
 from ...helpers.processes import finish, start_cli
 from ...helpers.questions import make_question
@@ -167,9 +167,10 @@ def test_the_metrics_of_a_task_file_are_shown_beside_the_published_ones(
         .read_text()
         .replace("letters}", "letters, aggregation: median}")
     )
-    code, out, err = run_cli(*arguments, "--tasks", "nieh_own")
-    assert (code, out, len(err.strip().splitlines())) == (2, "", 1)
-    assert "letters is not averaged (aggregation: mean); use lm-eval" in err
+    assert_refused(
+        run_cli(*arguments, "--tasks", "nieh_own"),
+        "letters is not averaged (aggregation: mean); use lm-eval",
+    )
 
 
 @pytest.mark.parametrize("repeats", [1, 3])
@@ -244,13 +245,10 @@ def test_misuse_ends_in_one_line_and_exit_code_2(
 ):
     data = make_nieh_set(size=56)
     arguments = [str(data) if argument == "SET" else argument for argument in arguments]
-    code, out, err = run_cli(
-        *arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else [])
+    assert_refused(
+        run_cli(*arguments, *(["--output", tmp_path / "out"] if "--model" in arguments else [])),
+        expected,
     )
-    assert code == 2
-    assert expected in err
-    assert out == ""
-    assert len(err.strip().splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -258,12 +256,12 @@ def test_bad_data_ends_in_one_line_and_exit_code_2(make_nieh_set, tmp_path, run_
     data = make_nieh_set(size=56)
     for traj_id in ("traj_a", "traj_b"):
         (data / "metadata" / traj_id / "img" / "extra.png").write_bytes(b"")
-    code, _, err = run_cli(
-        "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
+    assert_refused(
+        run_cli(
+            "--model", "oracle", "--tasks", "nieh", "--data", data, "--output", tmp_path / "out"
+        ),
+        "trajectory traj_a: 7 frames but 6 entries",
     )
-    assert code == 2
-    assert "trajectory traj_a: 7 frames but 6 entries" in err
-    assert len(err.strip().splitlines()) == 1
 
 
 def test_what_is_skipped_is_counted_and_named(make_nieh_set, tmp_path, run_cli):

@@ -10,7 +10,7 @@ from infthor_eval.formats.question import Question
 from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_header, read_run
 
-from ...helpers.command_line import option_words
+from ...helpers.command_line import assert_refused, option_words
 from ...helpers.files import find_one
 from ...helpers.processes import finish, start_cli
 from ...helpers.waiting import wait_until
@@ -69,10 +69,7 @@ def test_a_missing_retriever_ends_in_one_line(data, tmp_path, run_cli, monkeypat
         ("nieh_memory_frames", ("--retriever", "./nowhere"), "there is no such folder"),
         ("nieh_gt", ("--retriever", "./nowhere"), "no context of nieh_gt retrieves frames"),
     ):
-        code, out, err = run_cli(*arguments, "--tasks", tasks, *options)
-        assert (code, out) == (2, "")
-        assert expected in err
-        assert len(err.strip().splitlines()) == 1
+        assert_refused(run_cli(*arguments, "--tasks", tasks, *options), expected)
     assert not (tmp_path / "out").exists()
 
 
@@ -110,11 +107,19 @@ def test_trajectories_are_read_from_the_folder_that_is_named(data, tmp_path, run
             "no such folder; give the folder of the trajectories with --traj",
         ),
     ):
-        code, output, err = run_cli(
-            "--model", "oracle", "--tasks", tasks, "--data", data, "--trajectories", trajectories
+        assert_refused(
+            run_cli(
+                "--model",
+                "oracle",
+                "--tasks",
+                tasks,
+                "--data",
+                data,
+                "--trajectories",
+                trajectories,
+            ),
+            expected,
         )
-        assert (code, output, len(err.strip().splitlines())) == (2, "", 1)
-        assert expected in err
 
 
 def test_videos_are_shown_where_they_are_and_a_broken_one_is_counted(

@@ -77,8 +77,9 @@ def _questions(folder: Path) -> None:
 def _make_decisions(folder: Path) -> Path:
     path = folder / "inspection.csv"
     path.write_text(
-        "question_id,traj_id,question,clues,answers,replies,decision\na,t,q,[1],['b'],m: "
-        "x,keep\nb,,,,,,\n"
+        "question_id,traj_id,question,clues,answers,replies,decision\n"
+        "a,t,q,[1],['b'],m: x,keep\n"
+        "b,,,,,,\n"
     )
     return path
 

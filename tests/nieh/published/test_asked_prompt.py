@@ -47,8 +47,8 @@ VIEWS, FILM = CONTEXTS["trajectory"].intro, CONTEXTS["video"].intro
 
 # Qwen2's split of a text into pieces that are merged apart.
 PIECES = regex.compile(
-    r"(?i:'s|'t|'re|'ve|'m|'ll|'d)|[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}| "
-    r"?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"
+    r"(?i:'s|'t|'re|'ve|'m|'ll|'d)|[^\r\n\p{L}\p{N}]?\p{L}+|\p{N}"
+    r"| ?[^\s\p{L}\p{N}]+[\r\n]*|\s*[\r\n]+|\s+(?!\S)|\s+"
 )
 # Between 5 special tokens.
 TEMPLATE = ("system\nYou are a helpful assistant.", "\n", "user\n", "\n", "assistant\n")

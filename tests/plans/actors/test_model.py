@@ -232,8 +232,9 @@ def test_plans_and_actions_are_in_the_words_that_are_asked_for(acting, data, wor
 
 def test_a_preamble_is_told_before_everything_else(acting, task_files, data):
     (task_files / "plans" / "infthor_plans.yaml").write_text(
-        "include: _plans.yaml\ntask: infthor_plans\ndataset_kwargs: {preamble: 'You are a robot. "
-        "'}\n"
+        "include: _plans.yaml\n"
+        "task: infthor_plans\n"
+        "dataset_kwargs: {preamble: 'You are a robot. '}\n"
     )
     _, model = acting(lambda *_: "")
     assert all(
@@ -332,31 +333,18 @@ def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(acting, d
         assert join_parts(parts).startswith("<image>" * len(digests) + FIRST + "<image><|plan|>")
 
 
-HISTORIES = {
-    "last:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "last:": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "last:-5": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "last:many": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "
-    "goals and plans",
-    "last:²": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "frames:0": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, "
-    "goals and plans",
-    "all": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and "
-    "plans",
-    "full:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-    "text:3": "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals "
-    "and plans",
-}
+THERE_ARE = (
+    "there are full, published, last:TOKENS, text, retrieved:K, frames:K, memory, goals and plans"
+)
+BAD_HISTORIES = (
+    *("last:0", "last:", "last:-5", "last:many", "last:²"),
+    *("frames:0", "all", "full:3", "text:3"),
+)
 
 
-@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("history", BAD_HISTORIES)
 def test_a_history_that_there_is_not_is_refused(prepared, history):
-    with pytest.raises(UsageError, match=HISTORIES[history]) as caught:
+    with pytest.raises(UsageError, match=THERE_ARE) as caught:
         prepared("random", history=history)
     assert str(caught.value).startswith(f"--history {history}: ")
 
