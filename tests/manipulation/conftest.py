@@ -11,27 +11,17 @@ from infthor_eval.runs import PreparedRun
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
-from ..episodes.pool import Pool
+from ..episodes.pool import Pool, pool, shared_simulators  # noqa: F401 - fixtures
 from ..episodes.preparing import preparer
 from ..helpers.trajectories import MUG, cut_trajectory, write_trajectories
 from .arena import Arena
 
 
 @pytest.fixture(scope="session")
-def pool() -> Iterator[Pool]:
-    pool = Pool()
-    with pool.open:
-        yield pool
-
-
-@pytest.fixture
-def shared_simulators(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Has runs of manipulation use the shared processes instead of starting their own."""
-    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.simulators_type())
-
-
-@pytest.fixture(scope="session")
-def arena(pool: Pool, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Arena]]:
+def arena(
+    pool: Pool,  # noqa: F811 - the fixture
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Callable[..., Arena]]:
     """Makes the arena of a bundled trajectory, cut to so many plans; each has an arm's simulator of
     its own."""
     arenas: dict[tuple[str, int], Arena] = {}

@@ -1,28 +1,15 @@
 """Runs of plans on trajectories that are cut down, in simulators that all tests share."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from infthor_eval.runs import PreparedRun
 
-from ..episodes.pool import Pool
+from ..episodes.pool import pool, shared_simulators  # noqa: F401 - fixtures
 from ..episodes.preparing import preparer
 from ..helpers.trajectories import FORK, cut_trajectory, write_trajectories
-
-
-@pytest.fixture(scope="session")
-def simulators() -> Iterator[Pool]:
-    pool = Pool()
-    with pool.open:
-        yield pool
-
-
-@pytest.fixture
-def shared_simulator(simulators: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Has runs of plans use the shared processes instead of starting their own."""
-    monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", simulators.simulators_type())
 
 
 @pytest.fixture

@@ -97,7 +97,7 @@ class Calls:
 
 
 @pytest.fixture
-def calls(monkeypatch, shared_simulator):
+def calls(monkeypatch, shared_simulators):
     calls = Calls()
     watch_calls(monkeypatch, calls)
     return calls
@@ -130,7 +130,7 @@ def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepared, tmp_pa
     assert n_restarts(disturbed) == calls.killed > 3
 
 
-@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.usefixtures("shared_simulators")
 @pytest.mark.parametrize("n_failures", [1, 2, 3])
 def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(
     prepared, tmp_path, monkeypatch, n_failures

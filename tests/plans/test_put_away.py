@@ -76,7 +76,7 @@ def test_the_published_rules_pay_the_task_alone_and_count_the_put_as_refused(sim
     assert by_expert(environment, PUT + 1)[1].ended == "done"
 
 
-@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.usefixtures("shared_simulators")
 def test_baselines_are_evaluated_on_it(prepared, tmp_path):
     data = write_trajectories(tmp_path / "away", pen_put_away(), cut_trajectory(MUG, 2))
     outcome = execute(prepared(data=data))
@@ -92,7 +92,7 @@ def test_baselines_are_evaluated_on_it(prepared, tmp_path):
         assert not any(record.excluded for record in others.records)
 
 
-@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.usefixtures("shared_simulators")
 def test_a_final_task_has_it_in_its_history(prepared, tmp_path):
     data = write_trajectories(tmp_path / "final", pen_put_away(final=True))
     settings = {"tasks": ("infthor_final",), "data": data}
@@ -140,7 +140,7 @@ def test_without_actions_it_is_no_plan_and_the_others_are():
     ]
 
 
-@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.usefixtures("shared_simulators")
 def test_without_actions_the_default_goes_on_and_the_published_loop_is_over(prepared, tmp_path):
     data = write_trajectories(tmp_path / "old", put_away_without_actions())
     assert [record.payload.ended for record in execute(prepared(data=data)).records] == ["done"] * 6
@@ -149,7 +149,7 @@ def test_without_actions_the_default_goes_on_and_the_published_loop_is_over(prep
     assert [record.excluded for record in outcome.records] == [None] * 4 + [ends] * 2
 
 
-@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.usefixtures("shared_simulators")
 @pytest.mark.parametrize(("name", "n_plans", "is_last"), [(FORK, 6, True), (CANDLE, 16, False)])
 def test_final_scripts_go_on_but_after_the_last_task_before_it(
     prepared, tmp_path, name, n_plans, is_last

@@ -15,7 +15,7 @@ from ..helpers.command_line import assert_refused, option_words
 from ..helpers.refusals import read_one_line
 from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
-pytestmark = pytest.mark.usefixtures("shared_simulator")
+pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 
 def payloads(outcome):

@@ -8,7 +8,6 @@ import subprocess
 import sys
 
 import pytest
-from safetensors.torch import load_file
 
 from infthor_eval.errors import InfthorError
 from infthor_eval.nieh.docs import doc_target
@@ -20,6 +19,7 @@ from model_adapters import Decoding, load
 from ..conftest import QUESTIONS
 from ..helpers.processes import cli_words
 from ..helpers.waiting import wait_until
+from .twins import read_weights
 
 RECIPE = """
 title: a small one
@@ -54,10 +54,6 @@ def train(recipe, data, out, **changes):
 
 def command(recipe, data, out, *more):
     return cli_words("train", "--recipe", recipe, "--data", data, "--out", out, *more)
-
-
-def weights(folder):
-    return load_file(folder / "checkpoint" / "model.safetensors")
 
 
 def same(first, second):
@@ -115,7 +111,7 @@ def test_a_run_that_is_killed_ends_with_the_weights_of_one_that_is_not(recipe, d
         (states / "checkpoint-11" / name).unlink(missing_ok=True)
     first, last = map(int, start("killed").communicate()[0].split())
     assert 1 < first <= last == 12
-    assert same(weights(tmp_path / "killed"), weights(tmp_path / "whole"))
+    assert same(read_weights(tmp_path / "killed"), read_weights(tmp_path / "whole"))
 
 
 def test_a_folder_is_one_runs(recipe, data, tmp_path, run_cli):
@@ -140,7 +136,7 @@ def test_adapters_are_trained_and_merged(recipe, data, tmp_path):
     assert after.keys() == before.keys()
     changed = {name.split(".")[-2] for name in after if not after[name].equal(before[name])}
     assert changed == {"q_proj", "k_proj", "v_proj", "o_proj", "gate_proj", "up_proj", "down_proj"}
-    assert not any("lora" in name for name in weights(tmp_path / "out"))
+    assert not any("lora" in name for name in read_weights(tmp_path / "out"))
 
 
 @pytest.mark.parametrize("rope", ["dynamic", "longrope"])

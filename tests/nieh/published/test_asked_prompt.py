@@ -1,7 +1,6 @@
 """With which prompt the published logs were asked, by the public vocabulary and without it."""
 
 import base64
-import gzip
 import importlib.util
 import json
 import os
@@ -18,6 +17,7 @@ from infthor_eval.nieh.prompts import PUBLISHED_LOGS, PUBLISHED_MAIN, question_t
 from infthor_eval.nieh.published import asked_prompt as module
 from infthor_eval.nieh.published.asked_prompt import asked_prompt
 
+from ...helpers.files import read_json_lines
 from ...helpers.questions import make_question
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "goldens" / "prompts.json").read_text())
@@ -81,11 +81,6 @@ def n_tokens(text):
     )
 
 
-def rows_of(log):
-    with gzip.open(log) as lines:
-        return [json.loads(line) for line in lines]
-
-
 @pytest.mark.parametrize("case", GOLDEN["published-logs"], ids=lambda case: case["question"])
 def test_the_logs_prompt_is_the_published_text(case):
     assert (
@@ -104,7 +99,7 @@ def test_the_prompt_of_main_is_the_published_text(case):
 def test_the_logs_prompt_has_the_logged_number_of_tokens_in_every_row():
     n = {PUBLISHED_LOGS: 0, PUBLISHED_MAIN: 0}
     n_rows = 0
-    for row in [row for log in REPLIES.glob("*.log.gz") for row in rows_of(log)]:
+    for row in [row for log in REPLIES.glob("*.log.gz") for row in read_json_lines(log)]:
         n_rows += 1
         n_text = row["ctx_n_tokens"] - 123 * row["n_imgs"]
         for prompt in n:

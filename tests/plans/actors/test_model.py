@@ -21,7 +21,7 @@ from ...helpers.prompts import join_parts
 from ...helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 from ..scripting import ScriptedModel, done_so_far, goal_asked, plan_asked
 
-pytestmark = pytest.mark.usefixtures("shared_simulator")
+pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 QWEN, LLAVA = "qwen2.5-vl-tiny", "llava-onevision-tiny"
 FIRST = "<|goal|>Your main goal: put a fork in the drawer<|goal|>"

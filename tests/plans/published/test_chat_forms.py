@@ -71,7 +71,7 @@ def test_other_histories_are_no_chat():
     assert form_named("full") is None
 
 
-@pytest.mark.usefixtures("shared_simulator")
+@pytest.mark.usefixtures("shared_simulators")
 def test_every_plan_is_asked_from_the_true_state(prepared, monkeypatch, tmp_path):
     model = ScriptedModel(lambda *_: "fly")
     monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)

@@ -16,7 +16,7 @@ from ...helpers.prompts import join_parts
 from ...helpers.trajectories import FORK, cut_trajectory, write_trajectories
 from ..scripting import ScriptedModel
 
-pytestmark = pytest.mark.usefixtures("shared_simulator")
+pytestmark = pytest.mark.usefixtures("shared_simulators")
 
 QWEN = "qwen2.5-vl-tiny"
 FIRST = "<|goal|>Your main goal: put a fork in the drawer<|goal|><image>"

@@ -1,6 +1,5 @@
 """Figures of arms: success by radius, and reward over steps, from numbers made by hand."""
 
-import re
 from dataclasses import replace
 
 from PIL import Image
@@ -12,6 +11,7 @@ from infthor_eval.report.figures.curves import draw_curves
 from infthor_eval.report.figures.radius import draw_radii, radii_table
 
 from ...helpers.arm_runs import make_arm_planner_run, make_arm_run, make_episode_record
+from .drawings import read_texts
 
 
 def runs():
@@ -32,14 +32,10 @@ def runs():
     ]
 
 
-def texts(svg):
-    return re.findall(r"<text[^>]*>([^<]*)</text>", svg.read_text(encoding="utf-8"))
-
-
 def test_figure_6_has_a_panel_for_both_kinds_and_for_each(tmp_path):
     curves = arm_curves([replace(run, label=f"run {number}") for number, run in enumerate(runs())])
     _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure6")
-    words_drawn = texts(svg)
+    words_drawn = read_texts(svg)
     for words in (
         "Pick-up and put",
         "Pick-up",
@@ -88,7 +84,7 @@ def test_success_by_radius_is_drawn_with_its_floor(tmp_path):
         "in the sphere at the start",
         "success (%)",
     ):
-        assert words in texts(one)
+        assert words in read_texts(one)
     with Image.open(tmp_path / "one.png") as picture:
         assert min(picture.size) > 300
     table = radii_table(curves)

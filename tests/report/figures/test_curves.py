@@ -23,6 +23,7 @@ from ...helpers.command_line import option_words
 from ...helpers.journals import write_run
 from ...helpers.plan_runs import make_plan_record, make_planner_run, make_plans_run
 from ...helpers.trajectories import CANDLE, cut_trajectory, write_trajectories
+from .drawings import read_texts
 
 EXAMPLE = Path(__file__).parents[3] / "docs" / "figure7_panels.yaml"
 
@@ -49,17 +50,13 @@ def runs(**about):
     ]
 
 
-def texts(svg: Path) -> list[str]:
-    return re.findall(r"<text[^>]*>([^<]*)</text>", svg.read_text(encoding="utf-8"))
-
-
 def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
     curves = plan_curves(runs())
     png, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
     with Image.open(png) as picture:
         assert min(picture.size) > 300
         assert len(picture.convert("RGB").getcolors(1 << 20)) > 10
-    words_drawn = texts(svg)
+    words_drawn = read_texts(svg)
     for words in (
         "planner",
         "model $x$ &amp; &lt;y&gt;",
@@ -81,7 +78,7 @@ def test_the_picture_is_there_in_both_forms_with_its_words(tmp_path):
 def test_a_name_in_letters_that_the_font_lacks_is_no_warning(tmp_path, recwarn):
     curves = plan_curves([make_plans_run("模型", records(1.0))])
     _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
-    assert "模型" in texts(svg)
+    assert "模型" in read_texts(svg)
     assert not recwarn.list
 
 
@@ -96,8 +93,8 @@ def test_the_same_curves_give_the_same_bytes(tmp_path):
 def test_a_bound_without_tokens_leaves_one_column(tmp_path):
     curves = plan_curves([make_plans_run("m", records(1.0, tokens=False))])
     _, svg = draw_curves(curves, one_panel(curves), tmp_path, "figure7")
-    assert "at most" in texts(svg)
-    assert not any("(tokens)" in words for words in texts(svg))
+    assert "at most" in read_texts(svg)
+    assert not any("(tokens)" in words for words in read_texts(svg))
 
 
 def test_the_label_names_the_embedded_runs_where_not_all_are():
@@ -133,7 +130,7 @@ def test_panels_have_their_runs_and_the_bound(tmp_path):
     file = tmp_path / "panels.yaml"
     file.write_text("First: ['model $x$ & <y>']\nSecond: [_random]\n")
     _, svg = draw_curves(curves, read_panels(file, curves), tmp_path, "figure7")
-    words_drawn = texts(svg)
+    words_drawn = read_texts(svg)
     assert [words_drawn.count(words) for words in ("First", "Second", "planner", "_random")] == [
         1,
         1,
@@ -226,7 +223,7 @@ def test_the_six_panels_are_drawn_over_thousands_of_tokens_with_the_planner_in_e
     )
     assert (code, err) == (0, "")
     assert "in no panel" not in output
-    words = texts(tmp_path / "figure7.svg")
+    words = read_texts(tmp_path / "figure7.svg")
     assert [words.count(word) for word in ("planner", "500K", FT[130])] == [6, 6, 2]
     assert sum(word.startswith(tuple(FIGURE_7)) for word in words) == 6
 
@@ -263,7 +260,7 @@ def test_the_six_panels_are_drawn_from_runs_of_tiny_models(tmp_path, run_cli, mo
     assert code == 0
     assert "in no panel" not in output
     assert {line.split()[0] for line in output.splitlines() if line.split()} >= {*NAMES, "planner"}
-    words = texts(Path("results/figures/figure7.svg"))
+    words = read_texts(Path("results/figures/figure7.svg"))
     assert words.count("planner") == 6
     replies = {
         name: _replies(Path("results", name))
