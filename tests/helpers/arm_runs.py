@@ -1,4 +1,4 @@
-"""Journals of arms made by hand: no simulator, no policy."""
+"""Runs of arms made by hand: no simulator, no policy."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -24,6 +24,8 @@ def make_episode_record(
     excluded: str | None = None,
     task: str | None = None,
 ) -> UnitRecord[ArmRecord]:
+    """The record of an episode; `most` is the most reward there is, `inside` whether the object is
+    in the hand's sphere at the start."""
     acted = failure is None and excluded is None
     payload = ArmRecord(
         index=index,
@@ -57,6 +59,7 @@ def make_arm_run(
     model: Mapping[str, Any] | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> ArmRun:
+    """A run of these episodes; `settings` are further ones of its tasks."""
     tasks = {
         record.task: {
             "kind": record.payload.kind,
@@ -81,6 +84,7 @@ def make_arm_run(
 def make_arm_planner_run(
     records: Sequence[UnitRecord[ArmRecord]], label: str = "planner-arm", **about: Any
 ) -> ArmRun:
+    """The run of the planner, which is the upper bound."""
     return make_arm_run(
         label, records, model={"name": "planner-arm", "baseline": "planner-arm"}, **about
     )

@@ -6,5 +6,6 @@ BUNDLED = packaged_folder("sets/nieh_mini")
 
 
 def bundled_name(scene: str) -> str:
+    """The name of the trajectory in a scene."""
     (folder,) = (BUNDLED / "metadata").glob(f"{scene}-seed*")
     return folder.name

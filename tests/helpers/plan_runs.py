@@ -1,4 +1,4 @@
-"""Journals of plans made by hand: no simulator, no model."""
+"""Runs of plans made by hand: no simulator, no model."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,6 +20,7 @@ def make_plans_config(
     rewards: Mapping[str, Any] | None = None,
     after_failure: str = "continue",
 ) -> dict[str, Any]:
+    """What identifies a run on these trajectories, as in its header."""
     about = {
         "trajectories": {name: f"digest of {name}" for name in trajectories},
         "rewards": dict(rewards or RULES),
@@ -52,7 +53,7 @@ def make_plan_record(
     excluded: str | None = None,
     task: str = TASK,
 ) -> UnitRecord[PlanRecord]:
-    """A plan over the expert's steps [first, end)."""
+    """The record of a plan over the expert's steps [first, end)."""
     first, end = steps
     payload = PlanRecord(
         index=index,
@@ -82,6 +83,7 @@ def make_plan_record(
 
 
 def make_plans_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **about: Any) -> PlansRun:
+    """A run of these plans; `about` is what `make_plans_config` takes."""
     names = list(dict.fromkeys(record.cluster for record in records))
     header = RunHeader(suite="plans", name=label, config=make_plans_config(names, **about))
     return PlansRun(label, header, records)
@@ -90,4 +92,5 @@ def make_plans_run(label: str, records: Sequence[UnitRecord[PlanRecord]], **abou
 def make_planner_run(
     records: Sequence[UnitRecord[PlanRecord]], label: str = "planner", **about: Any
 ) -> PlansRun:
+    """The run of the planner, which is the upper bound."""
     return make_plans_run(label, records, model={"name": "planner", "baseline": "planner"}, **about)
