@@ -49,7 +49,7 @@ def data(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def prepared(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
+def prepare_run(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
     """Prepares a run on that, see `preparer`."""
     return preparer("planner-arm", tasks=("manipulathor",), data=data, output=tmp_path / "out")
 

@@ -37,10 +37,10 @@ def read_results(output):
 
 
 @pytest.mark.usefixtures("shared_simulators")
-def test_a_run_that_is_killed_ends_as_one_that_is_not(prepared, tmp_path):
+def test_a_run_that_is_killed_ends_as_one_that_is_not(prepare_run, tmp_path):
     data = write_trajectories(tmp_path / "two", cut_trajectory(CANDLE, 6), cut_trajectory(MUG))
     whole, killed = tmp_path / "whole", tmp_path / "killed"
-    execute(prepared("random-arm", data=data, output=whole))
+    execute(prepare_run("random-arm", data=data, output=whole))
     process = start(data, killed)
     wait_until(lambda: any(lines(killed)), process)
     os.kill(process.pid, signal.SIGKILL)
@@ -95,13 +95,13 @@ def calls(monkeypatch, shared_simulators):
 
 @pytest.mark.parametrize("mode", ["arm", "default"])
 def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(
-    prepared, tmp_path, calls, mode
+    prepare_run, tmp_path, calls, mode
 ):
-    whole = execute(prepared("random-arm", output=tmp_path / "whole"))
+    whole = execute(prepare_run("random-arm", output=tmp_path / "whole"))
     n_calls = calls.n[mode]
     assert n_calls > 20
     calls.deadly = {(mode, n_calls + 2 * n_calls // 3)}
-    disturbed = execute(prepared("random-arm", output=tmp_path / "disturbed"))
+    disturbed = execute(prepare_run("random-arm", output=tmp_path / "disturbed"))
     assert calls.killed == 1
     assert drop_times(disturbed.records) == drop_times(whole.records)
     assert disturbed.summary.summary == whole.summary.summary
@@ -114,9 +114,9 @@ def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(
 @pytest.mark.usefixtures("shared_simulators")
 @pytest.mark.parametrize("n_failures", [2, 3])
 def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(
-    prepared, tmp_path, monkeypatch, n_failures
+    prepare_run, tmp_path, monkeypatch, n_failures
 ):
-    whole = execute(prepared("random-arm", output=tmp_path / "whole"))
+    whole = execute(prepare_run("random-arm", output=tmp_path / "whole"))
     step, failures = ArmEnvironment.step, []
 
     def failing(environment, action):
@@ -126,7 +126,7 @@ def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(
         return step(environment, action)
 
     monkeypatch.setattr(ArmEnvironment, "step", failing)
-    outcome = execute(prepared("random-arm", output=tmp_path / "failing"))
+    outcome = execute(prepare_run("random-arm", output=tmp_path / "failing"))
     (first,) = (record for record in outcome.records if record.payload.index == 9)
     if n_failures < 3:
         assert first.faults == tuple(failures)
@@ -142,18 +142,18 @@ def test_an_episode_is_begun_anew_where_the_simulator_fails_for_good(
 
 
 def test_two_trajectories_at_once_find_what_one_after_the_other_finds(
-    prepared, tmp_path, monkeypatch, pool
+    prepare_run, tmp_path, monkeypatch, pool
 ):
     data = write_trajectories(tmp_path / "two", cut_trajectory(CANDLE), cut_trajectory(MUG))
     counting = ChildCounter()
-    together = execute(prepared("random-arm", data=data, output=tmp_path / "together"), counting)
+    together = execute(prepare_run("random-arm", data=data, output=tmp_path / "together"), counting)
     assert 2 < counting.most <= 4  # an expert and an arm for each
     assert not find_children() - counting.before  # simulators end with their runs
     one_by_one = Capabilities(counts_tokens=False, token_ids=False)
     assert BASELINES["random-arm"](0).capabilities.max_in_flight == 2
     monkeypatch.setattr(BASELINES["random-arm"], "capabilities", one_by_one)
     monkeypatch.setattr("infthor_eval.episodes.evaluation.Simulators", pool.simulators_type())
-    alone = execute(prepared("random-arm", data=data, output=tmp_path / "alone"))
+    alone = execute(prepare_run("random-arm", data=data, output=tmp_path / "alone"))
     assert drop_times(together.records) == drop_times(alone.records)
     assert together.summary == alone.summary
     assert len(together.records) == 3

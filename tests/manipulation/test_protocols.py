@@ -16,7 +16,7 @@ OPEN = ArmDelta((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.9)
 
 
 @pytest.fixture
-def picking(prepared, monkeypatch, tmp_path):
+def picking(prepare_run, monkeypatch, tmp_path):
     """The record of a pick-up of a clock beside the expert, by a policy that holds its hand still
     and open."""
     data = write_trajectories(tmp_path / "clock", cut_trajectory(MUG, 6))
@@ -26,7 +26,7 @@ def picking(prepared, monkeypatch, tmp_path):
             monkeypatch.setattr(
                 "infthor_eval.runs.work.binding.load", lambda *_: ScriptedPolicy(lambda _: [OPEN])
             )
-        *_, record = execute(prepared(model, tasks=(PICK,), data=data, **changes)).records
+        *_, record = execute(prepare_run(model, tasks=(PICK,), data=data, **changes)).records
         assert not record.failure and not record.excluded
         return record.payload
 
@@ -62,9 +62,9 @@ def test_the_hand_begins_at_rest_low_or_high(picking):
 
 
 @pytest.mark.parametrize("changes", [{"stand": "before"}, {"hand": "high"}, {"closing": "end"}])
-def test_each_is_another_run(prepared, changes):
+def test_each_is_another_run(prepare_run, changes):
     def config(**changes):
-        run = prepared("still", **changes)
+        run = prepare_run("still", **changes)
         return run.evaluation.bind(run.suite.baselines["still"](0)).workload.config
 
     assert config() != config(**changes)

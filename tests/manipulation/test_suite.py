@@ -46,9 +46,9 @@ def policy(monkeypatch):
 # -- a run
 
 
-def test_the_planner_does_what_the_expert_did(prepared, data):
+def test_the_planner_does_what_the_expert_did(prepare_run, data):
     write_trajectories(data / "more", cut_trajectory(CANDLE))
-    outcome = execute(prepared())
+    outcome = execute(prepare_run())
     records = by_key(outcome)
     assert {key: record.payload.instruction for key, record in records.items()} == {
         (PICK, MUG, 9): "pick up the mug",
@@ -69,8 +69,8 @@ def test_the_planner_does_what_the_expert_did(prepared, data):
     ]  # fmt: skip
 
 
-def test_the_journal_reads_back(prepared):
-    outcome = execute(prepared("random-arm"))
+def test_the_journal_reads_back(prepare_run):
+    outcome = execute(prepare_run("random-arm"))
     header, records = read_run(outcome.folder, RECORDS)[:2]
     assert list(records) == list(outcome.records)
     assert outcome.run.suite.summarise(header, records) == outcome.summary.summary
@@ -82,17 +82,17 @@ def test_the_journal_reads_back(prepared):
     }
 
 
-def test_the_limit_is_of_episodes(prepared):
-    outcome = execute(prepared("still", limit=1))
+def test_the_limit_is_of_episodes(prepare_run):
+    outcome = execute(prepare_run("still", limit=1))
     assert sorted(by_key(outcome)) == [(PICK, MUG, 9), (PUT, MUG, 21)]
     assert outcome.summary.header.config["limit"] == 1
 
 
-def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, task_file, tmp_path):
+def test_equal_seeds_act_alike_and_other_seeds_do_not(prepare_run, task_file, tmp_path):
     task_file("max_steps: 3")
 
     def moved(seed, folder):
-        outcome = execute(prepared("random-arm", seed=seed, output=tmp_path / folder))
+        outcome = execute(prepare_run("random-arm", seed=seed, output=tmp_path / folder))
         return [[step.delta for step in record.payload.steps] for record in outcome.records]
 
     first = moved(7, "a")
@@ -112,9 +112,9 @@ def test_several_radii_are_runs_of_their_own(data, tmp_path):
     assert [row.cells[1] for row in table.rows if not row.is_published] == ["0.06", "0.5"]
 
 
-def test_all_that_changes_a_number_is_part_of_a_runs_identity(prepared, task_file, data):
+def test_all_that_changes_a_number_is_part_of_a_runs_identity(prepare_run, task_file, data):
     def prints(**changes):
-        run = prepared("still", **changes)
+        run = prepare_run("still", **changes)
         bound = run.evaluation.bind(run.suite.baselines["still"](0))
         bound.close()
         return [bound._fingerprint(unit) for unit in bound.workload.groups[0].units]
@@ -149,11 +149,11 @@ def twins():
 
 
 @pytest.mark.parametrize("name", ["openvla-tiny", "spatialvla-tiny"])
-def test_tiny_policies_run_both_tasks(prepared, task_file, twins, monkeypatch, name):
+def test_tiny_policies_run_both_tasks(prepare_run, task_file, twins, monkeypatch, name):
     task_file("max_steps: 5")
     monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: twins[name])
     monkeypatch.setattr(twins[name], "close", lambda: None)
-    outcome = execute(prepared(name))
+    outcome = execute(prepare_run(name))
     assert sorted(by_key(outcome)) == [(PICK, MUG, 9), (PUT, MUG, 21)]
     for record in outcome.records:
         assert record.failure is record.excluded is None
@@ -163,19 +163,19 @@ def test_tiny_policies_run_both_tasks(prepared, task_file, twins, monkeypatch, n
     assert outcome.summary.summary.tasks[PICK].success.n == 1
     (table, *_) = outcome.run.suite.tables([outcome.summary])
     assert [row.cells[0] for row in table.rows if not row.is_published] == [name]
-    again = execute(prepared(name, output=outcome.folder.parents[1] / "again"))
+    again = execute(prepare_run(name, output=outcome.folder.parents[1] / "again"))
     assert [record.payload for record in again.records] == [
         record.payload for record in outcome.records
     ]
 
 
 def test_a_policy_sees_the_present_frame_once_per_chunk_and_is_told_what_to_do(
-    prepared, task_file, policy
+    prepare_run, task_file, policy
 ):
     task_file("max_steps: 4, image_size: 96")
     move = ArmDelta((0.0, 0.05, 0.0), (0.0, 0.0, 0.2), 0.49)
     scripted = policy(lambda number: (move, STILL))
-    outcome = execute(prepared("openvla-tiny", instruction="please: {object}"))
+    outcome = execute(prepare_run("openvla-tiny", instruction="please: {object}"))
     assert [len(record.payload.steps) for record in outcome.records] == [4, 4]
     assert scripted.instructions == ["please: mug"] * 4
     assert scripted.resets == [0, 2]
@@ -186,12 +186,12 @@ def test_a_policy_sees_the_present_frame_once_per_chunk_and_is_told_what_to_do(
         assert [bool(step.calls) for step in record.payload.steps] == [True, False] * 2
 
 
-def test_blank_frames_are_plain_and_change_nothing_else(prepared, task_file, policy, tmp_path):
+def test_blank_frames_are_plain_and_change_nothing_else(prepare_run, task_file, policy, tmp_path):
     task_file("max_steps: 2, image_size: 64")
     on_true_frames = policy(lambda number: (STILL,))
-    plain = execute(prepared("openvla-tiny"))
+    plain = execute(prepare_run("openvla-tiny"))
     blank = policy(lambda number: (STILL,))
-    outcome = execute(prepared("openvla-tiny", frames="blank", output=tmp_path / "blank"))
+    outcome = execute(prepare_run("openvla-tiny", frames="blank", output=tmp_path / "blank"))
     assert len(set(blank.seen)) == 1 and not set(blank.seen) & set(on_true_frames.seen)
     with Image.open(io.BytesIO(blank.seen[0])) as image:
         pixels = np.asarray(image)
@@ -222,11 +222,11 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_is_no_movement_is_a_failure_of_the_policy(prepared, task_file, policy, name):
+def test_what_is_no_movement_is_a_failure_of_the_policy(prepare_run, task_file, policy, name):
     task_file("max_steps: 3, image_size: 32")
     chunk, expected = BAD[name]
     policy(lambda number: chunk)
-    outcome = execute(prepared("openvla-tiny", tasks=(PICK,)))
+    outcome = execute(prepare_run("openvla-tiny", tasks=(PICK,)))
     (record,) = outcome.records
     assert expected in record.failure and "\n" not in record.failure
     assert (record.payload.ended, record.payload.done, record.excluded) == ("", False, None)
@@ -237,7 +237,7 @@ def test_what_is_no_movement_is_a_failure_of_the_policy(prepared, task_file, pol
 # -- what cannot be evaluated
 
 
-def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepared, tmp_path):
+def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepare_run, tmp_path):
     document = cut_trajectory(MUG)
     document["plan"]["low_actions"][12]["api_action"] = {
         "action": "OpenObject",
@@ -245,7 +245,7 @@ def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepared, tmp_p
     }
     for model in ("planner-arm", "still"):
         outcome = execute(
-            prepared(
+            prepare_run(
                 model,
                 data=write_trajectories(tmp_path / model, document),
                 output=tmp_path / "out" / model,
@@ -260,22 +260,24 @@ def test_a_trajectory_whose_expert_is_refused_counts_up_to_there(prepared, tmp_p
         assert f"1 left out: {put.excluded}" in table.notes
 
 
-def test_an_episode_whose_object_is_missing_counts_for_nobody(prepared, tmp_path):
+def test_an_episode_whose_object_is_missing_counts_for_nobody(prepare_run, tmp_path):
     document = cut_trajectory(MUG)
     recorded = document["plan"]["low_actions"][9]["api_action"]
     recorded["objectId"] = "Elephant|+00.00|+00.00|+00.00"
-    outcome = execute(prepared("still", data=write_trajectories(tmp_path / "elephant", document)))
+    outcome = execute(
+        prepare_run("still", data=write_trajectories(tmp_path / "elephant", document))
+    )
     # What comes after is not known either.
     assert all("Elephant" in record.excluded for record in outcome.records)
     assert by_key(outcome)[PICK, MUG, 9].payload.instruction == "pick up the elephant"
     assert outcome.summary.summary.tasks[PICK].success is None
 
 
-def test_a_scene_that_is_not_here_counts_for_nobody(prepared, data):
+def test_a_scene_that_is_not_here_counts_for_nobody(prepare_run, data):
     document = cut_trajectory(FORK, called="elsewhere")
     document["scene"]["floor_plan"] = "FloorPlan7"
     (data / "elsewhere.json").write_text(json.dumps(document))
-    outcome = execute(prepared("still"))
+    outcome = execute(prepare_run("still"))
     left_out = [record for record in outcome.records if record.excluded is not None]
     assert [record.cluster for record in left_out] == ["elsewhere"] * 2
     assert all(
@@ -300,7 +302,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
+def test_a_broken_trajectory_is_skipped_named_and_counted(prepare_run, data, name):
     damage, expected = BROKEN[name]
     if isinstance(damage, str):
         (data / "broken.json").write_text(damage)
@@ -308,7 +310,7 @@ def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
         document = cut_trajectory(MUG, called="broken")
         damage(document)
         (data / "broken.json").write_text(json.dumps(document))
-    outcome = execute(prepared("still", tasks=(PICK,)))
+    outcome = execute(prepare_run("still", tasks=(PICK,)))
     ((reason, number),) = outcome.summary.summary.tasks[PICK].skipped.items()
     assert number == 1 and reason.startswith("broken.json") and expected in reason
     assert "\n" not in reason and str(data) not in reason
@@ -317,18 +319,20 @@ def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
     assert len(outcome.records) == 1
 
 
-def test_where_no_trajectory_has_such_an_action_that_is_said(prepared, tmp_path):
+def test_where_no_trajectory_has_such_an_action_that_is_said(prepare_run, tmp_path):
     data = write_trajectories(tmp_path / "walks", cut_trajectory(MUG, 1))
     with pytest.raises(
         UsageError, match="manipulathor_pickup: no trajectory there has a Pick-up"
     ) as caught:
-        prepared(data=data)
+        prepare_run(data=data)
     read_one_line(caught)
     with pytest.raises(UsageError, match="manipulathor_put: no trajectory there has a Put"):
-        prepared(data=write_trajectories(tmp_path / "picks", cut_trajectory(MUG, 2)), tasks=(PUT,))
+        prepare_run(
+            data=write_trajectories(tmp_path / "picks", cut_trajectory(MUG, 2)), tasks=(PUT,)
+        )
 
 
-def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
+def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):
     broken = tmp_path / "broken"
     broken.mkdir()
     (broken / "a.json").write_text("{")
@@ -337,7 +341,7 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
         (broken, DataError, "nothing to evaluate"),
     ):
         with pytest.raises(error, match=expected) as caught:
-            prepared(data=place)
+            prepare_run(data=place)
         read_one_line(caught)
 
 
@@ -357,7 +361,7 @@ def test_an_option_that_does_not_fit_ends_the_command_in_one_line(
     assert expected in " ".join(err.split()) and "Traceback" not in err
 
 
-def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
+def test_two_tasks_about_the_same_episodes_run_together(prepare_run, task_files):
     """They share the expert's history; each has its own frames' size and radius."""
     for name, settings in (("near", "radius: 0.06, image_size: 64"), ("far", "radius: 0.5")):
         (task_files / "manipulation" / f"{name}.yaml").write_text(
@@ -365,7 +369,7 @@ def test_two_tasks_about_the_same_episodes_run_together(prepared, task_files):
             f"task: {name}\n"
             f"dataset_kwargs: {{kind: pickup, {settings}}}\n"
         )
-    outcome = execute(prepared("planner-arm", tasks=("near", "far")))
+    outcome = execute(prepare_run("planner-arm", tasks=("near", "far")))
     records = by_key(outcome)
     assert sorted(records) == [("far", MUG, 9), ("near", MUG, 9)]
     assert records["far", MUG, 9].payload.done

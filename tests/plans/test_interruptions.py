@@ -111,21 +111,21 @@ def n_restarts(outcome):
 
 @pytest.mark.parametrize("model", ["planner", "random"])
 def test_a_simulator_that_dies_in_mid_plan_changes_no_result_and_is_counted(
-    prepared, tmp_path, calls, model
+    prepare_run, tmp_path, calls, model
 ):
-    whole = execute(prepared(model, output=tmp_path / "whole"))
+    whole = execute(prepare_run(model, output=tmp_path / "whole"))
     n_calls = calls.n
     calls.deadly_from_now(random.Random(3).sample(range(1, n_calls), 2))
-    disturbed = execute(prepared(model, output=tmp_path / "disturbed"))
+    disturbed = execute(prepare_run(model, output=tmp_path / "disturbed"))
     assert drop_times(disturbed.records) == drop_times(whole.records)
     assert disturbed.summary.summary == whole.summary.summary
     assert (n_restarts(whole), n_restarts(disturbed), calls.killed) == (0, 2, 2)
 
 
-def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepared, tmp_path, calls):
-    whole = execute(prepared(output=tmp_path / "whole"))
+def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepare_run, tmp_path, calls):
+    whole = execute(prepare_run(output=tmp_path / "whole"))
     calls.deadly_from_now(range(10, 400, 28))
-    disturbed = execute(prepared(output=tmp_path / "disturbed"))
+    disturbed = execute(prepare_run(output=tmp_path / "disturbed"))
     assert drop_times(disturbed.records) == drop_times(whole.records)
     assert n_restarts(disturbed) == calls.killed > 3
 
@@ -133,9 +133,9 @@ def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepared, tmp_pa
 @pytest.mark.usefixtures("shared_simulators")
 @pytest.mark.parametrize("n_failures", [1, 2, 3])
 def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(
-    prepared, tmp_path, monkeypatch, n_failures
+    prepare_run, tmp_path, monkeypatch, n_failures
 ):
-    whole = execute(prepared(output=tmp_path / "whole"))
+    whole = execute(prepare_run(output=tmp_path / "whole"))
     step, failures = PlanEnvironment.step, []
 
     def failing(environment, action):
@@ -145,7 +145,7 @@ def test_a_plan_is_begun_anew_where_the_simulator_fails_for_good(
         return step(environment, action)
 
     monkeypatch.setattr(PlanEnvironment, "step", failing)
-    outcome = execute(prepared(output=tmp_path / "failing"))
+    outcome = execute(prepare_run(output=tmp_path / "failing"))
     third = outcome.records[2]
     if n_failures < 3:
         assert third.faults == tuple(failures)

@@ -11,7 +11,9 @@ from ..helpers.processes import ChildCounter, find_children
 from ..helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
 
-def test_four_episodes_at_once_find_what_one_after_the_other_finds(prepared, tmp_path, monkeypatch):
+def test_four_episodes_at_once_find_what_one_after_the_other_finds(
+    prepare_run, tmp_path, monkeypatch
+):
     data = write_trajectories(
         tmp_path / "three",
         cut_trajectory(FORK, 2),
@@ -19,13 +21,13 @@ def test_four_episodes_at_once_find_what_one_after_the_other_finds(prepared, tmp
         cut_trajectory(CANDLE, 3),
     )
     counting = ChildCounter()
-    together = execute(prepared("random", data=data, output=tmp_path / "together"), counting)
+    together = execute(prepare_run("random", data=data, output=tmp_path / "together"), counting)
     assert 1 < counting.most <= 3
     assert not find_children() - counting.before  # simulators end with their runs
     assert BASELINES["random"](0).capabilities.max_in_flight == 4
     one_by_one = Capabilities(counts_tokens=False, token_ids=False)
     monkeypatch.setattr(BASELINES["random"], "capabilities", one_by_one)
-    alone = execute(prepared("random", data=data, output=tmp_path / "alone"))
+    alone = execute(prepare_run("random", data=data, output=tmp_path / "alone"))
 
     def timeless(outcome):
         return [msgspec.structs.replace(record, seconds=0.0) for record in outcome.records]

@@ -40,9 +40,9 @@ def cells(outcome, title):
 # -- what a run finds
 
 
-def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, data):
+def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepare_run, data):
     write_trajectories(data / "more", cut_trajectory(MUG, 2))
-    outcome = execute(prepared())
+    outcome = execute(prepare_run())
     plans = {(record.cluster, record.payload.index): record.payload for record in outcome.records}
     # By hand, from the expert's actions: eleven steps and a look, the last of which leaves a step
     # (done with fewer than three to go); what is closed is opened and closed around a thing.
@@ -92,10 +92,10 @@ def test_the_planner_carries_every_plan_out_and_earns_all_there_is(prepared, dat
     assert outcome.run.suite.scores(outcome.records[-1]) == {"success": 1.0, "reward": 11.0}
 
 
-def test_what_is_exported_has_a_sample_for_each_plan(prepared):
+def test_what_is_exported_has_a_sample_for_each_plan(prepare_run):
     from infthor_eval.harness.export import export
 
-    outcome = execute(prepared())
+    outcome = execute(prepare_run())
     export(outcome)
     (path,) = outcome.folder.rglob("samples_infthor_plans_*.jsonl")
     rows = [json.loads(line) for line in path.read_text().splitlines()]
@@ -108,8 +108,8 @@ def test_what_is_exported_has_a_sample_for_each_plan(prepared):
     assert list(outcome.samples)[1].prompt == "put a fork in the drawer\npick up the Fork"
 
 
-def test_the_published_rules_have_the_published_faults(prepared):
-    plans = payloads(execute(prepared(rewards="published")))
+def test_the_published_rules_have_the_published_faults(prepare_run):
+    plans = payloads(execute(prepare_run(rewards="published")))
     assert [(plan.ended, plan.reward) for plan in plans] == [
         ("done", pytest.approx(6)),
         ("done", 2),
@@ -120,16 +120,16 @@ def test_the_published_rules_have_the_published_faults(prepared):
     assert all(step.call["forceAction"] for plan in plans for step in plan.steps)
 
 
-def test_the_limit_is_of_trajectories(prepared, tmp_path):
+def test_the_limit_is_of_trajectories(prepare_run, tmp_path):
     data = write_trajectories(tmp_path / "two", cut_trajectory(FORK, 1), cut_trajectory(MUG, 1))
-    outcome = execute(prepared("scripted", data=data, limit=1))
+    outcome = execute(prepare_run("scripted", data=data, limit=1))
     assert [record.cluster for record in outcome.records] == [MUG]  # the first by name
     assert outcome.summary.header.config["limit"] == 1
 
 
-def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, tmp_path):
+def test_equal_seeds_act_alike_and_other_seeds_do_not(prepare_run, tmp_path):
     def actions(seed, folder):
-        outcome = execute(prepared("random", seed=seed, output=tmp_path / folder))
+        outcome = execute(prepare_run("random", seed=seed, output=tmp_path / folder))
         return [[step.action for step in plan.steps] for plan in payloads(outcome)]
 
     first = actions(7, "a")
@@ -137,23 +137,24 @@ def test_equal_seeds_act_alike_and_other_seeds_do_not(prepared, tmp_path):
     assert actions(8, "c") != first
 
 
-def test_what_a_baseline_does_in_a_trajectory_depends_on_no_other(prepared, data, tmp_path):
-    alone = payloads(execute(prepared("random")))
+def test_what_a_baseline_does_in_a_trajectory_depends_on_no_other(prepare_run, data, tmp_path):
+    alone = payloads(execute(prepare_run("random")))
     write_trajectories(data / "more", cut_trajectory(MUG, 1))
     beside = [
         record
-        for record in execute(prepared("random", output=tmp_path / "b")).records
+        for record in execute(prepare_run("random", output=tmp_path / "b")).records
         if record.cluster == FORK
     ]
     assert [record.payload for record in beside] == alone
 
 
-def test_habits_are_learnt_in_other_scenes_alone(prepared, data, tmp_path):
-    alone = payloads(execute(prepared("history")))
+def test_habits_are_learnt_in_other_scenes_alone(prepare_run, data, tmp_path):
+    alone = payloads(execute(prepare_run("history")))
     assert {step.action for plan in alone for step in plan.steps} == {"NoOp"}
     write_trajectories(data / "more", cut_trajectory(MUG, 4))
     learnt = [
-        record.payload for record in execute(prepared("history", output=tmp_path / "b")).records[4:]
+        record.payload
+        for record in execute(prepare_run("history", output=tmp_path / "b")).records[4:]
     ]
     assert learnt[0].steps[0].action == "MoveAhead"
     assert learnt[1].steps[0].message.startswith("PickupObject Fork: ")  # the cabinet is closed
@@ -172,10 +173,12 @@ def refused_in(plan):
 
 
 @pytest.mark.parametrize("after_failure", ["continue", "stop"])
-def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_path, after_failure):
+def test_plans_that_the_expert_cannot_do_here_count_for_nobody(
+    prepare_run, tmp_path, after_failure
+):
     data = write_trajectories(tmp_path / "refused", refused_in(2))
     for model, ended in (("planner", "done"), ("scripted", "refused by the simulator")):
-        outcome = execute(prepared(model, data=data, after_failure=after_failure))
+        outcome = execute(prepare_run(model, data=data, after_failure=after_failure))
         assert payloads(outcome)[0].ended == ended
         task = summary(outcome)
         assert (task.n_plans, task.n_failed, sum(task.endings.values())) == (2, 0, 2)
@@ -194,22 +197,22 @@ def test_plans_that_the_expert_cannot_do_here_count_for_nobody(prepared, tmp_pat
         assert f"2 left out: {reason}" in table.notes
 
 
-def test_a_plan_about_what_is_not_there_counts_for_nobody(prepared, tmp_path):
+def test_a_plan_about_what_is_not_there_counts_for_nobody(prepare_run, tmp_path):
     document = cut_trajectory(FORK)
     document["plan"]["high_pddl"][3]["planner_action"]["receptacleObjectId"] = (
         "Elephant|+00.00|+00.00|+00.00"
     )
-    outcome = execute(prepared(data=write_trajectories(tmp_path / "elephant", document)))
+    outcome = execute(prepare_run(data=write_trajectories(tmp_path / "elephant", document)))
     task = summary(outcome)
     assert task.excluded == {"the scene has no object for 'Elephant|+00.00|+00.00|+00.00'": 1}
     assert (task.n_plans, task.n_failed, task.endings) == (3, 0, {"done": 3})
 
 
-def test_trajectories_in_a_scene_that_is_not_here_count_for_nobody(prepared, data):
+def test_trajectories_in_a_scene_that_is_not_here_count_for_nobody(prepare_run, data):
     document = cut_trajectory(MUG, 2, called="elsewhere")
     document["scene"]["floor_plan"] = "FloorPlan7"
     (data / "elsewhere.json").write_text(json.dumps(document))
-    outcome = execute(prepared("scripted"))
+    outcome = execute(prepare_run("scripted"))
     task = summary(outcome)
     ((reason, number),) = task.excluded.items()
     assert reason.startswith("scene FloorPlan7: ")
@@ -253,7 +256,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
+def test_a_broken_trajectory_is_skipped_named_and_counted(prepare_run, data, name):
     damage, expected = BROKEN[name]
     document = cut_trajectory(FORK, called="broken")
     if isinstance(damage, str):
@@ -261,7 +264,7 @@ def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
     else:
         damage(document)
         (data / "broken.json").write_text(json.dumps(document))
-    run = prepared("scripted")
+    run = prepare_run("scripted")
     (skipped,) = run.evaluation.bind(run.suite.baselines["scripted"](0)).workload.skipped
     assert skipped.key.id == "broken.json"
     assert expected in skipped.reason
@@ -269,12 +272,12 @@ def test_a_broken_trajectory_is_skipped_named_and_counted(prepared, data, name):
     assert str(data) not in skipped.reason  # the run is the same one wherever its data lie
 
 
-def test_files_that_cannot_be_read_are_skipped_too(prepared, data):
+def test_files_that_cannot_be_read_are_skipped_too(prepare_run, data):
     (data / "a.jsonl.gz").write_bytes(b"no gzip")
     (data / "b.json").mkdir()
     (data / "c.json").symlink_to("nowhere")
     (data / "d.jsonl").write_text(json.dumps(cut_trajectory(MUG, 1, called="sound")) + "\n{\n")
-    outcome = execute(prepared())
+    outcome = execute(prepare_run())
     assert {record.cluster for record in outcome.records} == {FORK, "sound"}
     task = summary(outcome)
     assert (sum(task.skipped.values()), task.n_trajectories) == (3, 2)
@@ -285,7 +288,7 @@ def test_files_that_cannot_be_read_are_skipped_too(prepared, data):
     )
 
 
-def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
+def test_nothing_to_evaluate_is_refused_in_one_line(prepare_run, tmp_path):
     nowhere, empty, broken = (tmp_path / name for name in ("nowhere", "empty", "broken"))
     empty.mkdir()
     broken.mkdir()
@@ -297,19 +300,19 @@ def test_nothing_to_evaluate_is_refused_in_one_line(prepared, tmp_path):
         (broken, DataError, "nothing to evaluate"),
     ):
         with pytest.raises(error, match=expected) as caught:
-            prepared(data=place)
+            prepare_run(data=place)
         read_one_line(caught)
     twice = write_trajectories(tmp_path / "twice", cut_trajectory(FORK, 1))
     write_trajectories(twice / "again", cut_trajectory(FORK, 2))
     with pytest.raises(DataError, match=f"{FORK} is the name of another trajectory too"):
-        prepared(data=twice)
+        prepare_run(data=twice)
 
 
 # -- final tasks
 
 
 def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_published_rows(
-    prepared, tmp_path, monkeypatch
+    prepare_run, tmp_path, monkeypatch
 ):
     row = PublishedRow("a paper's model", (), 7.0, (10.0, 20.0, 30.0, 25.0))
     table = PublishedTable(
@@ -319,7 +322,7 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
     data = write_trajectories(
         tmp_path / "final", cut_trajectory(FORK, 6, final=True), cut_trajectory(MUG, 2)
     )
-    outcome = execute(prepared(tasks=("infthor_final",), data=data))
+    outcome = execute(prepare_run(tasks=("infthor_final",), data=data))
     assert [
         (record.cluster, record.payload.index, record.payload.is_final)
         for record in outcome.records
@@ -333,7 +336,7 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
         for note in table.notes
     )
     theirs = execute(
-        prepared(tasks=("infthor_final",), data=data, protocol="published", rewards="published")
+        prepare_run(tasks=("infthor_final",), data=data, protocol="published", rewards="published")
     )
     (table, *_) = theirs.run.suite.tables([theirs.summary])
     (published,) = [row for row in table.rows if row.is_published]
@@ -345,16 +348,16 @@ def test_final_tasks_are_those_of_trajectories_that_have_one_beside_the_publishe
         "30.0*",
         "25.0",
     )
-    plain = execute(prepared(data=data))
+    plain = execute(prepare_run(data=data))
     assert len(plain.records) == 8
     assert not any(row.is_published for row in plain.run.suite.tables([plain.summary])[0].rows)
 
 
-def test_where_no_trajectory_has_a_final_task_that_is_said(prepared, run_cli, data, tmp_path):
+def test_where_no_trajectory_has_a_final_task_that_is_said(prepare_run, run_cli, data, tmp_path):
     with pytest.raises(
         UsageError, match="infthor_final: no trajectory there has a final task"
     ) as caught:
-        prepared(tasks=("infthor_final",))
+        prepare_run(tasks=("infthor_final",))
     read_one_line(caught)
     assert_refused(
         run_cli(
@@ -368,8 +371,8 @@ def test_where_no_trajectory_has_a_final_task_that_is_said(prepared, run_cli, da
 # -- after a failure
 
 
-def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_nothing(prepared):
-    outcome = execute(prepared("scripted", after_failure="stop"))
+def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_nothing(prepare_run):
+    outcome = execute(prepare_run("scripted", after_failure="stop"))
     first, *others = outcome.records
     assert first.payload.ended == "refused by the simulator"  # it walks on and on
     assert {record.payload.ended for record in others} == {NOT_ATTEMPTED}
@@ -381,13 +384,13 @@ def test_where_a_failure_ends_the_episode_later_plans_are_not_come_to_and_earn_n
     assert (task.n_plans, task.endings) == (4, {NOT_ATTEMPTED: 3, "refused by the simulator": 1})
     assert task.success["total"].mean == 0
     assert outcome.run.suite.scores(others[0]) == {}
-    going_on = execute(prepared("scripted"))
+    going_on = execute(prepare_run("scripted"))
     assert [plan.ended for plan in payloads(going_on)][1:] != [NOT_ATTEMPTED] * 3
-    assert execute(prepared(after_failure="stop")).records[-1].payload.done
+    assert execute(prepare_run(after_failure="stop")).records[-1].payload.done
 
 
 def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
-    prepared, monkeypatch
+    prepare_run, monkeypatch
 ):
     from infthor_eval.errors import ModelError
     from infthor_eval.plans.actors.protocols import baselines
@@ -401,7 +404,7 @@ def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
 
     with monkeypatch.context() as patched:
         patched.setattr(baselines._ExpertActor, "act", fails)
-        broken = execute(prepared(after_failure="stop"))
+        broken = execute(prepare_run(after_failure="stop"))
     assert [(record.failure, record.payload.ended) for record in broken.records] == [
         (None, "done"),
         ("out of memory", ""),
@@ -411,7 +414,7 @@ def test_a_failure_of_the_subject_that_is_mended_lets_a_stopped_episode_go_on(
     assert broken.records[1].payload.max_reward == 2
     task = summary(broken)
     assert (task.n_failed, task.endings) == (1, {"done": 1, "failed": 1, NOT_ATTEMPTED: 2})
-    mended = execute(prepared(after_failure="stop"))
+    mended = execute(prepare_run(after_failure="stop"))
     assert [record.payload.ended for record in mended.records] == ["done"] * 4
     assert [record.attempt for record in mended.records] == [1, 2, 2, 2]
 
@@ -453,22 +456,22 @@ def task_file(task_files: Path):
 @pytest.mark.parametrize(
     ("settings", "expected"), SETTINGS, ids=[expected for _, expected in SETTINGS]
 )
-def test_a_setting_that_would_not_act_is_refused(prepared, task_file, settings, expected):
+def test_a_setting_that_would_not_act_is_refused(prepare_run, task_file, settings, expected):
     task_file(settings)
     with pytest.raises((DataError, UsageError)) as caught:
-        prepared()
+        prepare_run()
     assert expected in read_one_line(caught)
 
 
-def test_settings_of_a_task_file_act_and_options_go_before_them(prepared, task_file):
+def test_settings_of_a_task_file_act_and_options_go_before_them(prepare_run, task_file):
     task_file("max_steps: 2, rewards: published")
-    plans = payloads(execute(prepared()))
+    plans = payloads(execute(prepare_run()))
     assert Counter(plan.ended for plan in plans) == {
         "step limit": 1,
         "done": 2,
         "refused by the simulator": 1,
     }
-    plans = payloads(execute(prepared(rewards="default")))
+    plans = payloads(execute(prepare_run(rewards="default")))
     assert Counter(plan.ended for plan in plans) == {"step limit": 2, "done": 2}
 
 
@@ -491,18 +494,18 @@ def test_settings_of_a_task_file_act_and_options_go_before_them(prepared, task_f
         ),
     ],
 )
-def test_what_is_wrong_beside_the_settings_is_refused_too(prepared, task_files, more, expected):
+def test_what_is_wrong_beside_the_settings_is_refused_too(prepare_run, task_files, more, expected):
     (task_files / "plans" / "infthor_plans.yaml").write_text(
         f"include: _plans.yaml\ntask: infthor_plans\n{more}\n"
     )
     with pytest.raises((DataError, UsageError)) as caught:
-        prepared(data=None)
+        prepare_run(data=None)
     assert expected in read_one_line(caught)
 
 
-def test_another_setting_is_another_run(prepared, data):
+def test_another_setting_is_another_run(prepare_run, data):
     def identity(**changes):
-        run = prepared(**changes)
+        run = prepare_run(**changes)
         return run.evaluation.bind(run.suite.baselines["planner"](0)).workload.config
 
     plain = identity()

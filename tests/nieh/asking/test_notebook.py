@@ -41,10 +41,10 @@ def model_requests(monkeypatch):
 
 
 @pytest.fixture
-def taking_notes(prepared):
+def taking_notes(prepare_run):
     def make(model="qwen2.5-vl-tiny", model_options=None, **changes):
         alone = {"batch_size": "1"} if model.endswith("-tiny") else None
-        return prepared(model, model_options or alone, tasks=(TASK,), **changes)
+        return prepare_run(model, model_options or alone, tasks=(TASK,), **changes)
 
     return make
 

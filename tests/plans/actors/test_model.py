@@ -40,15 +40,15 @@ def endings(outcome):
 
 
 @pytest.fixture
-def acting(prepared, monkeypatch):
+def run_scripted(prepare_run, monkeypatch):
     """A run of a scripted model: what it said to whom, and the outcome."""
 
-    def acting(say, **changes):
+    def run_scripted(say, **changes):
         model = ScriptedModel(say)
         monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
-        return execute(prepared(QWEN, **changes)), model
+        return execute(prepare_run(QWEN, **changes)), model
 
-    return acting
+    return run_scripted
 
 
 def as_expert(folder):
@@ -79,19 +79,19 @@ def brief(task_files):
 # -- what a model is asked, and what its words do
 
 
-def test_the_experts_own_words_carry_every_plan_out(acting, tmp_path):
+def test_the_experts_own_words_carry_every_plan_out(run_scripted, tmp_path):
     """Ten cabinets and drawers, two candles: the words mean the plan's own."""
     folder = write_trajectories(
         tmp_path / "two", cut_trajectory(FORK, 6), cut_trajectory(CANDLE, 4)
     )
-    outcome, model = acting(as_expert(folder), data=folder)
+    outcome, model = run_scripted(as_expert(folder), data=folder)
     assert set(endings(outcome)) == {"done"}
     assert all(record.payload.reward == record.payload.max_reward for record in outcome.records)
     assert len(model.requests) == sum(len(record.payload.steps) for record in outcome.records)
 
 
-def test_a_model_reads_the_sequence_that_it_was_trained_on(acting, data):
-    outcome, model = acting(as_expert(data))
+def test_a_model_reads_the_sequence_that_it_was_trained_on(run_scripted, data):
+    outcome, model = run_scripted(as_expert(data))
     (trajectory,) = iter_trajectories(data)
     plans = plans_of(trajectory, Words.PUBLISHED)
     beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
@@ -120,9 +120,9 @@ def test_a_model_reads_the_sequence_that_it_was_trained_on(acting, data):
     ]
 
 
-def test_the_history_is_the_true_one_whatever_the_model_did(acting, data, tmp_path):
-    _, right = acting(as_expert(data))
-    _, wrong = acting(
+def test_the_history_is_the_true_one_whatever_the_model_did(run_scripted, data, tmp_path):
+    _, right = run_scripted(as_expert(data))
+    _, wrong = run_scripted(
         lambda parts, decoding: "RotateLeft" if not done_so_far(parts) else "",
         output=tmp_path / "b",
     )
@@ -153,10 +153,10 @@ FAULTS = [
 ]
 
 
-def test_replies_that_are_no_action_here_are_counted_by_their_fault(acting, tmp_path):
+def test_replies_that_are_no_action_here_are_counted_by_their_fault(run_scripted, tmp_path):
     data = write_trajectories(tmp_path / "one", cut_trajectory(FORK, 1))
     for number, (reply, ended, message) in enumerate(FAULTS):
-        outcome, model = acting(
+        outcome, model = run_scripted(
             lambda *_, text=reply: text, data=data, output=tmp_path / str(number)
         )
         (record,) = outcome.records
@@ -169,9 +169,9 @@ def test_replies_that_are_no_action_here_are_counted_by_their_fault(acting, tmp_
 
 
 def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_history_without(
-    acting, data
+    run_scripted, data
 ):
-    _, model = acting(
+    _, model = run_scripted(
         lambda parts, _: " RotateRight \n" if len(done_so_far(parts)) < 2 else "", limit=1
     )
     first = [parts for parts, _ in model.requests[:3]]
@@ -180,13 +180,13 @@ def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_hist
     )
 
 
-def test_a_model_that_fails_fails_its_plan_alone(acting):
+def test_a_model_that_fails_fails_its_plan_alone(run_scripted):
     def say(parts, _):
         if plan_asked(parts) == "pick up the Fork":
             raise ZeroDivisionError("of its own")
         return "RotateLeft" if not done_so_far(parts) else ""
 
-    outcome, _ = acting(say)
+    outcome, _ = run_scripted(say)
     assert [record.failure and record.failure.split(" (")[0] for record in outcome.records] == [
         None,
         f"{QWEN} fails on the request",
@@ -196,8 +196,8 @@ def test_a_model_that_fails_fails_its_plan_alone(acting):
     assert outcome.records[1].payload.max_reward == 2
 
 
-def test_replies_are_held_to_what_is_possible_where_that_is_asked(acting, brief):
-    outcome, model = acting(lambda parts, decoding: decoding.choices[-1], constrained=True)
+def test_replies_are_held_to_what_is_possible_where_that_is_asked(run_scripted, brief):
+    outcome, model = run_scripted(lambda parts, decoding: decoding.choices[-1], constrained=True)
     for _, decoding in model.requests:
         assert {"MoveAhead", "RotateLeft", "NoOp"} <= set(decoding.choices)
         assert decoding.max_new_tokens >= 64
@@ -207,8 +207,8 @@ def test_replies_are_held_to_what_is_possible_where_that_is_asked(acting, brief)
 
 
 @pytest.mark.parametrize(("trained", "n_warnings"), [("natural", 1), ("published", 0), (None, 0)])
-def test_a_checkpoint_that_was_trained_on_other_words_is_told_of(prepared, trained, n_warnings):
-    run, model = prepared(QWEN), ScriptedModel(lambda *_: "")
+def test_a_checkpoint_that_was_trained_on_other_words_is_told_of(prepare_run, trained, n_warnings):
+    run, model = prepare_run(QWEN), ScriptedModel(lambda *_: "")
     model.identity = lambda: {} if trained is None else {"trained_words": trained}
     warnings = run.evaluation.bind(model).workload.warnings
     assert len(warnings) == n_warnings
@@ -218,11 +218,11 @@ def test_a_checkpoint_that_was_trained_on_other_words_is_told_of(prepared, train
 
 
 @pytest.mark.parametrize("words", ["published", "natural"])
-def test_plans_and_actions_are_in_the_words_that_are_asked_for(acting, data, words):
+def test_plans_and_actions_are_in_the_words_that_are_asked_for(run_scripted, data, words):
     (trajectory,) = iter_trajectories(data)
     plans = plans_of(trajectory, Words(words))
     known = {plan.text: expert_texts(trajectory, plan, Words(words)) for plan in plans}
-    outcome, model = acting(
+    outcome, model = run_scripted(
         lambda parts, _: known[plan_asked(parts)][len(done_so_far(parts))], words=words
     )
     assert set(endings(outcome)) == {"done"}
@@ -230,22 +230,22 @@ def test_plans_and_actions_are_in_the_words_that_are_asked_for(acting, data, wor
     assert [record.payload.plan for record in outcome.records] == list(known)
 
 
-def test_a_preamble_is_told_before_everything_else(acting, task_files, data):
+def test_a_preamble_is_told_before_everything_else(run_scripted, task_files, data):
     (task_files / "plans" / "infthor_plans.yaml").write_text(
         "include: _plans.yaml\n"
         "task: infthor_plans\n"
         "dataset_kwargs: {preamble: 'You are a robot. '}\n"
     )
-    _, model = acting(lambda *_: "")
+    _, model = run_scripted(lambda *_: "")
     assert all(
         join_parts(parts).startswith(f"You are a robot. {FIRST}<image>")
         for parts, _ in model.requests
     )
 
 
-def test_grey_frames_take_the_places_of_all(acting, data):
-    _, plain = acting(as_expert(data))
-    _, blank = acting(as_expert(data), frames="blank")
+def test_grey_frames_take_the_places_of_all(run_scripted, data):
+    _, plain = run_scripted(as_expert(data))
+    _, blank = run_scripted(as_expert(data), frames="blank")
     assert [join_parts(parts) for parts, _ in blank.requests] == [
         join_parts(parts) for parts, _ in plain.requests
     ]
@@ -256,13 +256,13 @@ def test_grey_frames_take_the_places_of_all(acting, data):
 # -- what a model is given of the past
 
 
-def test_the_last_plans_that_fit_are_whole_and_begin_with_their_goal(acting, tmp_path):
+def test_the_last_plans_that_fit_are_whole_and_begin_with_their_goal(run_scripted, tmp_path):
     data = write_trajectories(tmp_path / "six", cut_trajectory(FORK, 6))
-    _, full = acting(lambda *_: "", data=data)
+    _, full = run_scripted(lambda *_: "", data=data)
     wholes = [join_parts(parts) for parts, _ in full.requests]
     second = "<|goal|>Your main goal: put two slices of tomato on the dining table<|goal|>"
     for limit in (25, 60, 10_000):
-        _, model = acting(
+        _, model = run_scripted(
             lambda *_: "", data=data, history=f"last:{limit}", output=tmp_path / str(limit)
         )
         for number, (parts, _) in enumerate(model.requests):
@@ -288,24 +288,24 @@ def count(parts):
     return sum(1 if isinstance(part, FrameRef) else len(part.split()) for part in parts)
 
 
-def test_a_plan_that_does_not_fit_alone_fails_and_says_so(acting):
-    outcome, _ = acting(lambda *_: "", history="last:5")
+def test_a_plan_that_does_not_fit_alone_fails_and_says_so(run_scripted):
+    outcome, _ = run_scripted(lambda *_: "", history="last:5")
     assert {record.failure for record in outcome.records} == {
         "the plan alone takes more than 5 tokens; give --history last:N a larger N"
     }
 
 
-def test_tokens_that_nobody_counts_cannot_be_limited(acting, monkeypatch):
+def test_tokens_that_nobody_counts_cannot_be_limited(run_scripted, monkeypatch):
     monkeypatch.setattr("tests.plans.scripting.Talk.n_tokens", None)
-    outcome, _ = acting(lambda *_: "", history="last:500")
+    outcome, _ = run_scripted(lambda *_: "", history="last:500")
     assert {record.failure for record in outcome.records} == {
         "the model counts no tokens, so --history last:N cannot be used; use full"
     }
 
 
-def test_the_state_in_words_takes_the_place_of_the_history(acting, tmp_path):
+def test_the_state_in_words_takes_the_place_of_the_history(run_scripted, tmp_path):
     data = write_trajectories(tmp_path / "six", cut_trajectory(FORK, 6))
-    _, model = acting(as_expert(data), data=data, history="text")
+    _, model = run_scripted(as_expert(data), data=data, history="text")
     beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
     assert [len(frames(parts)) for parts in beginnings] == [1] * 6
     assert join_parts(beginnings[0]).startswith(f"{FIRST} State: ")
@@ -318,10 +318,12 @@ def test_the_state_in_words_takes_the_place_of_the_history(acting, tmp_path):
     assert beginnings[1][1].digest != beginnings[0][1].digest
 
 
-def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(acting, data, make_clip):
-    _, full = acting(as_expert(data))
+def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(
+    run_scripted, data, make_clip
+):
+    _, full = run_scripted(as_expert(data))
     histories = [frames(parts) for parts, _ in full.requests if not done_so_far(parts)]
-    _, model = acting(as_expert(data), history="frames:3", retriever=str(make_clip()))
+    _, model = run_scripted(as_expert(data), history="frames:3", retriever=str(make_clip()))
     beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
     for parts, history in zip(beginnings, histories, strict=True):
         earlier, now = [frame.digest for frame in history[:-1]], history[-1].digest
@@ -343,20 +345,20 @@ BAD_HISTORIES = (
 
 
 @pytest.mark.parametrize("history", BAD_HISTORIES)
-def test_a_history_that_there_is_not_is_refused(prepared, history):
+def test_a_history_that_there_is_not_is_refused(prepare_run, history):
     with pytest.raises(UsageError, match=THERE_ARE) as caught:
-        prepared("random", history=history)
+        prepare_run("random", history=history)
     assert str(caught.value).startswith(f"--history {history}: ")
 
 
-def test_a_retriever_is_for_frames_alone_and_must_be_there(prepared):
+def test_a_retriever_is_for_frames_alone_and_must_be_there(prepare_run):
     with pytest.raises(
         UsageError,
         match="--history full retrieves no frames; leave it out, or use --history frames:K",
     ):
-        prepared("random", retriever="somewhere")
+        prepare_run("random", retriever="somewhere")
     with pytest.raises(UsageError, match=r"--retriever \./nowhere: there is no such folder"):
-        prepared("random", history="frames:2", retriever="./nowhere")
+        prepare_run("random", history="frames:2", retriever="./nowhere")
     assert isinstance(history_named("last:7", MemoryChoice()), LastTokens)
 
 
@@ -386,10 +388,12 @@ def short(tmp_path):
 @pytest.mark.parametrize(
     ("model", "ways"), [(QWEN, ("greedy", "constrained")), (LLAVA, ("constrained",))]
 )
-def test_sharing_what_was_encoded_changes_no_reply(prepared, tmp_path, short, brief, model, ways):
+def test_sharing_what_was_encoded_changes_no_reply(
+    prepare_run, tmp_path, short, brief, model, ways
+):
     for way in ways:  # replies are drawn unless they are greedy
         shared, plain = (
-            execute(prepared(model, options, data=short, **{way: True}))
+            execute(prepare_run(model, options, data=short, **{way: True}))
             for options in ({}, {"share_prefix": "false"})
         )
         assert shared.folder != plain.folder
@@ -398,21 +402,21 @@ def test_sharing_what_was_encoded_changes_no_reply(prepared, tmp_path, short, br
         assert endings(shared) == endings(plain)
 
 
-def test_a_seed_draws_the_same_replies_and_another_others(prepared, tmp_path):
+def test_a_seed_draws_the_same_replies_and_another_others(prepare_run, tmp_path):
     data = write_trajectories(tmp_path / "one", cut_trajectory(FORK, 3))
 
     def drawn(seed, folder):
-        return says(execute(prepared(QWEN, data=data, seed=seed, output=tmp_path / folder)))
+        return says(execute(prepare_run(QWEN, data=data, seed=seed, output=tmp_path / folder)))
 
     first = drawn(0, "a")
     assert drawn(0, "b") == first
     assert drawn(1, "c") != first
-    greedy = says(execute(prepared(QWEN, data=data, greedy=True, output=tmp_path / "greedy")))
+    greedy = says(execute(prepare_run(QWEN, data=data, greedy=True, output=tmp_path / "greedy")))
     assert greedy != first
 
 
-def test_replies_that_are_held_to_possible_actions_can_be_tried(prepared, short, brief):
-    outcome = execute(prepared(QWEN, data=short, constrained=True))
+def test_replies_that_are_held_to_possible_actions_can_be_tried(prepare_run, short, brief):
+    outcome = execute(prepare_run(QWEN, data=short, constrained=True))
     steps = [step for record in outcome.records for step in record.payload.steps]
     assert all(step.action == step.reply for step in steps)
     assert all(step.call for step in steps)
@@ -420,11 +424,11 @@ def test_replies_that_are_held_to_possible_actions_can_be_tried(prepared, short,
 
 
 @pytest.mark.parametrize("model", [QWEN, LLAVA])
-def test_what_was_seen_is_encoded_once(prepared, short, monkeypatch, watched, brief, model):
+def test_what_was_seen_is_encoded_once(prepare_run, short, monkeypatch, watched, brief, model):
     """The model turns about: nothing that it saw before an action is encoded again for the next."""
     act = ModelActor.act
     monkeypatch.setattr(ModelActor, "act", lambda actor: replace(act(actor), action="RotateLeft"))
-    execute(prepared(model, {"chunk_tokens": "64"}, data=short, greedy=True))
+    execute(prepare_run(model, {"chunk_tokens": "64"}, data=short, greedy=True))
     assert [len(done_so_far(parts)) for parts, _ in watched] == [0, 1, 2, 3] * 2
     for number, ((_, first), (_, second)) in enumerate(pairwise(watched), 1):
         if number != 4:
@@ -434,12 +438,12 @@ def test_what_was_seen_is_encoded_once(prepared, short, monkeypatch, watched, br
             assert watched[0][1].n_context_tokens - second.n_cached_tokens < 30
 
 
-def test_histories_of_a_tiny_model(prepared, tmp_path, watched, make_clip):
+def test_histories_of_a_tiny_model(prepare_run, tmp_path, watched, make_clip):
     data = write_trajectories(tmp_path / "few", cut_trajectory(CANDLE, 5))
     options = {"retriever": str(make_clip())}
     for history, more in (("full", {}), ("last:700", {}), ("text", {}), ("frames:2", options)):
         watched.clear()
-        outcome = execute(prepared(QWEN, data=data, greedy=True, history=history, **more))
+        outcome = execute(prepare_run(QWEN, data=data, greedy=True, history=history, **more))
         assert not any(record.failure for record in outcome.records)
         firsts = [reply.n_context_tokens for parts, reply in watched if not done_so_far(parts)]
         assert len(firsts) == len(outcome.records) == 4  # one of five belongs to no task
@@ -450,8 +454,8 @@ def test_histories_of_a_tiny_model(prepared, tmp_path, watched, make_clip):
         assert [record.payload.steps[0].n_context_tokens for record in outcome.records] == firsts
 
 
-def test_a_context_that_is_full_fails_the_plan_in_one_line(prepared, short):
-    outcome = execute(prepared(QWEN, {"max_tokens": "200"}, data=short))
+def test_a_context_that_is_full_fails_the_plan_in_one_line(prepare_run, short):
+    outcome = execute(prepare_run(QWEN, {"max_tokens": "200"}, data=short))
     first, second = outcome.records
     assert second.failure
     assert "200" in second.failure
@@ -459,18 +463,18 @@ def test_a_context_that_is_full_fails_the_plan_in_one_line(prepared, short):
     assert first.payload.max_reward is not None
 
 
-def test_a_model_that_loses_its_conversation_is_an_error(acting, monkeypatch):
+def test_a_model_that_loses_its_conversation_is_an_error(run_scripted, monkeypatch):
     def full(*_):
         raise ModelError("too long")
 
     monkeypatch.setattr("infthor_eval.plans.history.forms.FullHistory.recall", full)
-    outcome, _ = acting(lambda *_: "")
+    outcome, _ = run_scripted(lambda *_: "")
     assert {record.failure for record in outcome.records} == {"too long"}
 
 
-def test_a_memory_stands_in_for_the_history(acting, data):
-    _, full = acting(as_expert(data))
-    _, model = acting(as_expert(data), history="memory", memory="last", memory_args="k=2")
+def test_a_memory_stands_in_for_the_history(run_scripted, data):
+    _, full = run_scripted(as_expert(data))
+    _, model = run_scripted(as_expert(data), history="memory", memory="last", memory_args="k=2")
     histories, beginnings = (
         [parts for parts, _ in model_requests if not done_so_far(parts)]
         for model_requests in (full.requests, model.requests)

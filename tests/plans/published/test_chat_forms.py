@@ -72,12 +72,12 @@ def test_other_histories_are_no_chat():
 
 
 @pytest.mark.usefixtures("shared_simulators")
-def test_every_plan_is_asked_from_the_true_state(prepared, monkeypatch, tmp_path):
+def test_every_plan_is_asked_from_the_true_state(prepare_run, monkeypatch, tmp_path):
     model = ScriptedModel(lambda *_: "fly")
     monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
     data = write_trajectories(tmp_path / "trajectories", cut_trajectory(FORK))
     outcome = execute(
-        prepared("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="plans")
+        prepare_run("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="plans")
     )
     assert [record.payload.ended for record in outcome.records] == ["no action"] * 4
     prompts = [join_parts(parts) for parts, _ in model.requests]
@@ -90,7 +90,7 @@ def test_every_plan_is_asked_from_the_true_state(prepared, monkeypatch, tmp_path
         (32, ())
     }
     outcome = execute(
-        prepared("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="goals")
+        prepare_run("qwen2.5-vl-tiny", tasks=("infthor_plans",), data=data, history="goals")
     )
     assert join_parts(model.requests[-1][0]).endswith("<image><|act|>")
     assert (model.requests[-1][1].max_new_tokens, model.requests[-1][1].stop) == (32, ("<|act|>",))

@@ -39,10 +39,10 @@ def experts(final):
 
 
 @pytest.fixture
-def acting(prepared, monkeypatch, final):
+def run_scripted(prepare_run, monkeypatch, final):
     """Runs a model that says these texts one after the other; gives the payloads and the model."""
 
-    def acting(replies, **changes):
+    def run_scripted(replies, **changes):
         rest = iter(replies)
         model = ScriptedModel(lambda *_: next(rest))
         monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
@@ -52,14 +52,14 @@ def acting(prepared, monkeypatch, final):
             "protocol": "published",
             "rewards": "published",
         }
-        outcome = execute(prepared(QWEN, **settings | changes))
+        outcome = execute(prepare_run(QWEN, **settings | changes))
         return [record.payload for record in outcome.records], model, outcome
 
-    return acting
+    return run_scripted
 
 
-def test_the_interleaved_form_ends_after_its_first_plan(acting, experts):
-    (first, second), model, outcome = acting(experts[4])
+def test_the_interleaved_form_ends_after_its_first_plan(run_scripted, experts):
+    (first, second), model, outcome = run_scripted(experts[4])
     assert (first.ended, second.ended) == ("done", "not attempted")
     (task,) = outcome.summary.summary.tasks.values()
     assert (task.n_plans, task.n_tried, task.success["total"].mean) == (2, 1, 0.5)
@@ -80,14 +80,14 @@ def test_the_interleaved_form_ends_after_its_first_plan(acting, experts):
     assert grown == f"{prompt}{experts[4][0]}<|act|><image><|act|>"
 
 
-def test_a_failed_first_plan_ends_it_too(acting):
-    (first, second), model, _ = acting(["fly"])
+def test_a_failed_first_plan_ends_it_too(run_scripted):
+    (first, second), model, _ = run_scripted(["fly"])
     assert (first.ended, second.ended) == ("no action", "not attempted")
     assert len(model.requests) == 1
 
 
-def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(acting):
-    (first, second), model, _ = acting(
+def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(run_scripted):
+    (first, second), model, _ = run_scripted(
         ["RotateLeft", "fly", *["RotateRight"] * 201], history="text"
     )
     assert (first.ended, second.ended) == ("no action", "step limit")
@@ -106,19 +106,19 @@ def test_with_a_memory_the_next_plan_follows_in_the_world_as_it_is(acting):
     assert any("Available actions: RotateLeft" in system_text for system_text in model.system_parts)
 
 
-def test_the_state_in_the_file_is_taken_where_there_is_one(acting, final):
+def test_the_state_in_the_file_is_taken_where_there_is_one(run_scripted, final):
     path = final / f"{FORK}.json"
     document = json.loads(path.read_text())
     first = document["sub_trajs"][-1]["low_pddl_idx"][0]
     path.write_text(json.dumps(document | {"state_summary": {str(first): "All is well"}}))
-    _, model, _ = acting(["fly", "fly"], history="text")
+    _, model, _ = run_scripted(["fly", "fly"], history="text")
     assert "State: You are in the middle of a room. All is well;\n" in join_parts(
         model.requests[0][0]
     )
 
 
-def test_frames_are_remembered_by_clip(acting, make_clip):
-    _, model, _ = acting(["fly", "fly"], history="frames:3", retriever=str(make_clip()))
+def test_frames_are_remembered_by_clip(run_scripted, make_clip):
+    _, model, _ = run_scripted(["fly", "fly"], history="frames:3", retriever=str(make_clip()))
     prompt = join_parts(model.requests[0][0])
     assert prompt.startswith("Your task is: ")
     assert prompt.endswith(
@@ -126,14 +126,14 @@ def test_frames_are_remembered_by_clip(acting, make_clip):
     )
 
 
-def test_frames_that_the_file_names_are_remembered_in_the_published_size(acting, final):
+def test_frames_that_the_file_names_are_remembered_in_the_published_size(run_scripted, final):
     path = final / f"{FORK}.json"
     document = json.loads(path.read_text())
     first = document["sub_trajs"][-1]["low_pddl_idx"][0]
     images = [{"low_idx": number, "image_name": f"{number + 1:09d}.png"} for number in range(first)]
     retrieved = {str(first): {"top20": ["000000000.png", "000000002.png", "000000005.png"]}}
     path.write_text(json.dumps(document | {"images": images, "retrieved_image": retrieved}))
-    _, model, _ = acting(["fly", "fly"], history="retrieved:20")
+    _, model, _ = run_scripted(["fly", "fly"], history="retrieved:20")
     parts = model.requests[0][0]
     assert join_parts(parts).endswith(
         ".\nPrevious states: <image><image><image>Current state: <image> Next action: "
@@ -148,12 +148,12 @@ def test_frames_that_the_file_names_are_remembered_in_the_published_size(acting,
     ] == [1]
 
 
-def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(acting, final):
+def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(run_scripted, final):
     path = final / f"{FORK}.json"
     path.write_text(
         json.dumps(json.loads(path.read_text()) | {"retrieved_image": {"0": {"top20": []}}})
     )
-    _, model, outcome = acting([], history="retrieved:20")
+    _, model, outcome = run_scripted([], history="retrieved:20")
     assert model.requests == []
     for record in outcome.records:
         assert record.failure.startswith(f'trajectory {FORK}: retrieved_image["')
@@ -162,9 +162,9 @@ def test_a_file_that_names_no_frames_for_an_action_is_told_in_its_records(acting
         )
 
 
-def test_files_that_name_no_frames_are_refused_before_the_work(acting):
+def test_files_that_name_no_frames_are_refused_before_the_work(run_scripted):
     with pytest.raises(DataError, match="infthor_final: no trajectory there has retrieved_image"):
-        acting([], history="retrieved:20")
+        run_scripted([], history="retrieved:20")
 
 
 @pytest.mark.parametrize(
@@ -181,13 +181,13 @@ def test_files_that_name_no_frames_are_refused_before_the_work(acting):
         ),
     ],
 )
-def test_what_the_scripts_have_not_is_refused(acting, changes, expected):
+def test_what_the_scripts_have_not_is_refused(run_scripted, changes, expected):
     with pytest.raises(UsageError) as caught:
-        acting([], **changes)
+        run_scripted([], **changes)
     assert str(caught.value) == expected
 
 
-def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepared, final, experts, monkeypatch):
+def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepare_run, final, experts, monkeypatch):
     rest = iter([*experts[4], "fly", *experts[4], "fly"])
     model = ScriptedModel(lambda *_: next(rest))
     monkeypatch.setattr("infthor_eval.runs.work.binding.load", lambda *_: model)
@@ -197,17 +197,19 @@ def test_a_run_that_was_stopped_goes_on_to_the_same_end(prepared, final, experts
         "protocol": "published",
         "history": "text",
     }
-    whole = execute(prepared(QWEN, **settings))
+    whole = execute(prepare_run(QWEN, **settings))
     (journal,) = (whole.folder / "journal").glob("*.jsonl")
     lines = journal.read_text().splitlines(keepends=True)
     journal.write_text("".join(lines[:-1]))
-    again = execute(prepared(QWEN, **settings))
+    again = execute(prepare_run(QWEN, **settings))
     assert [record.payload for record in again.records] == [
         record.payload for record in whole.records
     ]
 
 
-def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(acting, experts, final):
+def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(
+    run_scripted, experts, final
+):
     (trajectory,) = iter_trajectories(final)
     plan = plans_of(trajectory, Words.PUBLISHED)[4]
     name = trajectory.plan.high_pddl[plan.high].discrete_action.args[0]
@@ -222,7 +224,7 @@ def test_how_far_back_a_clue_is_stands_in_the_record_in_frames_and_tokens(acting
     path.write_text(json.dumps(json.loads(path.read_text()) | {"object_log": entries}))
 
     replies = [text for texts in experts[4:] for text in texts]
-    plans, model, outcome = acting(replies, protocol="default", rewards="default")
+    plans, model, outcome = run_scripted(replies, protocol="default", rewards="default")
     # Two slices, both there.
     assert plans[0].ended == "done" and {plan.conditions[1] for plan in plans} == {4}
     # Tokens up to each frame: a word is one, a frame is one.
