@@ -82,10 +82,10 @@ import sys
 from pathlib import Path
 from infthor_eval.training.fine_tuning import fine_tune, prepare_run
 from infthor_eval.training.recipe import read_recipe
-told = []
-fine_tune(prepare_run(read_recipe(sys.argv[1]), [Path(sys.argv[2])]), Path(sys.argv[3]), \
-told.append)
-print(told[0].step, told[-1].step)
+steps = []
+run = prepare_run(read_recipe(sys.argv[1]), [Path(sys.argv[2])])
+fine_tune(run, Path(sys.argv[3]), steps.append)
+print(steps[0].step, steps[-1].step)
 """
 
 

@@ -137,7 +137,7 @@ def test_what_was_met_is_not_tried_again(linkage):
     on_it = Contact(goal.world()[0], linkage.held_box(goal).center[0, 0])
     assert not Terrain(linkage, free, [on_it]).free(goal).any()
     elsewhere = Contact(goal.world()[0], linkage.held_box(pose(x=0.3, z=0.75, yaw=90)).center[0, 0])
-    # The hand was rotations_about otherwise there.
+    # The hand was turned otherwise there.
     assert Terrain(linkage, free, [elsewhere]).free(goal).all()
 
 
