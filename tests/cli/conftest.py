@@ -7,22 +7,11 @@ import pytest
 
 from infthor_eval.nieh.records import RECORDS, NiehAnswer
 from infthor_eval.nieh.scoring import SCORERS
-from infthor_eval.runs import RunHeader, UnitRecord, read_run
+from infthor_eval.runs import RunHeader, UnitRecord
 
 from ..helpers.journals import write_journal
 from ..helpers.nieh_runs import make_config
 from .commands.rescored import REPLIES
-
-
-@pytest.fixture
-def records_in() -> Callable[[Path], list[UnitRecord[NiehAnswer]]]:
-    """Gives the records of the one run below a folder."""
-
-    def records_in(folder: Path) -> list[UnitRecord[NiehAnswer]]:
-        (journal,) = folder.rglob("journal")
-        return read_run(journal.parent, RECORDS)[1]
-
-    return records_in
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import read_run
 from tests.harness.conftest import OURS, samples
 from tests.helpers.command_line import option_words
-from tests.helpers.files import find_one
+from tests.helpers.journals import read_records
 from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
 
 TINY = "openvla-tiny"
@@ -59,7 +59,7 @@ def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run_
     )
     code, _, err = run_cli(*arguments)
     assert code == 0, err
-    _, records = read_run(find_one(tmp_path / "ours", "journal").parent, RECORDS)
+    records = read_records(tmp_path / "ours")
     assert len(records) > 1
     out, journal = tmp_path / "theirs", tmp_path / "journal"
     start(OURS, *lm_eval_words(short, data, out, TINY, f"journal={journal}"))

@@ -13,6 +13,7 @@ from infthor_eval.storage.packaged import packaged_folder
 from tests.harness.conftest import LM_EVAL, samples
 from tests.helpers.command_line import option_words
 from tests.helpers.files import find_one
+from tests.helpers.journals import read_records
 from tests.helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
 
 PACKAGED = packaged_folder("tasks") / "plans" / "infthor_plans.yaml"
@@ -33,7 +34,7 @@ def test_one_request_a_trajectory_and_what_our_own_run_finds(tmp_path, task_file
     arguments = option_words(model=TINY, tasks="infthor_plans", data=data, output=tmp_path / "ours")
     code, _, err = run_cli(*arguments, "--greedy", "--constrained")
     assert code == 0, err
-    _, records = read_run(find_one(tmp_path / "ours", "journal").parent, RECORDS)
+    records = read_records(tmp_path / "ours")
     expected = {}
     for record in records:
         expected.setdefault(record.cluster, []).append(record.payload)

@@ -1,14 +1,14 @@
-"""Journals of runs that nobody ran."""
+"""Journals: those of runs that nobody ran, and what is in those of runs."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord
+from infthor_eval.runs import RecordTypes, RunHeader, UnitRecord, read_header, read_run
 from infthor_eval.runs.journals.journal import Journal
 from infthor_eval.suites import find_suite
 
-__all__ = ["RecordedRun", "write_journal", "write_run"]
+__all__ = ["RecordedRun", "read_records", "write_journal", "write_run"]
 
 
 class RecordedRun(Protocol):
@@ -34,3 +34,10 @@ def write_run(run: RecordedRun, output: Path, name: str | None = None) -> Path:
     suite."""
     folder = output / run.label / (name or f"{run.header.suite}-0123")
     return write_journal(folder, run.header, run.records, find_suite(run.header.suite).records)
+
+
+def read_records(output: Path) -> list[UnitRecord[Any]]:
+    """The records of the one run below a folder."""
+    (journal,) = output.rglob("journal")
+    suite = find_suite(read_header(journal.parent).suite)
+    return read_run(journal.parent, suite.records)[1]

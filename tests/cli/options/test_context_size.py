@@ -9,6 +9,7 @@ from model_adapters.tiny.qwen2_5_vl import save_tiny_checkpoint
 
 from ...helpers.command_line import assert_refused, option_words
 from ...helpers.files import find_one
+from ...helpers.journals import read_records
 from ...helpers.questions import make_question
 
 ONE = [make_question(clues=(40,))]
@@ -156,16 +157,14 @@ def test_a_context_that_is_cut_to_its_size_is_reported_as_truncated(
 
 
 @pytest.mark.parametrize("family", ["qwen2.5-vl", "llava-onevision", "deepseek-vl", "pixtral"])
-def test_the_longest_request_is_reported_as_it_is_sent(
-    make_nieh_set, tmp_path, run_cli, records_in, family
-):
+def test_the_longest_request_is_reported_as_it_is_sent(make_nieh_set, tmp_path, run_cli, family):
     data = make_nieh_set()
     arguments = option_words(
         model=f"{family}-tiny", tasks="nieh_full", data=data, output=tmp_path / "out"
     )
     _, _, err = run_cli(*arguments)
     # And the room for the reply.
-    longest = max(record.tokens.context for record in records_in(tmp_path / "out")) + 50
+    longest = max(record.tokens.context for record in read_records(tmp_path / "out")) + 50
     assert f"the longest request {longest:,} tokens" in line_of(err, "nieh_full: 2 contexts")
 
 

@@ -7,11 +7,11 @@ import signal
 import pytest
 
 from infthor_eval.formats.question import Question
-from infthor_eval.nieh.records import RECORDS
-from infthor_eval.runs import read_header, read_run
+from infthor_eval.runs import read_header
 
 from ...helpers.command_line import assert_refused, option_words
 from ...helpers.files import find_one
+from ...helpers.journals import read_records
 from ...helpers.processes import finish, start_cli
 from ...helpers.waiting import wait_until
 
@@ -207,8 +207,5 @@ def test_a_run_killed_while_it_takes_notes_ends_as_an_undisturbed_one(data, tmp_
         find_one(tmp_path / name, "results.json").read_bytes() for name in ("killed", "whole")
     ]
     assert results[0] == results[1]
-    records = [
-        read_run(find_one(tmp_path / name, "journal").parent, RECORDS)[1]
-        for name in ("killed", "whole")
-    ]
+    records = [read_records(tmp_path / name) for name in ("killed", "whole")]
     assert [r.fingerprint for r in records[0]] == [r.fingerprint for r in records[1]]

@@ -3,6 +3,7 @@
 import json
 
 from ...helpers.command_line import assert_refused, option_words
+from ...helpers.journals import read_records
 
 TINY = "qwen2.5-vl-tiny"
 
@@ -12,22 +13,22 @@ def results(folder):
     return {document["config"]["frames"]: document for document in documents}
 
 
-def tokens(folder, records_in):
+def tokens(folder):
     tokens = {}
     for path in folder.rglob("journal"):
-        for record in records_in(path.parent):
+        for record in read_records(path.parent):
             tokens.setdefault(record.key, set()).add(record.tokens.context)
     return tokens
 
 
-def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run_cli, records_in):
+def test_a_run_with_each_and_the_gain_between_them(make_nieh_set, tmp_path, run_cli):
     data, out = make_nieh_set(size=56), tmp_path / "out"
     arguments = ["--model", TINY, "--tasks", "nieh_full", "--data", data, "--output", out]
     code, output, err = run_cli(*arguments, "--frames", "shown,blank,shuffled,other")
     assert code == 0, err
     assert results(out).keys() == {"shown", "blank", "shuffled", "other"}
     # Blanks cost as much.
-    assert all(len(counts) == 1 for counts in tokens(out, records_in).values())
+    assert all(len(counts) == 1 for counts in tokens(out).values())
     rows = [line.split() for line in output.splitlines()]
     assert [TINY + ",", "blank", "frames", "nieh_full"] in [row[:4] for row in rows]
     assert "Gain over the same model's run on blank frames, in points" in output

@@ -20,11 +20,12 @@ from infthor_eval.runs import UnitRecord
 from model_adapters import check_adapter, load
 from tests.helpers.bundled import BUNDLED
 from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_records
 from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 
 from ..asking import up_to
 from ..checkpoints import save
-from ..serving import free_port, records_in, wait_for_server
+from ..serving import free_port, wait_for_server
 
 for package in ("openai", "fastapi", "uvicorn", "multipart"):
     pytest.importorskip(
@@ -98,7 +99,7 @@ def both(
             )
             code, _, err = run_cli(*typed, *arguments)
             assert code == 0, err
-            records.append(records_in(tmp_path / "out" / model))
+            records.append(read_records(tmp_path / "out" / model))
         return records
 
     return both

@@ -15,11 +15,10 @@ from infthor_eval.runs import UnitRecord
 from infthor_eval.storage.packaged import packaged_folder
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_records
 from tests.helpers.processes import cli_words
 from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 from tests.helpers.waiting import PATIENCE_S, wait_until
-
-from ...serving import records_in
 
 ENGINES = ("vllm", "transformers")
 Run = Callable[..., list[UnitRecord[Any]]]
@@ -44,7 +43,7 @@ def run_engine(run_cli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         output = tmp_path / engine / str(random.getrandbits(32))
         code, _, err = run_cli(*_arguments(engine, output, *more))
         assert code == 0, err
-        return records_in(output)
+        return read_records(output)
 
     return run_engine
 
@@ -116,6 +115,6 @@ def test_a_run_that_was_killed_goes_on(run_engine: Run, tmp_path: Path) -> None:
     )
     assert again.returncode == 0, again.stderr
     assert "resumed from the journal" in again.stderr + again.stdout
-    assert [record.payload for record in records_in(output)] == [
+    assert [record.payload for record in read_records(output)] == [
         record.payload for record in run_engine("vllm", *words)
     ]

@@ -18,12 +18,13 @@ from infthor_eval.storage.packaged import packaged_folder
 from model_adapters import load
 from model_adapters.tiny.qwen2_5_vl_nano import FOLDER
 from tests.helpers.command_line import option_words
+from tests.helpers.journals import read_records
 from tests.helpers.processes import cli_words
 from tests.helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
 from tests.helpers.waiting import PATIENCE_S, wait_until
 
 from ...asking import up_to
-from ...serving import free_port, records_in, wait_for_server
+from ...serving import free_port, wait_for_server
 
 SERVER = "vllm.entrypoints.openai.api_server"
 MODEL = str(packaged_folder(FOLDER))
@@ -89,7 +90,7 @@ def both(
                 *arguments,
             )
             assert code == 0, err
-            records.append(records_in(tmp_path / "out" / model))
+            records.append(read_records(tmp_path / "out" / model))
         return records
 
     return both
@@ -161,12 +162,12 @@ def test_a_server_that_dies_costs_nothing_that_was_answered_and_goes_on_once_it_
         output_text = asking.communicate(timeout=PATIENCE_S)[0]
     assert asking.returncode == 1, output_text
     assert "Traceback" not in output_text
-    before = {record.key: record for record in records_in(output) if record.failure is None}
+    before = {record.key: record for record in read_records(output) if record.failure is None}
     assert 5 <= len(before) < 40, "it did not die in the middle"
     with _server(port, tmp_path / "second"):
         code, _, err = run_cli(*words, "--output", output)
     assert code == 0, err
-    records = records_in(output)
+    records = read_records(output)
     assert len(records) == 40
     assert [record.failure for record in records] == [None] * 40
     assert all(
