@@ -40,7 +40,7 @@ def start() -> Callable[..., str]:
     return start
 
 
-def samples(folder: Path) -> dict[str, list[dict]]:
+def read_samples(folder: Path) -> dict[str, list[dict]]:
     """The samples files of a folder, by task."""
     by_task = {}
     for path in sorted(folder.rglob("samples_*.jsonl")):

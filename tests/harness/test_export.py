@@ -9,7 +9,7 @@ from lm_eval.utils import (
     make_table,
 )
 
-from tests.harness.conftest import samples
+from tests.harness.conftest import read_samples
 from tests.helpers.command_line import option_words
 from tests.helpers.files import find_one
 
@@ -31,7 +31,7 @@ def test_lm_evals_readers_take_the_files(make_nieh_set, tmp_path, run_cli):
     assert document["n-samples"]["nieh_gt"] == {"original": 5, "effective": 5}
     hashes = "".join(
         row["doc_hash"] + row["prompt_hash"] + row["target_hash"]
-        for row in samples(tmp_path)["nieh_gt"]
+        for row in read_samples(tmp_path)["nieh_gt"]
     )
     assert document["task_hashes"]["nieh_gt"] == hash_string(hashes)
 
@@ -65,6 +65,6 @@ def test_a_failed_sample_is_exported_as_wrong(make_nieh_set, tmp_path, run_cli):
     frame.write_bytes(frame.read_bytes()[:50])
     arguments = option_words(model="qwen2.5-vl-tiny", tasks="nieh_gt", data=data, output=tmp_path)
     assert run_cli(*arguments)[0] == 1
-    rows = samples(tmp_path)["nieh_gt"]
+    rows = read_samples(tmp_path)["nieh_gt"]
     assert len(rows) == 5
     assert [row["strict"] for row in rows if row["resps"] == [[""]]] == [0.0, 0.0]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from infthor_eval.storage.packaged import packaged_folder
-from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, samples
+from tests.harness.conftest import LM_EVAL, OURS_WITH_ALL_TASKS, read_samples
 from tests.helpers.command_line import option_words
 
 PEERS = Path(sys.prefix) / "test-peers"
@@ -26,7 +26,7 @@ def ours(make_nieh_set, tmp_path, run_cli):
         )
         code, _, err = run_cli(*arguments, *options)
         assert code == 0, err
-        return data, samples(tmp_path / "ours")
+        return data, read_samples(tmp_path / "ours")
 
     return ours
 
@@ -74,7 +74,7 @@ def test_hf_multimodal_runs_the_tasks_and_says_what_our_model_says(tmp_path, our
             for row in rows
         }
 
-    theirs = replies(samples(tmp_path / "theirs"))
+    theirs = replies(read_samples(tmp_path / "theirs"))
     assert len(theirs) == 10
     assert replies(our_samples) == theirs
 
@@ -87,7 +87,7 @@ def test_our_model_under_lm_evals_own_command_gives_the_samples_of_our_own(tmp_p
     arguments = ["--model", "infthor", "--model_args", "adapter=qwen2.5-vl-tiny", "--tasks", tasks]
     arguments += ["--metadata", json.dumps({"data": str(data)})]
     start(LM_EVAL, "run", *arguments, "--log_samples", "--output_path", tmp_path / "theirs")
-    theirs = samples(tmp_path / "theirs")
+    theirs = read_samples(tmp_path / "theirs")
     assert {task: len(rows) for task, rows in theirs.items()} == {"nieh_gt": 5, "nieh_full": 5}
     assert our_samples == theirs
 
@@ -118,7 +118,7 @@ def test_our_command_starts_lm_evals_with_any_adapter_and_tasks_by_name(
         out,
         path=[package],
     )
-    (rows,) = samples(out).values()
+    (rows,) = read_samples(out).values()
     assert [row["resps"][0][0] for row in rows] == ["mug"] * 5
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import read_run
-from tests.harness.conftest import OURS, samples
+from tests.harness.conftest import OURS, read_samples
 from tests.helpers.command_line import option_words
 from tests.helpers.journals import read_records
 from tests.helpers.trajectories import MUG, cut_trajectory, write_trajectories
@@ -63,7 +63,7 @@ def test_one_request_an_episode_and_what_our_own_run_finds(tmp_path, short, run_
     assert len(records) > 1
     out, journal = tmp_path / "theirs", tmp_path / "journal"
     start(OURS, *lm_eval_words(short, data, out, TINY, f"journal={journal}"))
-    (rows,) = samples(out).values()
+    (rows,) = read_samples(out).values()
     assert [row["doc"]["arm_episode"] for row in rows] == [record.id for record in records]
     for row, record in zip(rows, records, strict=True):
         assert row["success"] == float(record.payload.done)

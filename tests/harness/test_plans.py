@@ -10,7 +10,7 @@ import pytest
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import read_run
 from infthor_eval.storage.packaged import packaged_folder
-from tests.harness.conftest import LM_EVAL, samples
+from tests.harness.conftest import LM_EVAL, read_samples
 from tests.helpers.command_line import option_words
 from tests.helpers.files import find_one
 from tests.helpers.journals import read_records
@@ -44,7 +44,7 @@ def test_one_request_a_trajectory_and_what_our_own_run_finds(tmp_path, task_file
         LM_EVAL,
         *lm_eval_words(task, data, out, model, "--log_samples", greedy=True, constrained=True),
     )
-    (rows,) = samples(out).values()
+    (rows,) = read_samples(out).values()
     assert [row["doc"]["traj_id"] for row in rows] == [MUG, FORK]
     assert {row["doc"]["traj_id"]: row["doc"]["plans"] for row in rows} == {
         name: [plan.plan for plan in plans] for name, plans in expected.items()

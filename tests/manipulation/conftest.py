@@ -12,7 +12,7 @@ from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
 from ..episodes.pool import Pool, pool, shared_simulators  # noqa: F401 - fixtures
-from ..episodes.preparing import preparer
+from ..episodes.preparing import make_preparer
 from ..helpers.trajectories import MUG, cut_trajectory, write_trajectories
 from .arena import Arena
 
@@ -50,8 +50,8 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def prepare_run(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
-    """Prepares a run on that, see `preparer`."""
-    return preparer("planner-arm", tasks=("manipulathor",), data=data, output=tmp_path / "out")
+    """Prepares a run on that, see `make_preparer`."""
+    return make_preparer("planner-arm", tasks=("manipulathor",), data=data, output=tmp_path / "out")
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 from infthor_eval.runs import PreparedRun
 
 from ..episodes.pool import pool, shared_simulators  # noqa: F401 - fixtures
-from ..episodes.preparing import preparer
+from ..episodes.preparing import make_preparer
 from ..helpers.trajectories import FORK, cut_trajectory, write_trajectories
 
 
@@ -20,5 +20,5 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def prepare_run(data: Path, tmp_path: Path) -> Callable[..., PreparedRun]:
-    """Prepares a run on that, see `preparer`."""
-    return preparer("planner", tasks=("infthor_plans",), data=data, output=tmp_path / "out")
+    """Prepares a run on that, see `make_preparer`."""
+    return make_preparer("planner", tasks=("infthor_plans",), data=data, output=tmp_path / "out")

@@ -59,19 +59,19 @@ class ScriptedModel:
         pass
 
 
-def plan_asked(parts: Sequence[Part]) -> str:
+def plan_in_prompt(parts: Sequence[Part]) -> str:
     """The plan that is to be carried out."""
     text = "".join(part if isinstance(part, str) else "" for part in parts)
     return text.rpartition("<|plan|>Plan: ")[2].partition("<|plan|>")[0]
 
 
-def goal_asked(parts: Sequence[Part]) -> str:
+def goal_in_prompt(parts: Sequence[Part]) -> str:
     """The goal that it serves."""
     text = "".join(part if isinstance(part, str) else "" for part in parts)
     return text.rpartition("<|goal|>Your main goal: ")[2].partition("<|goal|>")[0]
 
 
-def done_so_far(parts: Sequence[Part]) -> list[str]:
+def actions_in_prompt(parts: Sequence[Part]) -> list[str]:
     """The actions of that plan up to now."""
     text = "".join(part if isinstance(part, str) else "" for part in parts)
     return text.rpartition("<|plan|>")[2].split("<|act|>")[1:-1:2]

@@ -19,19 +19,19 @@ REPLIES = (
 )
 
 
-def scores_in(folder, metric):
+def read_scores(folder, metric):
     return {one.id: one.payload.scores.get(metric) for one in read_run(folder, RECORDS)[1]}
 
 
-def lines_of(folder):
+def read_journal_lines(folder):
     return (folder / "journal" / "worker-0.jsonl").read_text().splitlines()
 
 
-def report_in(folder):
+def read_report(folder):
     return json.loads((folder / "rescored.json").read_text())
 
 
-def row(output, *beginning):
+def read_row(output, *beginning):
     """The rest of the row of a printed table that begins like this."""
     (cells,) = [
         line.split()

@@ -8,18 +8,14 @@ from PIL import Image
 
 from model_adapters.policies.parity import load_policy
 
-from ...model_adapters.policies.servers import (
-    no_proxy,  # noqa: F401 - a fixture
-    policy_answers,
-    serving,
-)
+from ...model_adapters.policies.servers import policy_answers, serve
 
 Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    with serving(policy_answers(load_policy("openvla-tiny", {}))) as address:
+    with serve(policy_answers(load_policy("openvla-tiny", {}))) as address:
         yield address
 
 
@@ -34,7 +30,7 @@ def test_equal_policies_end_with_0(run_cli: Run, url: str) -> None:
 def test_different_policies_end_with_1(run_cli: Run, tmp_path: Path) -> None:
     Image.new("RGB", (64, 64), "red").save(tmp_path / "red.png")
     words = ("--frames", tmp_path, "--instruction", "open the drawer")
-    with serving(policy_answers(load_policy("openvla-tiny", {}), change=0.125)) as other:
+    with serve(policy_answers(load_policy("openvla-tiny", {}), change=0.125)) as other:
         code, out, _ = run_cli("check-parity", "openvla-tiny", "--reference-url", other, *words)
         tolerated, _, _ = run_cli(
             "check-parity", "openvla-tiny", "--reference-url", other, *words, "--tolerance", "0.2"

@@ -12,7 +12,7 @@ from infthor_eval.storage.digests import fingerprint
 
 from ...helpers.command_line import option_words
 from ...helpers.nieh_runs import make_record
-from .rescored import REPLIES, lines_of, row, scores_in
+from .rescored import REPLIES, read_journal_lines, read_row, read_scores
 
 RIGHT, WRONG = {"reference": 1.0, "strict": 1.0}, {"reference": 0.0, "strict": 0.0}
 FOUR = {f"q{number}": score for number, score in enumerate((1.0, 0.0, 0.0, 1.0, 1.0, 0.0))}
@@ -29,7 +29,7 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run_cli)
     assert "7 replies scored; 1 without a reply stay failed; 2 were never asked" in output
     assert "nieh_gt, strict: 1 of 7 scores differ from those in the journal" in output
     assert "  q0: 0, now 1: 'Sofa'" in output
-    assert row(output, "nieh_gt", "strict", "our", "strict", "scorer") == [
+    assert read_row(output, "nieh_gt", "strict", "our", "strict", "scorer") == [
         "7",
         "40.00",
         "54.29",
@@ -45,8 +45,8 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run_cli)
         "judge": None,
     }
     assert header.config["model"] == {"name": "m"}
-    assert {name: scores_in(new, "strict")[name] for name in FOUR} == FOUR
-    assert scores_in(new, "strict")["q7"] == pytest.approx(0.8)
+    assert {name: read_scores(new, "strict")[name] for name in FOUR} == FOUR
+    assert read_scores(new, "strict")["q7"] == pytest.approx(0.8)
     assert {one.id: one.failure for one in records if one.failure} == {"q6": "m fails"}
     results = json.loads((new / "results.json").read_text())
     assert (results["n_missing"], results["usage"]["requests"]) == (2, 0)
@@ -57,14 +57,14 @@ def test_todays_scores_are_a_run_that_names_its_source(source, rescore, run_cli)
 def test_the_same_command_again_writes_nothing_new(source, rescore):
     _, _, new = rescore(source())
     before = (
-        lines_of(new),
+        read_journal_lines(new),
         (new / "results.json").read_bytes(),
         (new / "rescored.json").read_bytes(),
     )
     _, _, again = rescore(new.parents[2] / "elsewhere" / "a run")
     assert again == new
     assert (
-        lines_of(new),
+        read_journal_lines(new),
         (new / "results.json").read_bytes(),
         (new / "rescored.json").read_bytes(),
     ) == before
@@ -77,7 +77,7 @@ def test_a_changed_scorer_replaces_what_the_journal_has(source, rescore, monkeyp
     code, output, again = rescore(folder)
     assert (code, again) == (0, new)
     assert "nieh_gt, strict: 4 of 7 scores differ" in output
-    assert set(scores_in(new, "strict").values()) == {0.0, None}
+    assert set(read_scores(new, "strict").values()) == {0.0, None}
 
 
 def test_metrics_of_a_task_file_are_left_out_and_replies_that_they_failed_on_are_scored(
@@ -97,7 +97,12 @@ def test_metrics_of_a_task_file_are_left_out_and_replies_that_they_failed_on_are
     assert [(one.payload.scores, one.failure) for one in read_run(new, RECORDS)[1]] == [
         (RIGHT, None)
     ] * 2
-    assert row(output, "nieh_gt", "strict", "our", "strict", "scorer") == ["2", "-", "100.00", "-"]
+    assert read_row(output, "nieh_gt", "strict", "our", "strict", "scorer") == [
+        "2",
+        "-",
+        "100.00",
+        "-",
+    ]
 
 
 def test_a_run_of_another_suite_and_a_folder_without_a_run_are_refused_in_one_line(
@@ -151,7 +156,7 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
     own(LENGTH)
     code, output, new = rescore(source(), "--scorer", "own.py:length")
     assert code == 0
-    assert scores_in(new, "length") == {
+    assert read_scores(new, "length") == {
         "q0": 5,
         "q1": 15,
         "q2": 4,
@@ -161,7 +166,12 @@ def test_a_function_in_a_file_is_a_metric_of_its_name(source, rescore, own):
         "q6": None,
         "q7": 12,
     }
-    assert row(output, "nieh_gt", "length", "length", "in", "own.py") == ["7", "-", "742.86", "-"]
+    assert read_row(output, "nieh_gt", "length", "length", "in", "own.py") == [
+        "7",
+        "-",
+        "742.86",
+        "-",
+    ]
     scorer = read_run(new, RECORDS)[0].config["rescored"]["scorer"]
     assert (scorer["name"], scorer["metrics"], scorer["file"]) == ("length", ["length"], "own.py")
     own(LENGTH + "# edited\n")
@@ -177,7 +187,7 @@ def test_a_mapping_is_several_metrics(source, rescore, own):
         "b",
         "a",
     ]
-    assert scores_in(new, "a")["q0"] == scores_in(new, "b")["q1"] == 1.0
+    assert read_scores(new, "a")["q0"] == read_scores(new, "b")["q1"] == 1.0
     assert "a: both in own.py." in output
 
 
@@ -200,9 +210,9 @@ def test_an_exception_fails_the_reply_alone_and_its_traceback_is_kept(source, re
         "Sofa",
     )
     assert records["q1"].failure is None
-    lines = lines_of(new)
+    lines = read_journal_lines(new)
     rescore(folder, "--scorer", "own.py:third")
-    assert lines_of(new) == lines
+    assert read_journal_lines(new) == lines
 
 
 @pytest.mark.parametrize(
@@ -264,7 +274,7 @@ def test_a_scorer_of_another_package_is_found_by_its_entry_point(source, rescore
         "infthor_eval.plugins.entry_points", lambda group: [point] if group == point.group else []
     )
     code, _, new = rescore(source(REPLIES[:1]), "--scorer", "loud")
-    assert (code, scores_in(new, "loud")) == (0, {"q0": 0.0})
+    assert (code, read_scores(new, "loud")) == (0, {"q0": 0.0})
     scorer = read_run(new, RECORDS)[0].config["rescored"]["scorer"]
     assert (scorer["name"], scorer["package"]) == ("loud", "tests")
     assert "there are loud)" in rescore(source(REPLIES[:1]), "--scorer", "quiet")[1]

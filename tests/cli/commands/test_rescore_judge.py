@@ -8,7 +8,7 @@ from infthor_eval.nieh.records import RECORDS
 from infthor_eval.runs import read_run
 
 from ...helpers.nieh_runs import make_record
-from .rescored import REPLIES, lines_of, report_in, row, scores_in
+from .rescored import REPLIES, read_journal_lines, read_report, read_row, read_scores
 
 # It says yes to "soft", no to "bin", and keeps every request in a file.
 JUDGE = """
@@ -72,7 +72,7 @@ def requests(tmp_path):
 def test_without_the_option_nobody_is_asked(source, rescore, requests):
     _, output, new = rescore(source())
     assert requests() == []
-    assert scores_in(new, "judged")["q0"] is None
+    assert read_scores(new, "judged")["q0"] is None
     assert "judge" not in output
 
 
@@ -80,19 +80,19 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
     folder = source()
     code, output, new = rescore(folder, *WITH_JUDGE)
     assert code == 0
-    judged, strict = scores_in(new, "judged"), scores_in(new, "strict")
+    judged, strict = read_scores(new, "judged"), read_scores(new, "strict")
     assert {name for name in judged if judged[name] != strict[name]} == {"q1"}
     assert judged["q1"] == 1.0
     # Two unsure replies; Sofa and Bed are right, Bed for Sofa is wrong. A share of several answers
     # is neither.
     assert len(requests()) == 5
-    assert report_in(new)["judge"]["unsure"] == {"n": 2, "n_right": 1, "n_partly": 0} | {
+    assert read_report(new)["judge"]["unsure"] == {"n": 2, "n_right": 1, "n_partly": 0} | {
         "n_wrong": 1,
         "n_neither": 0,
         "n_not_asked": 0,
     }
-    assert row(output, "the", "rules", "are", "unsure", "of") == ["2", "1", "0", "1", "0", "0"]
-    assert row(output, "are", "right", "by", "the", "rules", "(sample)") == [
+    assert read_row(output, "the", "rules", "are", "unsure", "of") == ["2", "1", "0", "1", "0", "0"]
+    assert read_row(output, "are", "right", "by", "the", "rules", "(sample)") == [
         "2",
         "2",
         "0",
@@ -100,7 +100,7 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
         "0",
         "0",
     ]
-    assert row(output, "are", "wrong", "by", "the", "rules", "(sample)") == [
+    assert read_row(output, "are", "wrong", "by", "the", "rules", "(sample)") == [
         "1",
         "0",
         "0",
@@ -110,7 +110,7 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
     ]
     assert "Judge and rules agree on 100.00 % of the sample." in output
     by = "strict, and Judge where the rules are unsure"
-    assert row(output, "nieh_gt", "judged", *by.split()) == ["7", "-", "68.57", "-"]
+    assert read_row(output, "nieh_gt", "judged", *by.split()) == ["7", "-", "68.57", "-"]
     assert f"judged: {by}." in run_cli("show", new)[1]
     assert json.loads((new / "results.json").read_text())["usage"]["requests"] == 5
     judge = read_run(new, RECORDS)[0].config["rescored"]["judge"]
@@ -120,14 +120,18 @@ def test_a_judge_decides_where_the_rules_are_unsure(source, rescore, requests, r
 def test_a_verdict_is_in_the_journal_and_is_not_asked_for_again(source, rescore, requests):
     folder = source()
     _, _, new = rescore(folder, *WITH_JUDGE)
-    lines, report = lines_of(new), (new / "rescored.json").read_bytes()
+    lines, report = read_journal_lines(new), (new / "rescored.json").read_bytes()
     verdicts = [one["payload"] for one in map(json.loads, lines) if one["type"] == "artifact"]
     (soft,) = [one for one in verdicts if one["reply"] == "the soft thing"]
     assert (soft["type"], soft["said"], soft["score"]) == ("nieh_verdict", "yes", 1.0)
     assert soft["judge"]["soft"] == "yes"
     assert len(requests()) == 5
     assert rescore(folder, *WITH_JUDGE)[2] == new
-    assert (requests(), lines_of(new), (new / "rescored.json").read_bytes()) == ([], lines, report)
+    assert (requests(), read_journal_lines(new), (new / "rescored.json").read_bytes()) == (
+        [],
+        lines,
+        report,
+    )
     other = rescore(folder, *WITH_JUDGE, "--judge-args", "soft=no")[2]
     assert (other != new, len(requests())) == (True, 5)
     assert rescore(folder, "--judge", "judge.py:Judge:soft=no")[2] == other
@@ -139,8 +143,8 @@ def test_no_verdict_leaves_the_strict_score_and_is_counted(
     source, rescore, requests, said_by_judge
 ):
     _, output, new = rescore(source(), *WITH_JUDGE, "--judge-args", f"soft={said_by_judge}")
-    assert scores_in(new, "judged")["q1"] == 0.0
-    assert row(output, "the", "rules", "are", "unsure", "of") == ["2", "0", "0", "1", "1", "0"]
+    assert read_scores(new, "judged")["q1"] == 0.0
+    assert read_row(output, "the", "rules", "are", "unsure", "of") == ["2", "0", "0", "1", "1", "0"]
 
 
 def test_a_judge_that_cannot_be_asked_is_counted_and_asked_again_next_time(
@@ -154,8 +158,8 @@ def test_a_judge_that_cannot_be_asked_is_counted_and_asked_again_next_time(
         in output
     )
     assert "ZeroDivisionError in judge.py:" in output
-    assert row(output, "the", "rules", "are", "unsure", "of") == ["2", "0", "0", "1", "0", "1"]
-    assert scores_in(new, "judged")["q1"] == 0.0
+    assert read_row(output, "the", "rules", "are", "unsure", "of") == ["2", "0", "0", "1", "0", "1"]
+    assert read_scores(new, "judged")["q1"] == 0.0
     requests()
     rescore(folder, *WITH_JUDGE, "--judge-args", "soft=raise")
     assert len(requests()) == 1
@@ -197,13 +201,13 @@ def test_the_published_prompt_asks_for_a_score_and_a_share_counts(
     monkeypatch.syspath_prepend(tmp_path)
     folder = source()
     _, output, new = rescore(folder, "--judge", "scoring.py:Judge", "--judge-prompt", "published")
-    judged, strict = scores_in(new, "judged"), scores_in(new, "strict")
+    judged, strict = read_scores(new, "judged"), read_scores(new, "strict")
     assert {name: judged[name] for name in judged if judged[name] != strict[name]} == {
         "q1": 0.5,
         "q5": 1.0,
     }
-    assert row(output, "the", "rules", "are", "unsure", "of") == ["2", "1", "1", "0", "0", "0"]
-    assert row(output, "are", "wrong", "by", "the", "rules", "(sample)") == [
+    assert read_row(output, "the", "rules", "are", "unsure", "of") == ["2", "1", "1", "0", "0", "0"]
+    assert read_row(output, "are", "wrong", "by", "the", "rules", "(sample)") == [
         "1",
         "1",
         "0",
@@ -217,7 +221,7 @@ def test_the_published_prompt_asks_for_a_score_and_a_share_counts(
 def test_a_no_leaves_the_share_of_several_answers(source, rescore, requests):
     partly = make_record(0, "Sofa, the bin", ("Sofa", "Bed"))
     _, _, new = rescore(source([partly]), *WITH_JUDGE)
-    assert scores_in(new, "judged") == {"q0": 0.5}
+    assert read_scores(new, "judged") == {"q0": 0.5}
 
 
 def test_the_sample_is_seeded_and_half_right_half_wrong(source, rescore, requests):
@@ -229,8 +233,8 @@ def test_the_sample_is_seeded_and_half_right_half_wrong(source, rescore, request
     requests_by_seed = []
     for seed in (0, 0, 1):
         _, output, _ = rescore(folder, *WITH_JUDGE, "--seed", seed)
-        assert row(output, "are", "right", "by", "the", "rules", "(sample)")[0] == "25"
-        assert row(output, "are", "wrong", "by", "the", "rules", "(sample)")[0] == "25"
+        assert read_row(output, "are", "right", "by", "the", "rules", "(sample)")[0] == "25"
+        assert read_row(output, "are", "wrong", "by", "the", "rules", "(sample)")[0] == "25"
         requests_by_seed.append(set(requests()))
     assert [len(one) for one in requests_by_seed] == [50, 0, 50]
     assert requests_by_seed[0] != requests_by_seed[2]

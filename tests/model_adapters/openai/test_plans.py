@@ -14,7 +14,7 @@ from tests.helpers.command_line import option_words
 from tests.helpers.trajectories import CANDLE, FORK, MUG, cut_trajectory, write_trajectories
 
 from ..policies.servers import send
-from .talking import chatting, completion
+from .talking import completion, serve_chat
 
 MOVES = ("RotateLeft", "RotateRight", "LookUp", "LookDown", "MoveAhead")
 
@@ -54,7 +54,7 @@ def test_episodes_at_once_find_what_one_after_the_other_finds(played: Any, tmp_p
         cut_trajectory(MUG, 1),
         cut_trajectory(CANDLE, 1),
     )
-    with chatting(_moves) as url:
+    with serve_chat(_moves) as url:
         runs = [played(url, data, f"with-{number}", max_in_flight=number) for number in (3, 1)]
     together, alone = (
         [msgspec.structs.replace(record, seconds=0.0) for record in records]
@@ -85,7 +85,7 @@ def test_a_plan_that_fails_in_the_middle_says_what_it_took_and_the_next_one_is_p
         return send(handler, 400, b"no") if n_asked == 3 else completion("RotateLeft", (100, 3))
 
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 2))
-    with chatting(answer) as url:
+    with serve_chat(answer) as url:
         code, (first, second), results = played(url, data)
     assert code == 1
     assert "answers 400 Bad Request: 'no'" in first.failure
@@ -102,7 +102,7 @@ def test_a_survived_fault_stands_in_the_plans_record(played: Any, tmp_path: Path
         return send(handler, 503, b"busy") if n_asked == 2 else completion("RotateLeft")
 
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 1))
-    with chatting(answer) as url:
+    with serve_chat(answer) as url:
         code, (record,), _ = played(url, data, retries=1)
     assert code == 0
     (fault,) = record.faults
@@ -113,7 +113,7 @@ def test_plans_beyond_the_cap_are_not_asked_and_are_played_by_the_next_run(
     played: Any, tmp_path: Path
 ) -> None:
     data = write_trajectories(tmp_path / "data", cut_trajectory(FORK, 2))
-    with chatting(lambda *_: completion("RotateLeft", (95, 5))) as url:
+    with serve_chat(lambda *_: completion("RotateLeft", (95, 5))) as url:
         code, (first, second), _ = played(url, data, max_tokens_total=400)
         assert (code, first.failure, first.usage.requests) == (1, None, 4)
         assert second.failure.startswith(

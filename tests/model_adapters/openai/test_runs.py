@@ -17,7 +17,7 @@ from infthor_eval.runs import read_run
 
 from ...helpers.command_line import option_words
 from ..policies.servers import send
-from .talking import chatting, completion, kept, says, talkative
+from .talking import always_say, completion, keep_requests, serve_chat, talkative
 
 KEY = "sk-0123456789abcdef0123456789"
 
@@ -46,7 +46,7 @@ def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(
     ask: Any, tmp_path: Path
 ) -> None:
     prices = {"price_per_m_input": 2, "price_per_m_cached": 1, "price_per_m_output": 10}
-    with chatting(lambda *_: completion("yes", (1000, 10, 200))) as url:
+    with serve_chat(lambda *_: completion("yes", (1000, 10, 200))) as url:
         code, out, err = ask(url, **prices)
     assert code == 0, err
     records, results = _run(tmp_path / "out")
@@ -68,7 +68,7 @@ def test_questions_are_answered_and_their_tokens_and_cost_are_in_the_results(
 
 def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path: Path) -> None:
     requests: list[Any] = []
-    with chatting(kept(requests, lambda *_: completion("yes", (95, 5)))) as url:
+    with serve_chat(keep_requests(requests, lambda *_: completion("yes", (95, 5)))) as url:
         code, _, err = ask(url, "--max-tokens-total", 250)
         assert code == 1
         assert (
@@ -87,7 +87,7 @@ def test_a_run_that_reaches_its_cap_goes_on_with_a_higher_one(ask: Any, tmp_path
 
 def test_money_is_capped_likewise(ask: Any) -> None:
     requests: list[Any] = []
-    with chatting(kept(requests, lambda *_: completion("yes", (1000, 0)))) as url:
+    with serve_chat(keep_requests(requests, lambda *_: completion("yes", (1000, 0)))) as url:
         code, _, err = ask(url, "--max-cost", 0.0015, price_per_m_input=1, price_per_m_output=1)
     assert code == 1
     assert len(requests) == 2
@@ -143,7 +143,7 @@ def test_units_that_fail_are_named_and_the_others_answered(ask: Any, tmp_path: P
         text = request["messages"][0]["content"][-1]["text"]
         return send(handler, 400, b"no fridge") if "fridge" in text else completion("yes")
 
-    with chatting(answer) as url:
+    with serve_chat(answer) as url:
         code, _, err = ask(url)
     assert code == 1
     assert "Traceback" not in err
@@ -162,7 +162,7 @@ def test_a_survived_fault_stands_in_the_record(ask: Any, tmp_path: Path) -> None
         n_asked += 1
         return send(handler, 503, b"busy") if n_asked == 1 else completion("yes")
 
-    with chatting(answer) as url:
+    with serve_chat(answer) as url:
         assert ask(url, retries=1, max_in_flight=1)[0] == 0
     faults = [fault for record in _run(tmp_path / "out")[0] for fault in record.faults]
     assert len(faults) == 1
@@ -196,7 +196,7 @@ def test_the_key_is_in_no_file_and_in_nothing_that_is_said(
 ) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", KEY)
     heard: list[Any] = []
-    with caplog.at_level(logging.DEBUG), chatting(kept(heard, _echoes)) as url:
+    with caplog.at_level(logging.DEBUG), serve_chat(keep_requests(heard, _echoes)) as url:
         code, out, err = ask(url, retries=1)
     assert code == 1
     assert {request["headers"]["authorization"] for request in heard} == {f"Bearer {KEY}"}
@@ -221,7 +221,7 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(
         done.wait(600)
 
     data = make_nieh_set(size=56)
-    with chatting(answer) as url:
+    with serve_chat(answer) as url:
         model_args = f"base_url={url},model=m,max_in_flight={in_flight}"
         arguments = option_words(
             model="openai", model_args=model_args, tasks="nieh_full", data=data
@@ -256,7 +256,7 @@ def test_a_run_interrupted_twice_ends_at_once_in_one_line(
 
 def test_notes_are_paid_for_too(make_nieh_set: Any, tmp_path: Path, run_cli: Any) -> None:
     data = make_nieh_set(size=56)
-    with chatting(lambda *_: completion("a note", (100, 10))) as url:
+    with serve_chat(lambda *_: completion("a note", (100, 10))) as url:
         model_args = f"base_url={url},model=m,price_per_m_input=1,price_per_m_output=10"
         arguments = option_words(
             model="openai", model_args=model_args, tasks="nieh_memory_notes", data=data
@@ -297,7 +297,7 @@ def test_several_trajectories_are_asked_about_at_once(
         return talkative(request, handler)
 
     data = make_nieh_set(size=56)
-    with chatting(answer) as url:
+    with serve_chat(answer) as url:
         model_args = f"base_url={url},model=m"
         arguments = option_words(
             model="openai", model_args=model_args, tasks="nieh_full", data=data
@@ -307,7 +307,7 @@ def test_several_trajectories_are_asked_about_at_once(
 
 
 def test_a_server_that_says_nonsense_fails_every_unit_and_nothing_else(ask: Any) -> None:
-    with chatting(says("\x1b[2J\x00 not a word")) as url:
+    with serve_chat(always_say("\x1b[2J\x00 not a word")) as url:
         code, out, err = ask(url)
     assert code == 0
     assert "\x1b[2J" not in out + err

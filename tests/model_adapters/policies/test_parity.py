@@ -20,7 +20,7 @@ from model_adapters.policies.parity import (
 )
 from model_adapters.policies.policy import VlaPolicy
 
-from .servers import policy_answers, serving
+from .servers import policy_answers, serve
 
 
 class Still:
@@ -48,7 +48,7 @@ def test_the_same_policy_behind_a_server_is_equal(
 ) -> None:
     settings = {"pretrained": str(policy_checkpoints[family]), "device": "cpu"}
     theirs = load_policy(family, settings)
-    with synthetic_frames() as frames, serving(policy_answers(theirs)) as url:
+    with synthetic_frames() as frames, serve(policy_answers(theirs)) as url:
         report = compare_policies(
             load_policy(family, settings), reference_policy(url, None), frames, INSTRUCTIONS, 1e-6
         )

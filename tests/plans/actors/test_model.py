@@ -19,7 +19,7 @@ from model_adapters.backend import BackendConversation
 
 from ...helpers.prompts import join_parts
 from ...helpers.trajectories import CANDLE, FORK, cut_trajectory, write_trajectories
-from ..scripting import ScriptedModel, done_so_far, goal_asked, plan_asked
+from ..scripting import ScriptedModel, actions_in_prompt, goal_in_prompt, plan_in_prompt
 
 pytestmark = pytest.mark.usefixtures("shared_simulators")
 
@@ -63,7 +63,7 @@ def as_expert(folder):
             known[key] = expert_texts(trajectory, plan, Words.PUBLISHED)
 
     def say(parts, decoding):
-        return known[goal_asked(parts), plan_asked(parts)][len(done_so_far(parts))]
+        return known[goal_in_prompt(parts), plan_in_prompt(parts)][len(actions_in_prompt(parts))]
 
     return say
 
@@ -94,7 +94,7 @@ def test_a_model_reads_the_sequence_that_it_was_trained_on(run_scripted, data):
     outcome, model = run_scripted(as_expert(data))
     (trajectory,) = iter_trajectories(data)
     plans = plans_of(trajectory, Words.PUBLISHED)
-    beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
+    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
     whole = FIRST + "<image>"
     for plan, parts in zip(plans, beginnings, strict=True):
         assert join_parts(parts) == f"{whole}<|plan|>Plan: {plan.text}<|plan|><|act|>"
@@ -104,8 +104,8 @@ def test_a_model_reads_the_sequence_that_it_was_trained_on(run_scripted, data):
             for action in expert_texts(trajectory, plan, Words.PUBLISHED)
         )
     for (before, _), (after, _) in pairwise(model.requests):
-        if done_so_far(after):  # within a plan it grows by the action and what is seen then
-            action = done_so_far(after)[-1]
+        if actions_in_prompt(after):  # within a plan it grows by the action and what is seen then
+            action = actions_in_prompt(after)[-1]
             assert join_parts(after) == f"{join_parts(before)}{action}<|act|><image><|act|>"
             assert frames(after)[:-1] == frames(before)
     assert {
@@ -123,12 +123,12 @@ def test_a_model_reads_the_sequence_that_it_was_trained_on(run_scripted, data):
 def test_the_history_is_the_true_one_whatever_the_model_did(run_scripted, data, tmp_path):
     _, right = run_scripted(as_expert(data))
     _, wrong = run_scripted(
-        lambda parts, decoding: "RotateLeft" if not done_so_far(parts) else "",
+        lambda parts, decoding: "RotateLeft" if not actions_in_prompt(parts) else "",
         output=tmp_path / "b",
     )
 
     def beginnings(model):
-        return [parts for parts, _ in model.requests if not done_so_far(parts)]
+        return [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
 
     def seen(model):
         return [
@@ -172,7 +172,7 @@ def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_hist
     run_scripted, data
 ):
     _, model = run_scripted(
-        lambda parts, _: " RotateRight \n" if len(done_so_far(parts)) < 2 else "", limit=1
+        lambda parts, _: " RotateRight \n" if len(actions_in_prompt(parts)) < 2 else "", limit=1
     )
     first = [parts for parts, _ in model.requests[:3]]
     assert join_parts(first[2]).endswith(
@@ -182,9 +182,9 @@ def test_a_reply_with_white_space_around_it_is_the_action_and_goes_into_the_hist
 
 def test_a_model_that_fails_fails_its_plan_alone(run_scripted):
     def say(parts, _):
-        if plan_asked(parts) == "pick up the Fork":
+        if plan_in_prompt(parts) == "pick up the Fork":
             raise ZeroDivisionError("of its own")
-        return "RotateLeft" if not done_so_far(parts) else ""
+        return "RotateLeft" if not actions_in_prompt(parts) else ""
 
     outcome, _ = run_scripted(say)
     assert [record.failure and record.failure.split(" (")[0] for record in outcome.records] == [
@@ -223,10 +223,10 @@ def test_plans_and_actions_are_in_the_words_that_are_asked_for(run_scripted, dat
     plans = plans_of(trajectory, Words(words))
     known = {plan.text: expert_texts(trajectory, plan, Words(words)) for plan in plans}
     outcome, model = run_scripted(
-        lambda parts, _: known[plan_asked(parts)][len(done_so_far(parts))], words=words
+        lambda parts, _: known[plan_in_prompt(parts)][len(actions_in_prompt(parts))], words=words
     )
     assert set(endings(outcome)) == {"done"}
-    assert {plan_asked(parts) for parts, _ in model.requests} == set(known)
+    assert {plan_in_prompt(parts) for parts, _ in model.requests} == set(known)
     assert [record.payload.plan for record in outcome.records] == list(known)
 
 
@@ -306,7 +306,7 @@ def test_tokens_that_nobody_counts_cannot_be_limited(run_scripted, monkeypatch):
 def test_the_state_in_words_takes_the_place_of_the_history(run_scripted, tmp_path):
     data = write_trajectories(tmp_path / "six", cut_trajectory(FORK, 6))
     _, model = run_scripted(as_expert(data), data=data, history="text")
-    beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
+    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
     assert [len(frames(parts)) for parts in beginnings] == [1] * 6
     assert join_parts(beginnings[0]).startswith(f"{FIRST} State: ")
     for parts, plan in zip(beginnings, ("go to the cabinet", "pick up the Fork"), strict=False):
@@ -322,9 +322,9 @@ def test_the_frames_nearest_to_the_present_one_are_shown_in_time_order(
     run_scripted, data, make_clip
 ):
     _, full = run_scripted(as_expert(data))
-    histories = [frames(parts) for parts, _ in full.requests if not done_so_far(parts)]
+    histories = [frames(parts) for parts, _ in full.requests if not actions_in_prompt(parts)]
     _, model = run_scripted(as_expert(data), history="frames:3", retriever=str(make_clip()))
-    beginnings = [parts for parts, _ in model.requests if not done_so_far(parts)]
+    beginnings = [parts for parts, _ in model.requests if not actions_in_prompt(parts)]
     for parts, history in zip(beginnings, histories, strict=True):
         earlier, now = [frame.digest for frame in history[:-1]], history[-1].digest
         *digests, present = [frame.digest for frame in frames(parts)]
@@ -429,7 +429,7 @@ def test_what_was_seen_is_encoded_once(prepare_run, short, monkeypatch, watched,
     act = ModelActor.act
     monkeypatch.setattr(ModelActor, "act", lambda actor: replace(act(actor), action="RotateLeft"))
     execute(prepare_run(model, {"chunk_tokens": "64"}, data=short, greedy=True))
-    assert [len(done_so_far(parts)) for parts, _ in watched] == [0, 1, 2, 3] * 2
+    assert [len(actions_in_prompt(parts)) for parts, _ in watched] == [0, 1, 2, 3] * 2
     for number, ((_, first), (_, second)) in enumerate(pairwise(watched), 1):
         if number != 4:
             # All but the end of the prompt, where the reply was asked for, is there.
@@ -445,7 +445,9 @@ def test_histories_of_a_tiny_model(prepare_run, tmp_path, watched, make_clip):
         watched.clear()
         outcome = execute(prepare_run(QWEN, data=data, greedy=True, history=history, **more))
         assert not any(record.failure for record in outcome.records)
-        firsts = [reply.n_context_tokens for parts, reply in watched if not done_so_far(parts)]
+        firsts = [
+            reply.n_context_tokens for parts, reply in watched if not actions_in_prompt(parts)
+        ]
         assert len(firsts) == len(outcome.records) == 4  # one of five belongs to no task
         if history == "full":
             whole = firsts
@@ -476,7 +478,7 @@ def test_a_memory_stands_in_for_the_history(run_scripted, data):
     _, full = run_scripted(as_expert(data))
     _, model = run_scripted(as_expert(data), history="memory", memory="last", memory_args="k=2")
     histories, beginnings = (
-        [parts for parts, _ in model_requests if not done_so_far(parts)]
+        [parts for parts, _ in model_requests if not actions_in_prompt(parts)]
         for model_requests in (full.requests, model.requests)
     )
     for history, beginning in zip(histories, beginnings, strict=True):

@@ -15,7 +15,7 @@ from model_adapters import check_adapter, load
 from model_adapters.policies.http import client
 from model_adapters.policies.policy import VlaPolicy
 
-from ..servers import Answer, asked_image, policy_answers, send, serving
+from ..servers import Answer, policy_answers, read_image, send, serve
 
 Frames = tuple[FrameRef, FrameRef]
 ACTION = [0.1, 0.2, 0.3, -0.1, -0.2, -0.3, 1.0]
@@ -33,7 +33,7 @@ def _act(url: str, frame: FrameRef, **settings: str) -> Any:
 
 
 def _refused(answer: Answer, frame: FrameRef, **settings: str) -> str:
-    with serving(answer) as url, pytest.raises(ModelError) as caught:
+    with serve(answer) as url, pytest.raises(ModelError) as caught:
         _act(url, frame, **settings)
     assert f"{url}/act" in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -51,7 +51,7 @@ def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
         requests.append(request)
         return ACTION
 
-    with serving(answer) as url:
+    with serve(answer) as url:
         (step,) = _act(url + ending, plain_frames[1], image=image, unnorm_key="bridge_orig")
     assert (step.translation, step.rotation, step.gripper) == (
         (0.1, 0.2, 0.3),
@@ -61,19 +61,19 @@ def test_a_frame_and_an_instruction_are_sent_and_an_action_comes_back(
     (request,) = requests
     assert request.keys() == {"image", "instruction", "unnorm_key"}
     assert (request["instruction"], request["unnorm_key"]) == ("pick up the mug", "bridge_orig")
-    seen = asked_image(request)
+    seen = read_image(request)
     assert (seen.shape, seen.dtype, np.unique(seen).tolist()) == ((300, 300, 3), np.uint8, [255])
 
 
 def test_without_a_key_none_is_sent(plain_frames: Frames) -> None:
     requests = []
-    with serving(lambda request, _: requests.append(request) or ACTION) as url:
+    with serve(lambda request, _: requests.append(request) or ACTION) as url:
         _act(url, plain_frames[0])
     assert "unnorm_key" not in requests[0]
 
 
 def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
-    with serving(lambda *_: [ACTION] * 4) as url:
+    with serve(lambda *_: [ACTION] * 4) as url:
         assert len(_act(url, plain_frames[0])) == 4
         assert len(_act(url, plain_frames[0], execute="2")) == 2
 
@@ -81,7 +81,7 @@ def test_chunks_are_taken_and_cut(plain_frames: Frames) -> None:
 def test_a_policy_behind_a_server_acts_as_it_does_here(
     policies: dict[str, VlaPolicy], plain_frames: Frames
 ) -> None:
-    with serving(policy_answers(policies["openvla"])) as url:
+    with serve(policy_answers(policies["openvla"])) as url:
         policy: Any = load("vla-http", {"url": url}, 0)
         check_adapter(policy)
         assert policy.act(plain_frames[1], "close the fridge") == policies["openvla"].act(
@@ -180,7 +180,7 @@ def test_a_lost_connection_is_tried_again(
             return None
         return ACTION
 
-    with serving(answer) as url:
+    with serve(answer) as url:
         assert _act(url, plain_frames[0], retries="2")
         assert n_asked == 3
         n_asked = 0
