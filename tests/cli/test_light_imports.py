@@ -56,7 +56,7 @@ def test_listings_and_help_are_printed_at_once(typed: str) -> None:
 FIRST_QUESTION = """
 import os, sys
 from infthor_eval.cli import main
-from infthor_eval.nieh import answering
+from infthor_eval.nieh.asking import answering
 
 def print_modules(*_):
     print(*sorted(sys.modules), flush=True)

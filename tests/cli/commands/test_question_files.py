@@ -151,17 +151,14 @@ def test_a_row_without_an_answer_is_told_by_every_command_that_takes_question_fi
         "".join(json.dumps({"question_id": f"single{n}", "reply": "yes"}) + "\n" for n in range(3))
     )
     expected = f"{FILES[0]}, line 3: answer is empty; fill it or remove the row"
-    commands = {
-        ("table4", tmp_path): 0,
-        ("audit", tmp_path): 0,
-        (
-            "import-replies",
-            log,
-            *option_words(data=tmp_path, model="m", output=tmp_path / "out"),
-        ): 1,
-        option_words(model="oracle", tasks="nieh_gt", data=tmp_path, output=tmp_path / "out"): 0,
-    }
-    for command, code in commands.items():
+    output = tmp_path / "out"
+    commands = (
+        (0, ["table4", tmp_path]),
+        (0, ["audit", tmp_path]),
+        (1, ["import-replies", log, *option_words(data=tmp_path, model="m", output=output)]),
+        (0, option_words(model="oracle", tasks="nieh_gt", data=tmp_path, output=output)),
+    )
+    for code, command in commands:
         ended, _, err = run_cli(*command)
         assert (ended, expected in " ".join(err.split())) == (code, True), (command, err)
         assert (
