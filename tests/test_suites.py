@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 SUITE = """
 from dataclasses import dataclass, field
 from infthor_eval.report.plain import PlainPresenter
-from tests.runs.toy import ToySuite
+from tests.helpers.toy_suite import ToySuite
 
 @dataclass(frozen=True)
 class Options:

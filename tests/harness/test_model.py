@@ -117,7 +117,7 @@ def install(monkeypatch):
     module, or none."""
 
     def install(adapter):
-        points = [EntryPoint("toy", "tests.runs.toy:ToySuite", "infthor_eval.suites")]
+        points = [EntryPoint("toy", "tests.helpers.toy_suite:ToySuite", "infthor_eval.suites")]
         if adapter is not None:
             points.append(EntryPoint("toy", f"{__name__}:{adapter}", "infthor_eval.lm_eval"))
         monkeypatch.setattr(
