@@ -1,7 +1,10 @@
-"""Runs of episodes that are disturbed, and what is to be equal in them all the same."""
+"""Runs of episodes whose simulators die, and what is to be equal in them all the same."""
 
+import os
+import signal
+from collections import Counter
 from collections.abc import Iterable
-from typing import Any, Protocol
+from typing import Any
 
 import msgspec
 import pytest
@@ -9,14 +12,7 @@ import pytest
 from infthor_eval.runs import UnitRecord
 from infthor_eval.thor.controller import SafeController
 
-__all__ = ["CallCounter", "drop_times", "watch_calls"]
-
-
-class CallCounter(Protocol):
-    """What is told of every call of a simulator in this process."""
-
-    def come(self, controller: SafeController) -> None:
-        """A call is about to be made."""
+__all__ = ["SimulatorCalls", "drop_times", "simulator_calls"]
 
 
 def drop_times(records: Iterable[UnitRecord[Any]]) -> list[UnitRecord[Any]]:
@@ -26,8 +22,42 @@ def drop_times(records: Iterable[UnitRecord[Any]]) -> list[UnitRecord[Any]]:
     ]
 
 
-def watch_calls(monkeypatch: pytest.MonkeyPatch, calls: CallCounter) -> None:
-    """Tell a counter of every call of a simulator in this process."""
+class SimulatorCalls:
+    """The calls of simulators in this process: counted by agent mode, and processes killed before
+    some of them.
+
+    Attributes:
+        n: how many there were so far, by mode: "arm" or "default".
+        deadly: modes and numbers of those that come, before which the process is killed.
+        killed: how often it was.
+    """
+
+    def __init__(self) -> None:
+        self.n: Counter[str] = Counter()
+        self.deadly: set[tuple[str, int]] = set()
+        self.killed = 0
+
+    def come(self, controller: SafeController) -> None:
+        """Count a call that is about to be made."""
+        process = controller.server and controller.server.unity_proc
+        if controller.last_event is None or process is None:
+            return  # at starting
+        mode = "arm" if controller.last_event.metadata.get("arm") else "default"
+        self.n[mode] += 1
+        if (mode, self.n[mode]) in self.deadly:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+            self.killed += 1
+
+    def deadly_from_now(self, numbers: Iterable[int], mode: str = "default") -> None:
+        """Kill before calls of a mode, numbered from those that were so far."""
+        self.deadly = {(mode, self.n[mode] + number) for number in numbers}
+
+
+@pytest.fixture
+def simulator_calls(monkeypatch: pytest.MonkeyPatch, shared_simulators: None) -> SimulatorCalls:
+    """The calls of the simulators that tests share."""
+    calls = SimulatorCalls()
     step = SafeController.step
 
     def counted(controller: SafeController, action: Any = None, **arguments: Any) -> Any:
@@ -35,3 +65,4 @@ def watch_calls(monkeypatch: pytest.MonkeyPatch, calls: CallCounter) -> None:
         return step(controller, action, **arguments)
 
     monkeypatch.setattr(SafeController, "step", counted)
+    return calls

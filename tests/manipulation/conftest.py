@@ -11,6 +11,7 @@ from infthor_eval.runs import PreparedRun
 from infthor_eval.thor.launch import embedded_launch
 from infthor_eval.thor.simulator import Simulator
 
+from ..episodes.interrupted import simulator_calls  # noqa: F401 - a fixture
 from ..episodes.pool import Pool, pool, shared_simulators  # noqa: F401 - fixtures
 from ..episodes.preparing import make_preparer
 from ..helpers.trajectories import MUG, cut_trajectory, write_trajectories

@@ -14,7 +14,7 @@ from infthor_eval.manipulation.records import RECORDS
 from infthor_eval.runs import execute, read_run
 from model_adapters import Capabilities
 
-from ..episodes.interrupted import drop_times, watch_calls
+from ..episodes.interrupted import drop_times
 from ..helpers.processes import ChildCounter, find_children, finish, start_cli
 from ..helpers.trajectories import CANDLE, MUG, cut_trajectory, write_trajectories
 from ..helpers.waiting import wait_until
@@ -65,44 +65,16 @@ def lines(output):
 # -- simulators die
 
 
-class Calls:
-    """Calls of simulators in this process: counted by agent mode, and processes killed before some
-    of them."""
-
-    def __init__(self):
-        self.n = {"arm": 0, "default": 0}
-        self.deadly = set()
-        self.killed = 0
-
-    def come(self, controller):
-        process = controller.server and controller.server.unity_proc
-        if controller.last_event is None or process is None:
-            return  # at starting
-        mode = "arm" if controller.last_event.metadata.get("arm") else "default"
-        self.n[mode] += 1
-        if (mode, self.n[mode]) in self.deadly:
-            os.kill(process.pid, signal.SIGKILL)
-            process.wait()
-            self.killed += 1
-
-
-@pytest.fixture
-def calls(monkeypatch, shared_simulators):
-    calls = Calls()
-    watch_calls(monkeypatch, calls)
-    return calls
-
-
 @pytest.mark.parametrize("mode", ["arm", "default"])
 def test_a_simulator_that_dies_in_mid_episode_changes_no_result_and_is_told(
-    prepare_run, tmp_path, calls, mode
+    prepare_run, tmp_path, simulator_calls, mode
 ):
     whole = execute(prepare_run("random-arm", output=tmp_path / "whole"))
-    n_calls = calls.n[mode]
+    n_calls = simulator_calls.n[mode]
     assert n_calls > 20
-    calls.deadly = {(mode, n_calls + 2 * n_calls // 3)}
+    simulator_calls.deadly = {(mode, n_calls + 2 * n_calls // 3)}
     disturbed = execute(prepare_run("random-arm", output=tmp_path / "disturbed"))
-    assert calls.killed == 1
+    assert simulator_calls.killed == 1
     assert drop_times(disturbed.records) == drop_times(whole.records)
     assert disturbed.summary.summary == whole.summary.summary
     assert [fault for record in whole.records for fault in record.faults] == []

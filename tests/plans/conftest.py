@@ -7,6 +7,7 @@ import pytest
 
 from infthor_eval.runs import PreparedRun
 
+from ..episodes.interrupted import simulator_calls  # noqa: F401 - a fixture
 from ..episodes.pool import pool, shared_simulators  # noqa: F401 - fixtures
 from ..episodes.preparing import make_preparer
 from ..helpers.trajectories import FORK, cut_trajectory, write_trajectories

@@ -15,7 +15,7 @@ from infthor_eval.plans.environment import PlanEnvironment
 from infthor_eval.plans.records import RECORDS
 from infthor_eval.runs import execute, read_run
 
-from ..episodes.interrupted import drop_times, watch_calls
+from ..episodes.interrupted import drop_times
 from ..helpers.processes import finish, start_cli
 from ..helpers.trajectories import FORK, MUG, cut_trajectory, write_trajectories
 from ..helpers.waiting import wait_until
@@ -69,40 +69,6 @@ def test_a_run_that_is_killed_again_and_again_ends_as_one_that_is_not(tmp_path):
     assert len(read_results(tmp_path / "whole")[0]) == 7
 
 
-class Calls:
-    """The calls of simulators in this process: counted, and their processes killed before some of
-    them.
-
-    Attributes:
-        n: how many there were so far.
-        deadly: numbers of those that come, before which the process is killed.
-        killed: how often it was.
-    """
-
-    def __init__(self):
-        self.n, self.deadly, self.killed = 0, set(), 0
-
-    def come(self, controller):
-        process = controller.server and controller.server.unity_proc
-        if controller.last_event is None or process is None:
-            return  # at starting
-        self.n += 1
-        if self.n in self.deadly:
-            os.kill(process.pid, signal.SIGKILL)
-            process.wait()
-            self.killed += 1
-
-    def deadly_from_now(self, numbers):
-        self.deadly = {self.n + number for number in numbers}
-
-
-@pytest.fixture
-def calls(monkeypatch, shared_simulators):
-    calls = Calls()
-    watch_calls(monkeypatch, calls)
-    return calls
-
-
 def n_restarts(outcome):
     faults = [fault for record in outcome.records for fault in record.faults]
     assert all(fault.startswith("simulator started again: ") for fault in faults)
@@ -111,23 +77,25 @@ def n_restarts(outcome):
 
 @pytest.mark.parametrize("model", ["planner", "random"])
 def test_a_simulator_that_dies_in_mid_plan_changes_no_result_and_is_counted(
-    prepare_run, tmp_path, calls, model
+    prepare_run, tmp_path, simulator_calls, model
 ):
     whole = execute(prepare_run(model, output=tmp_path / "whole"))
-    n_calls = calls.n
-    calls.deadly_from_now(random.Random(3).sample(range(1, n_calls), 2))
+    n_calls = simulator_calls.n["default"]
+    simulator_calls.deadly_from_now(random.Random(3).sample(range(1, n_calls), 2))
     disturbed = execute(prepare_run(model, output=tmp_path / "disturbed"))
     assert drop_times(disturbed.records) == drop_times(whole.records)
     assert disturbed.summary.summary == whole.summary.summary
-    assert (n_restarts(whole), n_restarts(disturbed), calls.killed) == (0, 2, 2)
+    assert (n_restarts(whole), n_restarts(disturbed), simulator_calls.killed) == (0, 2, 2)
 
 
-def test_an_episode_survives_more_deaths_than_one_plan_may_have(prepare_run, tmp_path, calls):
+def test_an_episode_survives_more_deaths_than_one_plan_may_have(
+    prepare_run, tmp_path, simulator_calls
+):
     whole = execute(prepare_run(output=tmp_path / "whole"))
-    calls.deadly_from_now(range(10, 400, 28))
+    simulator_calls.deadly_from_now(range(10, 400, 28))
     disturbed = execute(prepare_run(output=tmp_path / "disturbed"))
     assert drop_times(disturbed.records) == drop_times(whole.records)
-    assert n_restarts(disturbed) == calls.killed > 3
+    assert n_restarts(disturbed) == simulator_calls.killed > 3
 
 
 @pytest.mark.usefixtures("shared_simulators")
